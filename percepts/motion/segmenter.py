@@ -16,6 +16,7 @@ import numpy as np
 
 from visup.agent import Directive, Frame, Region
 from visup.agent.contract.saving import saved_attributes
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.motion_constraints import (
     Constraints,
     Points,
@@ -170,7 +171,9 @@ class MotionSegmenter:
         share = self._foreground.belief.share
         self.trace = SegmentationTrace(scene, tracks, keys, labelling.posterior, cues, share)
         if self._static.active:
-            regions = report_regions(tracks, scene, self._size, self.settings, self._beside)
+            found = report_regions(tracks, scene, self._size, self.settings, self._beside)
+            known = self._foreground.objects
+            regions = tuple(replace(r, id=known.id_of_track(r.id)) for r in found)
         else:
             regions = report_objects(
                 self._foreground, tracks, scene, self._size, self.settings, self._beside

@@ -21,7 +21,7 @@ from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import Belief
-from visup.percepts.motion.foreground.cues import FrameCues
+from visup.percepts.motion.foreground.cues import NAMES, FrameCues
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 Keys = NDArray[np.int64]
@@ -30,6 +30,8 @@ CAME = 0.4  # share of a cell that comes from an object for it to be that object
 OWNED = 0.5  # share of a new track that is an object's already: then it is a part of that one
 EXISTS = 0.7  # running mean of the belief in what is reported: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
 EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # the same for what no track follows: both beliefs
+LEAST_PX = 0.25  # beside the ground, from frame to frame: twice what sampling and compression leave
+RESIDUAL = NAMES.index("residual")
 FOLLOW = 0.4  # weight of the newest frame in it
 LASTS = 3  # frames for which a candidate is seen before it is an object
 NEAR = 12  # steps from cell to cell over which an object is hung together with
@@ -92,6 +94,10 @@ class ForegroundObjects:
         seen = [o for o in known if o.last_seen == now]
         return sorted(seen, key=lambda o: o.id)
 
+    def id_of_track(self, track: int) -> int:
+        """The public id of the object that a track follows; the track's own where there is none."""
+        return next((o.id for o in self.known.values() if o.track == track), track)
+
 
 def no_objects() -> ForegroundObjects:
     """Before the first frame."""
@@ -144,6 +150,9 @@ def follow_objects(
     last_key += len(fresh)
     known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
     objects = ForegroundObjects(owner, known, last_key)
+    # What goes no further than sampling leaves from frame to frame does not bear itself out.
+    moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
+    belief = replace(belief, alone=belief.alone * moved)
     return _seen(objects, belief, cues.area, now, least, ids)
 
 

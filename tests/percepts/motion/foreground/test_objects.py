@@ -22,13 +22,13 @@ COUNT = 40  # cells in a row, each linked to the next
 STEP = 1 / 25
 
 
-def row(shift: int = 0) -> FrameCues:
-    """Cells in a row, whose contents came from `shift` cells to the left."""
+def row(shift: int = 0, residual: float = 0.0) -> FrameCues:
+    """Cells in a row, whose contents came from `shift` cells to the left; all cues are `residual`."""
     ones = np.ones(COUNT - 1, np.float32)
     link = sparse.diags([ones, ones], [-1, 1], format="csr")
     here = np.arange(max(shift, 0), COUNT + min(shift, 0), dtype=np.int32)
     return FrameCues(
-        np.zeros((COUNT, len(NAMES)), np.float32),
+        np.full((COUNT, len(NAMES)), residual, np.float32),
         np.full(COUNT, 64, np.float32),
         np.zeros(COUNT, np.int64),
         link.indptr,
@@ -71,11 +71,12 @@ class Row:
         seen: TrackCells | None = None,
         shift: int = 0,
         alone: NDArray[np.float32] | None = None,
+        residual: float = 0.0,
     ) -> dict[int, list[int]]:
         """Public id -> cells."""
         self.frame += 1
         now = self.frame * STEP
-        cues = row(shift)
+        cues = row(shift, residual)
         none = np.zeros(BINS**3)
         belief = Belief(believed, believed if alone is None else alone, none, none)
         self.objects = follow_objects(
@@ -111,6 +112,20 @@ def test_what_only_its_past_and_its_looks_speak_for_is_none() -> None:
         found = world.step(share(slice(5, 15)))
     assert found
     assert world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)), alone=share()) == found
+
+
+def test_what_goes_nowhere_begins_no_object() -> None:
+    world = Row()
+    assert all(world.step(share(slice(5, 15)), residual=-2.0) == {} for _ in range(20))
+
+
+def test_the_id_of_a_track_is_that_of_its_object() -> None:
+    world = Row()
+    for _ in range(LASTS):
+        found = world.step(share(slice(5, 15)))
+    world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
+    assert world.objects.id_of_track(7) == next(iter(found))
+    assert world.objects.id_of_track(9) == 9
 
 
 def test_a_track_gives_its_id_at_once_and_its_whole_body_belongs_to_it() -> None:
