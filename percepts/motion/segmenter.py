@@ -162,26 +162,33 @@ class MotionSegmenter:
         tracks = self._updated(tracks, scene, evidence, labelling)
         wanted = looked_at(directives, tracks, scene)
         tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, wanted)
-        tracked = TrackPosterior(tracks, keys, labelling.posterior)
-        least = min_region_area(scene, self.settings)
-        old = self._history.back(1)
-        cues, self._foreground = follow_foreground(
-            self._foreground, self._model, scene, old, tracked, least, self._ids
-        )
-        share = self._foreground.belief.share
-        self.trace = SegmentationTrace(scene, tracks, keys, labelling.posterior, cues, share)
-        if self._static.active:
-            found = report_regions(tracks, scene, self._size, self.settings, self._beside)
-            known = self._foreground.objects
-            regions = tuple(replace(r, id=known.id_of_track(r.id)) for r in found)
-        else:
-            regions = report_objects(
-                self._foreground, tracks, scene, self._size, self.settings, self._beside
-            )
+        self._follow_foreground(scene, TrackPosterior(tracks, keys, labelling.posterior))
+        regions = self._reported(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
         regions = self._shadows.step(frame, scene, regions, static=self._static.active)
         return select_regions(regions, directives)
+
+    def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
+        """Bring the belief in what moves, and its objects, up to date."""
+        least, old = min_region_area(scene, self.settings), self._history.back(1)
+        cues, self._foreground = follow_foreground(
+            self._foreground, self._model, scene, old, tracked, least, self._ids
+        )
+        known = self._foreground.objects
+        tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
+        share = self._foreground.belief.share
+        self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior, cues, share)
+
+    def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
+        """Regions of the objects of the foreground; of the tracks while the ground hardly moves."""
+        if not (self._static.active or self._foreground.calm):
+            return report_objects(
+                self._foreground, tracks, scene, self._size, self.settings, self._beside
+            )
+        found = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        known = self._foreground.objects
+        return tuple(replace(r, id=known.id_of_track(r.id)) for r in found)
 
     def _begin(self, image: WorkImage) -> None:
         """Take in the first frame of a size: there is nothing to compare it with."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.foreground.belief import Belief, unbiased, updated
-from visup.percepts.motion.foreground.cues import CueMemory, FrameCues, frame_cues, track_shares
+from visup.percepts.motion.foreground.cues import (
+    NAMES,
+    CueMemory,
+    FrameCues,
+    frame_cues,
+    track_shares,
+)
 from visup.percepts.motion.foreground.objects import (
     ForegroundObjects,
     TrackCells,
@@ -21,6 +26,12 @@ from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
+GROUND_SPEED = NAMES.index("ground_speed")
+CALM_PX = (
+    0.25  # cameras at rest and in orbit: 0.00 in the median; those that travel or pan: 0.5 to 34
+)
+FOLLOW = 0.2  # weight of the newest frame in the running mean
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForegroundState:
@@ -30,11 +41,18 @@ class ForegroundState:
         memory: What the cues of the next frame need; None before the first.
         belief: Of its superpixels.
         objects: Those that it is made of.
+        ground_px: Running mean of how far the ground goes from frame to frame, working pixels.
     """
 
     memory: CueMemory | None
     belief: Belief
     objects: ForegroundObjects
+    ground_px: float = 0.0
+
+    @property
+    def calm(self) -> bool:
+        """Whether the ground hardly moves: then tracks, over long baselines, tell more than single frames."""
+        return self.ground_px < CALM_PX
 
 
 def no_foreground() -> ForegroundState:
@@ -52,8 +70,8 @@ class TrackPosterior:
         posterior: (count, K + 2) float32, shares of background, tracks and unknown motion.
     """
 
-    tracks: Sequence[Track]
-    keys: Sequence[int]
+    tracks: tuple[Track, ...]
+    keys: tuple[int, ...]
     posterior: Floats
 
     def cells(self, now: float) -> TrackCells:
@@ -100,4 +118,6 @@ def follow_foreground(
     belief = updated(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
     objects = follow_objects(state.objects, cues, belief, tracks, scene.time, least, ids)
-    return cues, ForegroundState(memory, belief, objects)
+    speed = float(np.exp(cues.values[0, GROUND_SPEED])) - 0.1
+    known = state.ground_px if state.memory is not None else speed
+    return cues, ForegroundState(memory, belief, objects, known + FOLLOW * (speed - known))

@@ -96,7 +96,8 @@ class ForegroundObjects:
 
     def id_of_track(self, track: int) -> int:
         """The public id of the object that a track follows; the track's own where there is none."""
-        return next((o.id for o in self.known.values() if o.track == track), track)
+        owners = (o.id for o in self.known.values() if track > 0 and o.track == track)
+        return next(owners, track)
 
 
 def no_objects() -> ForegroundObjects:

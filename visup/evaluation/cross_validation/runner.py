@@ -25,7 +25,6 @@ from visup.evaluation.motion.variants import PLAIN, VARIANTS
 from visup.evaluation.training.closed_loop import train
 from visup.evaluation.training.runner import (
     TrainingPlan,
-    composed_examples,
     found_below,
     gathered,
     known_or_error,
@@ -155,7 +154,7 @@ def _learnt(
 ) -> dict[int, Path]:
     """The models of the folds, each learnt from all other folds, and what is always learnt from, as files."""
     how = TrainingPlan(plan.cache, plan.seed)
-    common = gathered(found_below(plan.also), how, progress) | composed_examples(how, progress)
+    common = gathered(found_below(plan.also), how, progress)
     found = gathered(sequences, how, progress)
     out = {}
     for number in sorted(set(fold.values())):

@@ -16,7 +16,6 @@ from visup.evaluation.motion.code_digest import code_digest, files_digest
 from visup.evaluation.motion.mask_scores import UNSCORED
 from visup.evaluation.motion.runner import LabelledSequence, labelled_frames
 from visup.evaluation.motion.variants import AS_IT_IS
-from visup.evaluation.training.composites import composed
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.cues import FrameCues
 from visup.percepts.motion.segmenter import MotionSegmenter
@@ -54,13 +53,6 @@ def collected(sequence: LabelledSequence, limit: int | None, cache: Path) -> lis
     digest.update(files_digest(sequence))
     file = cache / f"{digest.hexdigest()}.npz"
     return _kept(file, lambda: labelled_frames(sequence, AS_IT_IS, limit))
-
-
-def collected_composition(seed: int, cache: Path) -> list[Example]:
-    """The examples of a clip composed from a seed, in the same way."""
-    digest = hashlib.sha256(code_digest((*CODE, "evaluation/training/composites.py")))
-    digest.update(f"composed {seed}".encode())
-    return _kept(cache / f"{digest.hexdigest()}.npz", lambda: composed(seed))
 
 
 Footage = Iterable[tuple[Frame, NDArray[np.uint8] | None]]

@@ -10,11 +10,10 @@ from visup.agent.model.errors import OutputError, SettingsError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences
 from visup.evaluation.training.closed_loop import train
-from visup.evaluation.training.examples import Example, collected, collected_composition
+from visup.evaluation.training.examples import Example, collected
 from visup.percepts.motion.foreground.perceptron import write_model
 
 LIMIT = 250  # frames of a sequence that are learnt from
-COMPOSED = 36  # clips composed at random that are learnt from besides
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +48,6 @@ def train_motion(
     """
     examples = known_or_error(gathered(found_below(folders), plan, progress))
     made = {"sequences": sorted(examples), "seed": plan.seed, "limit": plan.limit}
-    examples |= composed_examples(plan, progress)
     model = train(examples, plan.seed, progress)
     try:
         write_model(model, out, made)
@@ -80,14 +78,6 @@ def gathered(
         progress(name)
         out[name] = collected(sequence, plan.limit, plan.cache)
     return out
-
-
-def composed_examples(
-    plan: TrainingPlan, progress: Progress = silent
-) -> dict[str, Sequence[Example]]:
-    """The examples of clips composed at random, by name; each is a family of its own."""
-    progress("composed clips")
-    return {f"composed/{seed}": collected_composition(seed, plan.cache) for seed in range(COMPOSED)}
 
 
 def known_or_error(
