@@ -32,7 +32,11 @@ from visup.percepts.motion.foreground.following import (
     follow_foreground,
     no_foreground,
 )
-from visup.percepts.motion.foreground.perceptron import read_model, shipped_model
+from visup.percepts.motion.foreground.perceptron import (
+    ForegroundModel,
+    read_model,
+    shipped_model,
+)
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 from visup.percepts.motion.layers.background_motion import (
@@ -97,8 +101,7 @@ class MotionSegmenter:
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
-        given = self.settings.foreground
-        self._model = shipped_model() if given is None else read_model(given)
+        self._model = _model(self.settings)
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -170,7 +173,10 @@ class MotionSegmenter:
         return select_regions(regions, directives)
 
     def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
-        """Bring the belief in what moves, and its objects, up to date."""
+        """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
+        if self._model is None:
+            self.trace = SegmentationTrace(scene, tracked.tracks, tracked.keys, tracked.posterior)
+            return
         least, old = min_region_area(scene, self.settings), self._history.back(1)
         cues, self._foreground = follow_foreground(
             self._foreground, self._model, scene, old, tracked, least, self._ids
@@ -182,7 +188,7 @@ class MotionSegmenter:
 
     def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
         """Regions of the objects of the foreground; of the tracks while the ground hardly moves."""
-        if not (self._static.active or self._foreground.calm):
+        if self._model is not None and not (self._static.active or self._foreground.calm):
             return report_objects(
                 self._foreground, tracks, scene, self._size, self.settings, self._beside
             )
@@ -337,3 +343,10 @@ class MotionSegmenter:
         nearest = min(fresh, key=lambda r: abs(np.log(r.span_s / span)))
         bend = None if nearest.bend is None else nearest.bend * span
         return Affine(nearest.matrix * span, bend=bend)
+
+
+def _model(settings: MotionSettings) -> ForegroundModel | None:
+    """What was learnt of moving foreground, where that is wanted."""
+    if settings.foreground is not None:
+        return read_model(settings.foreground)
+    return shipped_model() if settings.learnt else None

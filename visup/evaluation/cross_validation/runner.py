@@ -173,7 +173,7 @@ def tried_changes(text: str) -> dict[str, Any]:
     Raises:
         SettingsError: A setting is unknown or its value is no number.
     """
-    known = {f.name: f.type for f in fields(MotionSettings) if f.type in ("int", "float")}
+    known = {f.name: f.type for f in fields(MotionSettings) if f.type in ("bool", "int", "float")}
     given: dict[str, Any] = {}
     for part in text.split(","):
         name, _, value = (p.strip() for p in part.partition("="))
@@ -184,7 +184,7 @@ def tried_changes(text: str) -> dict[str, Any]:
                 expected=f"name=value with one of {', '.join(known)}",
             )
         try:
-            given[name] = int(value) if known[name] == "int" else float(value)
+            given[name] = float(value) if known[name] == "float" else int(value)
         except ValueError:
             raise SettingsError(
                 f"{value!r} is no value for {name}", where="--try", expected="a number"

@@ -16,6 +16,7 @@ from visup.evaluation.motion.code_digest import code_digest, files_digest
 from visup.evaluation.motion.mask_scores import UNSCORED
 from visup.evaluation.motion.runner import LabelledSequence, labelled_frames
 from visup.evaluation.motion.variants import AS_IT_IS
+from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.cues import FrameCues
 from visup.percepts.motion.segmenter import MotionSegmenter
@@ -67,10 +68,10 @@ def _kept(file: Path, footage: Callable[[], Footage]) -> list[Example]:
 
 def _collect(footage: Footage) -> Iterator[Example]:
     """The examples of a video as it is segmented."""
-    segmenter = MotionSegmenter()
+    segmenter = MotionSegmenter(MotionSettings(learnt=True))
     for frame, labels in footage:
         segmenter.step(frame)
-        if segmenter.trace is not None:
+        if segmenter.trace is not None and segmenter.trace.cues is not None:
             cells = segmenter.trace.scene.cells
             truth, scored = _cell_truth(labels, cells.labels, cells.count)
             yield Example(segmenter.trace.cues, truth, scored)
