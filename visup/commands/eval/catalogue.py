@@ -92,6 +92,29 @@ EVALUATIONS = (
         adapters.machines_closing,
     ),
     EvaluationCommand(
+        "orbits",
+        "Missions in orbit drawn from a seed: rendered, supervised, scored, thrown away.",
+        f"{_ADAPTERS}:random_orbits",
+        "supervising",
+        (
+            "identity",
+            "event_f1",
+            "stage",
+            "false_alerts",
+            "verdicts_right",
+            "view_deg",
+            "spin_error",
+        ),
+        (
+            _count("count", 20, "How many missions."),
+            _SEED,
+            _count("width", 480, "Of the image, pixels.", 64),
+            _count("workers", None, "Processes; as many as there are cores by default."),
+            _LIMIT,
+        ),
+        closing=adapters.orbits_closing,
+    ),
+    EvaluationCommand(
         "random",
         """Worlds drawn from a seed: rendered, taught, watched, scored like machines, thrown away.
 
@@ -192,6 +215,7 @@ EVALUATIONS = (
         (),
         (
             _count("views", 32, "Views of each mesh in the database."),
+            _flag("machines", "Add thirteen machines that are made by code."),
             _count("queries", 12, "Silhouettes asked for of each mesh."),
             _count("seed", 0, "Of the queries.", 0),
             _count("limit", None, "Meshes, for a quick look."),

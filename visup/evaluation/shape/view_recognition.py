@@ -52,6 +52,7 @@ def evaluate_views(
     queries: int = 12,
     seed: int = 0,
     limit: int | None = None,
+    machines: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Figures of recognising meshes from unseen directions.
@@ -61,7 +62,8 @@ def evaluate_views(
         views: Views of each mesh in the database.
         queries: Silhouettes of each mesh that are asked for.
         seed: Of the queries' directions, rolls, sizes and damage.
-        limit: Meshes, for a quick look; all by default.
+        limit: Meshes of the folder, for a quick look; all by default.
+        machines: Whether the machines that are made by code (`render/meshes/machines.py`) are added.
         progress: Shows what is being done.
 
     Returns:
@@ -80,6 +82,7 @@ def evaluate_views(
     meshes = _listed(folder, limit)
     others = descriptors()
     with tempfile.TemporaryDirectory() as scratch:
+        meshes += _machines(Path(scratch)) if machines else []
         progress(f"views of {len(meshes)} meshes")
         begin = time.perf_counter()
         database = build_database(
@@ -104,6 +107,14 @@ def _listed(folder: Path, limit: int | None) -> list[Path]:
             expected=f"mesh files ({', '.join(MESHES)})",
         )
     return found
+
+
+def _machines(folder: Path) -> list[Path]:
+    """The machines that are made by code, as mesh files in a folder."""
+    from visup.render.meshes.machines import MACHINES
+    from visup.render.meshes.spacecraft import write_meshes
+
+    return write_meshes(MACHINES, folder)
 
 
 def _asked(
