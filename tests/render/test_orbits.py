@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,7 @@ def test_the_tip_draws_nearer_until_the_touch() -> None:
         )
         for t in np.linspace(0, touch_s(scenario), 6)
     ]
-    assert all(a > b for a, b in zip(apart, apart[1:], strict=False))
+    assert all(a > b for a, b in pairwise(apart))
 
 
 def test_an_outcome_that_is_none_is_refused() -> None:

@@ -27,9 +27,9 @@ SEEDS_APART = 10_000
 SCENERY = ("sill", "slab", "payload_bay")
 """Meshes that nobody looks for."""
 
-_ARM_SEEDS = range(9_000_000, 9_000_012)
+_ARM_SEEDS = range(9_000_000, 9_000_024)
 _ARM_EVERY = 25
-_ARM_EXEMPLARS = 16
+_ARM_EXEMPLARS = 32
 
 
 def evaluate_orbits(
