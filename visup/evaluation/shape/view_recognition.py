@@ -25,6 +25,10 @@ from visup.evaluation.shape.view_queries import CONDITIONS, Query, draw_queries
 from visup.percepts.shape.building.database_builder import build_database
 from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
+from visup.rules.identity.votes import VoteSettings
+
+STRANGER = VoteSettings().stranger
+"""Similarity above which a name gets more votes than that the object is none of the models."""
 
 TOP = 5
 """Different objects that are looked at for `top5`."""
@@ -43,6 +47,8 @@ class _QueryResult:
     angle: float | None
     seconds: float
     compared: float
+    own: float
+    other: float
 
 
 def evaluate_views(
@@ -69,9 +75,12 @@ def evaluate_views(
     Returns:
         {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
         and `top5` (shares of queries whose object is the first of all, or among the five best) and
-        `angle_deg` (median angle between the best view of the right object and the true direction);
-        `ms_query` from mask to ranking, `compared` as a share of all views, `build_views_per_s`; under
-        `baseline`, `top1` of other descriptors on the same views and queries.
+        `angle_deg` (median angle between the best view of the right object and the true direction),
+        `known_told` and `stranger_told` (shares of queries in which the right object, or without it in
+        the database the best other one, is as similar as counts for more than nothing known does) and
+        `ms` (median); `ms_query` from mask to ranking, the mean of the four conditions, `compared` as a
+        share of all views, `build_views_per_s`; under `baseline`, `top1` of other descriptors on the same
+        views and queries.
 
     Raises:
         SettingsError: There are no meshes, or a number is out of range.
@@ -147,6 +156,8 @@ def _answers(
             _angle(own, query, alike),
             seconds,
             ranking.compared / len(database.views),
+            own[0].similarity if own else 0.0,
+            max((m.similarity for m in ranking.matches if m.view.name != query.name), default=0.0),
         )
 
 
@@ -165,8 +176,11 @@ def _figures(answers: Sequence[_QueryResult]) -> dict[str, Any]:
             "top1": float(np.mean([a.rank == 0 for a in own])),
             "top5": float(np.mean([a.rank is not None for a in own])),
             "angle_deg": float(np.median(angles)) if angles else None,
+            "known_told": float(np.mean([a.own >= STRANGER for a in own])),
+            "stranger_told": float(np.mean([a.other >= STRANGER for a in own])),
+            "ms": 1e3 * float(np.median([a.seconds for a in own])),
         }
-    figures["ms_query"] = 1e3 * float(np.median([a.seconds for a in answers]))
+    figures["ms_query"] = float(np.mean([figures[c]["ms"] for c in CONDITIONS]))
     figures["compared"] = float(np.mean([a.compared for a in answers]))
     return figures
 
