@@ -35,6 +35,7 @@ class WatchOptions(TypedDict, total=False):
     zones: str | os.PathLike[str] | None
     patience_s: float
     detections: str | os.PathLike[str] | None
+    motion: bool
     preset: str | None
     attention: bool
 

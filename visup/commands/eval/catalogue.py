@@ -9,24 +9,19 @@ from typing import Annotated
 import typer
 
 from visup.commands.eval import adapters
-from visup.commands.eval.evaluation import EvaluationCommand, folder_argument
+from visup.commands.eval.evaluation import (
+    FOLDER,
+    LIMIT,
+    EvaluationCommand,
+    count,
+    flag,
+    folder_argument,
+)
+from visup.commands.eval.motion import MOTION
 from visup.commands.options import Setting
 from visup.runs.settings import Option
 
-
-def _count(name: str, default: int | None, about: str, at_least: int | None = 1) -> Setting:
-    """A whole number."""
-    kind = int if default is not None else int | None
-    return Setting(name, kind, default, Option(about, at_least=at_least))
-
-
-def _flag(name: str, about: str) -> Setting:
-    return Setting(name, bool, False, Option(about, f"--{name}"))
-
-
-_FOLDER = folder_argument("Folder with the data and its ground truth.")
-_LIMIT = _count("limit", None, "Frames (or shapes) of each item, for a quick look.", None)
-_SEED = _count("seed", 0, "Of all that is drawn.", 0)
+_SEED = count("seed", 0, "Of all that is drawn.", 0)
 _CLIP_NAMES = Parameter(
     "names",
     Parameter.KEYWORD_ONLY,
@@ -38,23 +33,15 @@ _CLIP_NAMES = Parameter(
 _ADAPTERS = "visup.commands.eval.adapters"
 
 EVALUATIONS = (
-    EvaluationCommand(
-        "motion",
-        "Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.",
-        "visup.evaluation.motion.runner:evaluate_motion",
-        "segmenting",
-        ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio"),
-        (_LIMIT,),
-        _FOLDER,
-    ),
+    MOTION,
     EvaluationCommand(
         "shapes",
         "Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time.",
         "visup.evaluation.shape.retrieval:evaluate_shapes",
         "comparing",
         ("nn1", "rank_sum", "bullseye", "ms_shape", "ms_pair", "compared", "lost"),
-        (_LIMIT,),
-        _FOLDER,
+        (LIMIT,),
+        FOLDER,
         adapters.shapes_closing,
     ),
     EvaluationCommand(
@@ -68,8 +55,8 @@ EVALUATIONS = (
             *("false_alerts_per_hour", "verdicts_right", "verdicts", "verdict"),
             *("view_deg", "spin_error", "fps"),
         ),
-        (Setting("models", Path | None, None, Option("Model database.")), _LIMIT),
-        _FOLDER,
+        (Setting("models", Path | None, None, Option("Model database.")), LIMIT),
+        FOLDER,
     ),
     EvaluationCommand(
         "machines",
@@ -84,11 +71,11 @@ EVALUATIONS = (
             *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
         ),
         (
-            _flag("eyes", "Regions are made from the masks of worlds: reasoning by itself."),
+            flag("eyes", "Regions are made from the masks of worlds: reasoning by itself."),
             Setting("baseline", bool, True, Option("Let CSRT watch, too.", "--baseline/--alone")),
-            _LIMIT,
+            LIMIT,
         ),
-        _FOLDER,
+        FOLDER,
         adapters.machines_closing,
     ),
     EvaluationCommand(
@@ -106,11 +93,11 @@ EVALUATIONS = (
             "spin_error",
         ),
         (
-            _count("count", 20, "How many missions."),
-            _SEED,
-            _count("width", 480, "Of the image, pixels.", 64),
-            _count("workers", None, "Processes; as many as there are cores by default."),
-            _LIMIT,
+            count("count", 20, "How many missions."),
+            SEED,
+            count("width", 480, "Of the image, pixels.", 64),
+            count("workers", None, "Processes; as many as there are cores by default."),
+            LIMIT,
         ),
         closing=adapters.orbits_closing,
     ),
@@ -128,12 +115,12 @@ EVALUATIONS = (
         ),
         (
             Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
-            _count("count", 60, "How many worlds."),
+            count("count", 60, "How many worlds."),
             _SEED,
-            _flag("eyes", "Regions are made from the masks: reasoning by itself."),
+            flag("eyes", "Regions are made from the masks: reasoning by itself."),
             Setting("baseline", bool, False, Option("Let CSRT watch, too.", "--baseline/--alone")),
-            _LIMIT,
-            _count("workers", None, "Processes that share the work; as many as there are cores."),
+            LIMIT,
+            count("workers", None, "Processes that share the work; as many as there are cores."),
         ),
         closing=adapters.random_closing,
     ),
@@ -147,9 +134,9 @@ EVALUATIONS = (
             *("false_reports", "hours", "false_reports_per_hour", "ms"),
         ),
         (
-            _count("faults", 100, "How many faults are injected."),
+            count("faults", 100, "How many faults are injected."),
             _SEED,
-            _count("limit", None, "Frames of each video when it is run unharmed."),
+            count("limit", None, "Frames of each video when it is run unharmed."),
         ),
         folder_argument("Folder with sound video anywhere below it."),
     ),
@@ -162,7 +149,7 @@ EVALUATIONS = (
         "visup.evaluation.alarms.runner:evaluate_alarms",
         "watching",
         ("alarms", "clips", "per_hour", "hours", "noted", "lines_per_min"),
-        (_LIMIT,),
+        (LIMIT,),
         folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
     ),
     EvaluationCommand(
@@ -189,7 +176,7 @@ EVALUATIONS = (
             *("open_ms", "first_ms", "ms_query", "ms_search", "ms_cpu"),
             *("ms_worst", "rss_mb", "compared", "lost"),
         ),
-        (_count("views", 100_000, "Views of the largest database."), _SEED),
+        (count("views", 100_000, "Views of the largest database."), _SEED),
         folder_argument("Folder of meshes (*.ply)."),
         adapters.scale_closing,
     ),
@@ -200,8 +187,8 @@ EVALUATIONS = (
         "damaging",
         ("trials", "refused", "answered", "nothing", "failed", "worst_s"),
         (
-            _count("files", 2000, "How many damaged database files.", 0),
-            _count("masks", 2000, "How many odd masks.", 0),
+            count("files", 2000, "How many damaged database files.", 0),
+            count("masks", 2000, "How many odd masks.", 0),
             _SEED,
         ),
         closing=adapters.failures_closing("{kind}, number {number}: {what}, {seconds:.2f} s"),
@@ -214,11 +201,11 @@ EVALUATIONS = (
         "recognising",
         (),
         (
-            _count("views", 32, "Views of each mesh in the database."),
-            _flag("machines", "Add thirteen machines that are made by code."),
-            _count("queries", 12, "Silhouettes asked for of each mesh."),
-            _count("seed", 0, "Of the queries.", 0),
-            _count("limit", None, "Meshes, for a quick look."),
+            count("views", 32, "Views of each mesh in the database."),
+            flag("machines", "Add thirteen machines that are made by code."),
+            count("queries", 12, "Silhouettes asked for of each mesh."),
+            count("seed", 0, "Of the queries.", 0),
+            count("limit", None, "Meshes, for a quick look."),
         ),
         folder_argument("Folder of mesh files."),
         adapters.views_closing,
@@ -232,7 +219,7 @@ EVALUATIONS = (
         "tests.oracles.runtime.behaviour_faults:evaluate_faults",
         "injecting",
         ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
-        (_count("count", 1000, "How many faults are injected."), _SEED),
+        (count("count", 1000, "How many faults are injected."), _SEED),
         closing=adapters.failures_closing("number {number}, {fault} in '{kind}': {problem}"),
         failed=adapters.any_failures,
     ),
@@ -246,9 +233,9 @@ EVALUATIONS = (
         "reading",
         ("files", "read", "refused", "raised", "slow", "crashed", "memory", "ran"),
         (
-            _count("count", 5000, "Damaged files of each kind."),
+            count("count", 5000, "Damaged files of each kind."),
             _SEED,
-            _count("races", 100, "How often two writers begin at once.", 0),
+            count("races", 100, "How often two writers begin at once.", 0),
             Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
         ),
         closing=adapters.failures_closing("{text}"),
@@ -261,7 +248,7 @@ EVALUATIONS = (
         "judging",
         ("fps", "fps_cpu", "plain_fps", "ratio", "changes", "seen_s"),
         (
-            _count("draws", 10_000, "Random pairs for the oracles."),
+            count("draws", 10_000, "Random pairs for the oracles."),
             Setting("minutes", float, 10.0, Option("How long boxes rest.", at_least=0.1)),
             _SEED,
         ),
@@ -277,7 +264,7 @@ EVALUATIONS = (
             *("formulas", "samples", "online", "different", "us", "samples_per_s", "times_rtamt"),
             *("rules", "ms", "concerns", "kept", "kb_each", "slower"),
         ),
-        (_count("formulas", 10_000, "How many random formulas.", 10), _SEED),
+        (count("formulas", 10_000, "How many random formulas.", 10), _SEED),
         closing=adapters.rules_closing,
         failed=adapters.rules_differ,
     ),
@@ -311,12 +298,12 @@ EVALUATIONS = (
             *("frames", "ms", "ms_ten", "rss_mb", "grown", "snapshot_kb"),
         ),
         (
-            _count("seeds", 20, "Runs of each mission."),
-            _count("first", 0, "The first seed.", 0),
-            _count("every", 1, "Use every n-th frame."),
-            _count("jobs", 2, "Processes."),
-            _flag("merge", "Coupled objects are seen as one region."),
-            _count("long", 0, "Instead: so many frames of a script, for memory and speed.", 0),
+            count("seeds", 20, "Runs of each mission."),
+            count("first", 0, "The first seed.", 0),
+            count("every", 1, "Use every n-th frame."),
+            count("jobs", 2, "Processes."),
+            flag("merge", "Coupled objects are seen as one region."),
+            count("long", 0, "Instead: so many frames of a script, for memory and speed.", 0),
         ),
         folder_argument("A mission, or a folder of missions."),
         adapters.reasoning_closing,
@@ -329,8 +316,8 @@ EVALUATIONS = (
         "damaging",
         (),
         (
-            _count("count", 100_000, "How many damaged files are read.", 0),
-            _count("seed", 0, "Seed of the first; one more for each file.", None),
+            count("count", 100_000, "How many damaged files are read.", 0),
+            count("seed", 0, "Seed of the first; one more for each file.", None),
         ),
         closing=adapters.tasks_closing,
         failed=adapters.any_failures,
@@ -342,9 +329,9 @@ EVALUATIONS = (
         "recognising",
         (),
         (
-            _count("grammars", 2_000, "Small grammars compared with the exact oracle."),
-            _count("tasks", 20, "Tasks of 30 stages that are followed."),
-            _count("seed", 0, "Seed of the first; one more for each.", None),
+            count("grammars", 2_000, "Small grammars compared with the exact oracle."),
+            count("tasks", 20, "Tasks of 30 stages that are followed."),
+            count("seed", 0, "Seed of the first; one more for each.", None),
         ),
         closing=adapters.recognition_closing,
         failed=lambda figures: not all(figures["bars"].values()),
@@ -356,9 +343,9 @@ EVALUATIONS = (
         "killing",
         ("kills", "early", "resumed", "equal", "lost", "resume_s"),
         (
-            _count("kills", 200, "How many runs are killed."),
-            _count("seed", 0, "Of the moments.", 0),
-            _flag("demo", "Kill runs of the shipped clip."),
+            count("kills", 200, "How many runs are killed."),
+            count("seed", 0, "Of the moments.", 0),
+            flag("demo", "Kill runs of the shipped clip."),
         ),
         closing=lambda figures: iter(figures["failures"]),
         failed=adapters.resume_failed,
@@ -369,7 +356,7 @@ EVALUATIONS = (
         "visup.evaluation.runtime.soak:evaluate_soak",
         "soaking",
         ("ms", "rss_mb"),
-        (_count("frames", 200_000, "Length of the run.", None),),
+        (count("frames", 200_000, "Length of the run.", None),),
         closing=adapters.totals_closing,
     ),
     EvaluationCommand(
@@ -379,8 +366,8 @@ EVALUATIONS = (
         "stepping",
         ("median_ms", "most_ms"),
         (
-            _count("steps", 10_000, "How many are made and kept.", None),
-            _count("seed", 0, "Of the places to go back from.", 0),
+            count("steps", 10_000, "How many are made and kept.", None),
+            count("seed", 0, "Of the places to go back from.", 0),
         ),
         closing=adapters.stepping_closing,
         failed=adapters.stepping_failed,
@@ -392,8 +379,8 @@ EVALUATIONS = (
         "stepping",
         ("ms", "ms_low", "think_ms", "alerts", "observers", "replay_fps", "mind_kb"),
         (
-            _count("steps", 2000, "Length of each script.", None),
-            _count("kept", 10_000, "Minds that are kept in a row.", 100),
+            count("steps", 2000, "Length of each script.", None),
+            count("kept", 10_000, "Minds that are kept in a row.", 100),
         ),
     ),
 )
