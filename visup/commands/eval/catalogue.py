@@ -94,7 +94,7 @@ EVALUATIONS = (
         ),
         (
             count("count", 20, "How many missions."),
-            SEED,
+            _SEED,
             count("width", 480, "Of the image, pixels.", 64),
             count("workers", None, "Processes; as many as there are cores by default."),
             LIMIT,
