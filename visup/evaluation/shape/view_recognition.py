@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,26 +51,36 @@ class _QueryResult:
     other: float
 
 
+class DrawnQueries(TypedDict, total=False):
+    """Silhouettes that are asked for.
+
+    Attributes:
+        queries: How many of each mesh; 12 unless told.
+        seed: Of their directions, rolls, sizes and damage; 0 unless told.
+    """
+
+    queries: int
+    seed: int
+
+
 def evaluate_views(
     folder: Path,
     *,
     views: int = 32,
-    queries: int = 12,
-    seed: int = 0,
     limit: int | None = None,
     machines: bool = False,
     progress: Progress = silent,
+    **drawn: Unpack[DrawnQueries],
 ) -> dict[str, Any]:
     """Figures of recognising meshes from unseen directions.
 
     Args:
         folder: Folder of mesh files.
         views: Views of each mesh in the database.
-        queries: Silhouettes of each mesh that are asked for.
-        seed: Of the queries' directions, rolls, sizes and damage.
         limit: Meshes of the folder, for a quick look; all by default.
         machines: Whether the machines that are made by code (`render/meshes/machines.py`) are added.
         progress: Shows what is being done.
+        drawn: What is asked for.
 
     Returns:
         {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
@@ -86,6 +96,7 @@ def evaluate_views(
         SettingsError: There are no meshes, or a number is out of range.
         ExtraMissingError: What renders meshes, or the baselines, are not installed.
     """
+    queries, seed = drawn.get("queries", 12), drawn.get("seed", 0)
     if views < 1 or queries < 1:
         raise SettingsError("views and queries are counted from 1", expected="at least 1 of each")
     meshes = _listed(folder, limit)
