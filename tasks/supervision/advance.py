@@ -108,7 +108,9 @@ class Advance:
             return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._goes_on(transition):
             return Support.OVER
-        nearer = ways == 1 and all(self._nearer(s) for s in transition.entered)
+        # What fails is not left behind unseen.
+        fails = any(x.payload.status in BAD for x in transition.left)
+        nearer = ways == 1 and not fails and all(self._nearer(s) for s in transition.entered)
         return Support.NEARER if nearer else Support.NONE
 
     def _chance(
@@ -171,7 +173,8 @@ class Advance:
         state = transition.taken(leaves(hypothesis.state), entered(self.now))
         begun = set(transition.transition.begun)
         under_way = [
-            self._begun(x, opened) if i in begun else x for i, x in enumerate(leaves(state))
+            self._begun(_in_turn(x, transition.left), opened) if i in begun else x
+            for i, x in enumerate(leaves(state))
         ]
         left = tuple(x.step for x in transition.left)
         if self._early(hypothesis, transition):
@@ -249,6 +252,14 @@ class Advance:
         meaning = self.steps.actions[leaf.step.action]
         status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
+
+
+def _in_turn(leaf: Leaf[StepMonitor], left: tuple[Leaf[StepMonitor], ...]) -> Leaf[StepMonitor]:
+    """A step that begins, with since when what shows it counts."""
+    same = any(leaf.step.same_as(x.step) for x in left)
+    begun = (x.payload.begun for x in left)
+    turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
+    return replace(leaf, payload=replace(leaf.payload, turn=turn))
 
 
 def _may_end(transition: OpenTransition) -> bool:
