@@ -16,6 +16,7 @@ from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
 from visup.commands.export import export
 from visup.commands.models import app as models_app
+from visup.commands.overview import Overview
 from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
@@ -40,6 +41,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 app = typer.Typer(
     name="visup",
+    cls=Overview,
     help="The visual supervisor: it watches machines work and says in plain words whether it goes well.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
