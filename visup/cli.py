@@ -16,7 +16,6 @@ from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
 from visup.commands.export import export
 from visup.commands.models import app as models_app
-from visup.commands.overview import Overview
 from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
@@ -26,6 +25,7 @@ from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
 from visup.terminal.console import complain, echo
+from visup.terminal.overview import Overview
 from visup.version import __version__
 
 BAD_INPUT = 2

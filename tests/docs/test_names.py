@@ -91,7 +91,7 @@ def test_help_shows_every_command_by_its_purpose() -> None:
     from typer.main import get_command
 
     from visup.cli import app
-    from visup.commands.overview import PURPOSES
+    from visup.terminal.overview import PURPOSES
 
     shown = [name for commands in PURPOSES.values() for name in commands]
     assert sorted(shown) == sorted(getattr(get_command(app), "commands"))  # noqa: B009
