@@ -40,13 +40,13 @@ class DetectorBehaviour:
     contract = Contract("detections", gives=("region", "hypothesis"))
     names: tuple[str, ...] = ()
 
-    def __init__(self, find: Callable[[Frame], Sequence[Detection]] | None = None) -> None:
+    def __init__(self, find: Callable[[Frame], Iterable[Detection]] | None = None) -> None:
         if find is not None:
             self.find = find  # type: ignore[method-assign,assignment]  # a function in place of it
         self._numbering = BoxNumbering()
         self._past: dict[int, list[tuple[float, float, float]]] = {}
 
-    def find(self, frame: Frame) -> Sequence[Detection]:
+    def find(self, frame: Frame) -> Iterable[Detection]:
         """The boxes of a frame."""
         raise NotImplementedError("a detector says in `find` what there is in a frame")
 
@@ -65,7 +65,7 @@ class DetectorBehaviour:
     ) -> Iterable[Percept]:
         """One region for each box that shows in the picture, and what it is said to be."""
         source = self.contract.name
-        for detection in self._numbering.number(frame.index, self.find(frame)):
+        for detection in self._numbering.number(frame.index, tuple(self.find(frame))):
             region = self._region(detection, frame)
             if region is None:
                 continue
