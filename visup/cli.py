@@ -14,6 +14,7 @@ from visup.commands.check import check
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
+from visup.commands.eval.train import app as train_app
 from visup.commands.export import export
 from visup.commands.models import app as models_app
 from visup.commands.presets import presets
@@ -23,7 +24,6 @@ from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
-from visup.commands.train import app as train_app
 from visup.commands.watch import demo, watch
 from visup.terminal.console import complain, echo
 from visup.terminal.overview import Overview
