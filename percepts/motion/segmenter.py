@@ -32,6 +32,7 @@ from visup.percepts.motion.foreground.following import (
     follow_foreground,
     no_foreground,
 )
+from visup.percepts.motion.foreground.objects import Admission
 from visup.percepts.motion.foreground.perceptron import (
     ForegroundModel,
     read_model,
@@ -177,9 +178,10 @@ class MotionSegmenter:
         if self._model is None:
             self.trace = SegmentationTrace(scene, tracked.tracks, tracked.keys, tracked.posterior)
             return
-        least, old = min_region_area(scene, self.settings), self._history.back(1)
+        admission = Admission(min_region_area(scene, self.settings), self._ids)
+        old = self._history.back(1)
         cues, self._foreground = follow_foreground(
-            self._foreground, self._model, scene, old, tracked, least, self._ids
+            self._foreground, self._model, scene, old, tracked, admission
         )
         known = self._foreground.objects
         tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)

@@ -16,13 +16,13 @@ from visup.percepts.motion.foreground.cues import (
     track_shares,
 )
 from visup.percepts.motion.foreground.objects import (
+    Admission,
     ForegroundObjects,
     TrackCells,
     follow_objects,
     no_objects,
 )
 from visup.percepts.motion.foreground.perceptron import ForegroundModel
-from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
@@ -97,8 +97,7 @@ def follow_foreground(
     scene: FrameMeasurements,
     old: WorkImage,
     tracked: TrackPosterior,
-    least: float,
-    ids: IdAllocator,
+    admission: Admission,
 ) -> tuple[FrameCues, ForegroundState]:
     """The foreground after a frame.
 
@@ -108,8 +107,7 @@ def follow_foreground(
         scene: The frame as measured.
         old: The image before.
         tracked: Its tracks.
-        least: Least area of an object, working pixels.
-        ids: Gives public ids.
+        admission: What is asked of an object.
 
     Returns:
         The cues of the frame, and the state.
@@ -117,7 +115,7 @@ def follow_foreground(
     cues, memory = frame_cues(scene, scene.flow, old, tracked.shares(), state.memory)
     belief = updated(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
-    objects = follow_objects(state.objects, cues, belief, tracks, scene.time, least, ids)
+    objects = follow_objects(state.objects, cues, belief, tracks, scene.time, admission)
     speed = float(np.exp(cues.values[0, GROUND_SPEED])) - 0.1
     known = state.ground_px if state.memory is not None else speed
     return cues, ForegroundState(memory, belief, objects, known + FOLLOW * (speed - known))

@@ -120,14 +120,26 @@ class TrackCells:
     winner: Keys
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Admission:
+    """What is asked of an object.
+
+    Attributes:
+        least: Its least area, working pixels.
+        ids: Gives its public id.
+    """
+
+    least: float
+    ids: IdAllocator
+
+
 def follow_objects(
     before: ForegroundObjects,
     cues: FrameCues,
     belief: Belief,
     tracks: TrackCells,
     now: float,
-    least: float,
-    ids: IdAllocator,
+    admission: Admission,
 ) -> ForegroundObjects:
     """The objects of a frame.
 
@@ -137,8 +149,7 @@ def follow_objects(
         belief: What is believed of its superpixels.
         tracks: Those that are reported and seen.
         now: Seconds.
-        least: Least area of an object, working pixels.
-        ids: Gives public ids.
+        admission: What an object must be, and who names it.
     """
     moves = belief.share > MOVES
     came = _came_from(before, cues)
@@ -147,14 +158,14 @@ def follow_objects(
     own = np.array([0, *(key_of[i] for i in tracks.seen)], dtype=np.int64)[tracks.winner]
     owner = np.where(moves, np.where(own > 0, own, came), 0)
     owner = _spread(owner, moves, cues)
-    owner, fresh = _candidates(owner, moves, cues, least, last_key)
+    owner, fresh = _candidates(owner, moves, cues, admission.least, last_key)
     last_key += len(fresh)
     known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
     objects = ForegroundObjects(owner, known, last_key)
     # What goes no further than sampling leaves from frame to frame does not bear itself out.
     moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
     belief = replace(belief, alone=belief.alone * moved)
-    return _seen(objects, belief, cues.area, now, least, ids)
+    return _seen(objects, belief, cues.area, now, admission)
 
 
 def object_share(objects: ForegroundObjects, key: int, share: Floats) -> Floats:
@@ -268,8 +279,7 @@ def _seen(
     belief: Belief,
     area: Floats,
     now: float,
-    least: float,
-    ids: IdAllocator,
+    admission: Admission,
 ) -> ForegroundObjects:
     """The objects with what is seen of them; candidates that lasted confirmed, what is gone forgotten."""
     pixels = np.bincount(objects.owner, area, objects.last_key + 1)
@@ -279,7 +289,7 @@ def _seen(
     )
     known = {}
     for k, o in objects.known.items():
-        if pixels[k] < least:
+        if pixels[k] < admission.least:
             if o.track or now - o.last_seen <= (MISSED_S if o.id else 0):
                 known[k] = o
             continue
@@ -291,7 +301,9 @@ def _seen(
             existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
             borne_out=o.borne_out + weight * (float(alone[k] / pixels[k]) - o.borne_out),
         )
-        known[k] = replace(o, id=ids.new()) if not o.id and o.frames >= LASTS and o.exists else o
+        known[k] = (
+            replace(o, id=admission.ids.new()) if not o.id and o.frames >= LASTS and o.exists else o
+        )
     held = np.zeros(objects.last_key + 1, dtype=bool)
     held[list(known)] = True
     owner = np.where(held[objects.owner], objects.owner, 0)

@@ -10,6 +10,7 @@ from visup.percepts.motion.foreground.belief import Belief
 from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.objects import (
     LASTS,
+    Admission,
     ForegroundObjects,
     TrackCells,
     follow_objects,
@@ -80,7 +81,7 @@ class Row:
         none = np.zeros(BINS**3)
         belief = Belief(believed, believed if alone is None else alone, none, none)
         self.objects = follow_objects(
-            self.objects, cues, belief, seen or tracks(), now, 64.0 * 3, self.ids
+            self.objects, cues, belief, seen or tracks(), now, Admission(64.0 * 3, self.ids)
         )
         return {
             o.id: np.flatnonzero(self.objects.owner == o.key).tolist()
