@@ -249,6 +249,7 @@ class _FormulaChecker:
 
 
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
+EXAMPLES |= {"signal": "battery", "word": "auto"}
 
 
 def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:

@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from visup.agent import Truth
+from visup.rules.formula.nodes import SIGNAL_WORDS
 from visup.rules.formula.truth import NEGATION, TRUTH_OF, truth_if
 from visup.rules.formula.units import Number
 from visup.rules.predicates.inputs_missing import inputs_missing
@@ -57,6 +58,7 @@ def rule_actions() -> Iterator[ActionDefinition]:
                 hold_s=0.5,
                 text=text,
                 takes=word.takes,
+                needs=_needs(name),
                 about=word.meaning,
             )
     for name, quantity in QUANTITIES.items():
@@ -68,12 +70,21 @@ def rule_actions() -> Iterator[ActionDefinition]:
                 hold_s=0.5,
                 takes=quantity.takes,
                 measures=MEASURES[quantity.dimension],
-                needs=DEPTHS if "depth" in name else frozenset({"region"}),
+                needs=_needs(name),
                 about=quantity.meaning,
             )
 
 
+def _needs(name: str) -> frozenset[str]:
+    """Kinds of percept without which a word or quantity is never observed."""
+    if name in SIGNAL_WORDS:
+        return frozenset({"signal"})
+    return DEPTHS if "depth" in name and name in QUANTITIES else frozenset({"region"})
+
+
 def _fits(name: str, takes: tuple[str, ...]) -> bool:
+    if name in SIGNAL_WORDS:
+        return True
     known = name not in OF_TASKS and name not in RESERVED
     return known and bool(takes) and takes[0] == "object" and set(takes) <= {"object", "zone"}
 
@@ -111,6 +122,9 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
             said = " and ".join(map(str, amounts))
             text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
+        elif name in SIGNAL_WORDS:
+            looks[key] = _word(name, tuple(map(str, fact.words)))
+            text = f"at {' '.join(map(str, fact.words))}"
         else:
             zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
@@ -145,12 +159,14 @@ def _facts(task: Task) -> Iterator[Fact]:
         yield from facts_of(invariant.condition)
 
 
-def _word(name: str) -> FactEvaluator:
+def _word(name: str, words: tuple[str, ...] = ()) -> FactEvaluator:
+    """Whether a word of rules holds; `words` are what it is given besides objects."""
+
     def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        return TRUTH_OF[int(PREDICATES[name].look(facts)[rows])]
+        return TRUTH_OF[int(PREDICATES[name].look(facts, *words)[rows])]
 
     return look
 

@@ -12,7 +12,7 @@ from lark import Lark, Token, Transformer
 
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
-from visup.rules.formula.units import Span
+from visup.rules.formula.units import Span, Unit
 from visup.tasks.grammar.conditions import Condition, PartName, Range
 from visup.tasks.grammar.criteria import (
     Another,
@@ -323,6 +323,11 @@ class _TaskBuilder(Transformer[Token, Any]):
         name, *actors, last = items
         words = tuple(a if isinstance(a, Name) else Name(str(a), _of(a)) for a in actors)
         return Action(str(name), words, _of(name).to(_of(last)))
+
+    signal = action
+
+    def bare(self, items: list[Token]) -> Number:
+        return Number(float(items[0]), Unit.NONE, _of(items[0]))
 
     def part_of(self, items: list[Token]) -> Name:
         part, machine = items

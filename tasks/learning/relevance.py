@@ -1,0 +1,165 @@
+"""What a run is made of: meetings, what leads to them, and partings; not what only comes along.
+
+A camera sees more than was meant: what is carried meets what it is carried past, outlines touch where one
+body stands before another. What is left is one row of happenings for each run, alike in all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Symbol
+
+Pair = tuple[str, ...]
+MEETINGS = ("touching", "coupled")
+LET_GO_S = 0.6
+"""What is carried meets others no longer than so long after it was let go."""
+CLOSE_S = 2.0
+"""An approach may end so long before its meeting; relations are judged with delays."""
+ENDED_S = 0.3
+"""A meeting that ends so long before the run does has ended, and is not cut off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A happening in the row of a run.
+
+    Attributes:
+        happening: What, from when to when.
+        at: Seconds by which it is ordered: an approach comes with its meeting.
+        lasts: Whether it goes on to the end of the run.
+    """
+
+    happening: Happening
+    at: float
+    lasts: bool = False
+
+    @property
+    def symbol(self) -> Symbol:
+        """What happens."""
+        return self.happening.symbol
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Two that are together for a while.
+
+    Attributes:
+        pair: Who.
+        touching: Their first to last touch.
+        coupled: First to last coupling, or None when they only touch.
+    """
+
+    pair: Pair
+    touching: tuple[float, float]
+    coupled: tuple[float, float] | None
+
+    def spell(self, action: str) -> tuple[float, float] | None:
+        """From when to when, as one of the two."""
+        return self.coupled if action == "coupled" else self.touching
+
+
+def relevant(runs: Sequence[RunTrace]) -> list[list[Event]]:
+    """What each run is made of, in order.
+
+    A touch that becomes a coupling is that coupling, where it does so in all runs; else both are touches.
+    What is coupled to the same thing moves and meets as that does. An approach counts when it leads to a
+    meeting, a parting when it ends one. Where nobody ever meets all counts.
+    """
+    met = [meetings_of(run) for run in runs]
+    if not any(met):
+        return [[Event(h, h.begin) for h in run.happenings] for run in runs]
+    words = _words(met)
+    return [
+        sorted(_events(run, rows, words), key=lambda e: (e.at, _RANK[e.symbol[0]], e.symbol))
+        for run, rows in zip(runs, met, strict=True)
+    ]
+
+
+_RANK = {"converging": 0, "touching": 1, "coupled": 1, "apart": 2, "decoupled": 2}
+
+
+def _words(met: Sequence[Collection[Meeting]]) -> dict[Pair, str]:
+    """How each pair meets: coupled where it is so in every run in which they meet."""
+    pairs = {m.pair for rows in met for m in rows}
+    return {
+        pair: "coupled"
+        if all(
+            any(m.coupled for m in rows if m.pair == pair)
+            for rows in met
+            if any(m.pair == pair for m in rows)
+        )
+        else "touching"
+        for pair in pairs
+    }
+
+
+def _events(
+    run: RunTrace, meetings: Sequence[Meeting], words: Mapping[Pair, str]
+) -> Iterator[Event]:
+    for meeting in meetings:
+        action, pair = words[meeting.pair], meeting.pair
+        spell = meeting.spell(action)
+        if spell is None:
+            continue
+        begin, end = spell
+        lasts = end > run.end - ENDED_S
+        approach = _approach(run, pair, meeting.touching[0], begin)
+        if approach is not None:
+            yield Event(approach, begin)
+        yield Event(Happening((action, pair), begin, end), begin, lasts)
+        if not lasts:
+            parting = "decoupled" if action == "coupled" else "apart"
+            yield Event(Happening((parting, pair), end, run.end), end)
+
+
+def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happening | None:
+    """The last time that they draw nearer before they meet."""
+    found = [
+        h
+        for h in run.happenings
+        if h.symbol == ("converging", pair) and h.begin <= begin and h.end >= touch - CLOSE_S
+    ]
+    return found[-1] if found else None
+
+
+def meetings_of(run: RunTrace) -> list[Meeting]:
+    """All meetings of a run but those of what is only carried along."""
+    spells = [h for h in run.happenings if h.symbol[0] in MEETINGS]
+    real = [h for h in spells if not _carried(h, spells)]
+    found: list[list[Happening]] = []
+    for h in real:
+        of_pair = [g for g in found if g[0].symbol[1] == h.symbol[1]]
+        if of_pair and h.begin <= max(g.end for g in of_pair[-1]) + BREAK_S:
+            of_pair[-1].append(h)
+        else:
+            found.append([h])
+    return [_meeting(group) for group in found]
+
+
+def _meeting(spells: Sequence[Happening]) -> Meeting:
+    coupled = [h for h in spells if h.symbol[0] == "coupled"]
+    return Meeting(
+        spells[0].symbol[1],
+        (spells[0].begin, max(h.end for h in spells)),
+        (coupled[0].begin, max(h.end for h in coupled)) if coupled else None,
+    )
+
+
+def _carried(meeting: Happening, meetings: Sequence[Happening]) -> bool:
+    """Whether two meet only through a third thing, which one holds and which meets the other.
+
+    It then ends as soon as that is let go.
+    """
+    overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
+    for held in overlap:
+        if held.symbol[0] != "coupled" or meeting.end > held.end + LET_GO_S:
+            continue
+        for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
+            if a not in held.symbol[1] or b in held.symbol[1]:
+                continue
+            (x,) = set(held.symbol[1]) - {a}
+            if any({x, b} == set(m.symbol[1]) and m.end > meeting.end - CLOSE_S for m in overlap):
+                return True
+    return False
