@@ -42,9 +42,9 @@ STAGE_NAMES = {
     "diverging": "retreat",
     "apart": "part",
 }
-MARGIN = 2.0
+MARGIN = 3.0
 """A stage may take so many times as long as it ever took in a good run."""
-LEAST_DEADLINE_S = 5.0
+LEAST_DEADLINE_S = 10.0
 HELD_SHARE = 0.5
 LONGEST_HOLD_S = 6.0
 """What a run ends with must hold for that share of the least time for which it did, or of this."""

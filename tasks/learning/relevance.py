@@ -67,14 +67,33 @@ def relevant(runs: Sequence[RunTrace]) -> list[list[Event]]:
     What is coupled to the same thing moves and meets as that does. An approach counts when it leads to a
     meeting, a parting when it ends one. Where nobody ever meets all counts.
     """
-    met = [meetings_of(run) for run in runs]
+    order = pairs_by_weight(runs)
+    met = [meetings_of(run, order) for run in runs]
     if not any(met):
         return [[Event(h, h.begin) for h in run.happenings] for run in runs]
     words = _words(met)
+    hidden = {m.pair for rows in met for m in rows} - _shared_pairs(met)
     return [
-        sorted(_events(run, rows, words), key=lambda e: (e.at, _RANK[e.symbol[0]], e.symbol))
+        sorted(
+            [*_events(run, rows, words), *_towards(run, rows, hidden)],
+            key=lambda e: (e.at, _RANK[e.symbol[0]], e.symbol),
+        )
         for run, rows in zip(runs, met, strict=True)
     ]
+
+
+def _shared_pairs(met: Sequence[Collection[Meeting]]) -> set[Pair]:
+    """Pairs that meet in every run."""
+    return set.intersection(*({m.pair for m in rows} for rows in met))
+
+
+def _towards(run: RunTrace, rows: Sequence[Meeting], pairs: Collection[Pair]) -> Iterator[Event]:
+    """Approaches whose meeting is not seen in this run, as when one goes into the other and is hidden."""
+    met = {m.pair for m in rows}
+    for pair in pairs:
+        found = [h for h in run.happenings if h.symbol == ("converging", pair)]
+        if pair not in met and found:
+            yield Event(found[0], found[0].begin)
 
 
 _RANK = {"converging": 0, "touching": 1, "coupled": 1, "apart": 2, "decoupled": 2}
@@ -124,10 +143,29 @@ def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happenin
     return found[-1] if found else None
 
 
-def meetings_of(run: RunTrace) -> list[Meeting]:
-    """All meetings of a run but those of what is only carried along."""
-    spells = [h for h in run.happenings if h.symbol[0] in MEETINGS]
-    real = [h for h in spells if not _carried(h, spells)]
+def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
+    """Pairs that touch, those that do so in the fewest runs, and for the shortest time, first."""
+    seconds: dict[Pair, list[float]] = {}
+    for run in runs:
+        mine: dict[Pair, float] = {}
+        for h in run.happenings:
+            if h.symbol[0] in MEETINGS:
+                mine[h.symbol[1]] = mine.get(h.symbol[1], 0.0) + h.end - h.begin
+        for pair, long in mine.items():
+            seconds.setdefault(pair, []).append(long)
+    return sorted(seconds, key=lambda p: (len(seconds[p]), sum(seconds[p]), p))
+
+
+def meetings_of(run: RunTrace, pairs: Sequence[Pair]) -> list[Meeting]:
+    """All meetings of a run but those of what is only carried along.
+
+    Args:
+        run: The run.
+        pairs: All pairs; of several that meet through each other the first one is let be.
+    """
+    real = [h for h in run.happenings if h.symbol[0] in MEETINGS]
+    for pair in pairs:
+        real = [h for h in real if h.symbol[1] != pair or not _carried(h, real)]
     found: list[list[Happening]] = []
     for h in real:
         of_pair = [g for g in found if g[0].symbol[1] == h.symbol[1]]

@@ -115,6 +115,26 @@ EVALUATIONS = (
         closing=adapters.random_closing,
     ),
     EvaluationCommand(
+        "learning",
+        """Tasks learned from a few good runs of random missions, watched by their masks, judged on others.
+
+        Rows are kinds of mission. Exit code 1 when a kind misses its bar: all good runs accepted, nine
+        of ten bad ones refused.
+        """,
+        f"{_ADAPTERS}:learning",
+        "watching and learning",
+        ("accepted", "good", "refused", "bad", "unlike"),
+        (
+            Setting("kind", list[str] | None, None, Option("Which kinds; five if none.")),
+            _count("runs", 3, "Good runs that each task is learned from."),
+            _count("count", 10, "Further good runs of each kind, and as many bad ones."),
+            _SEED,
+            _count("workers", None, "Processes that share the work; as many as there are cores."),
+        ),
+        closing=adapters.learning_closing,
+        failed=adapters.learning_failed,
+    ),
+    EvaluationCommand(
         "health",
         "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
         "visup.evaluation.health.runner:evaluate_health",
