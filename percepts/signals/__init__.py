@@ -1,6 +1,6 @@
 """Signals that are not from the image: a battery, a door, a mode, told beside the video.
 
-Read `files.py` (tables of signals), `mqtt.py` (messages of a broker) and `behaviour.py` (what is reported for a frame).
+Read `files.py` (tables), `mqtt.py` (messages of a broker) and `behaviour.py` (what is reported for a frame).
 """
 
 from visup.percepts.signals.behaviour import SIGNAL, SignalBehaviour

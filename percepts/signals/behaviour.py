@@ -20,8 +20,9 @@ Value = float | bool | str
 class SignalSource(Protocol):
     """Whoever knows signals."""
 
-    names: frozenset[str]
-    """All that it may ever tell; empty when that is not known beforehand."""
+    @property
+    def names(self) -> frozenset[str]:
+        """All that it may ever tell; empty when that is not known beforehand."""
 
     def at(self, time: float) -> Mapping[str, Value]:
         """What is known at a time, seconds of the video; what is not known is left out."""

@@ -1,4 +1,4 @@
-"""Signals that are not from the image, as words of rules: numbers, truths and words, told by percepts of kind `signal`."""
+"""Signals that are not from the image, as words of rules; percepts of kind `signal` tell them."""
 
 from __future__ import annotations
 
@@ -22,16 +22,14 @@ def known_signals(mind: Mind) -> Mapping[str, Any]:
 
 def number(facts: Snapshot, name: str) -> Floats:
     """A signal that is a number, as an interval; unknown of any other."""
-    value = known_signals(facts.mind).get(name)
-    if _is_number(value):
-        return np.array((float(value), float(value)))
-    return np.array((-np.inf, np.inf))
+    value = _number_of(known_signals(facts.mind).get(name))
+    return np.array([-np.inf, np.inf] if value is None else [value, value])
 
 
 def is_on(facts: Snapshot, name: str) -> Codes:
     """Whether a signal is true, or a number other than 0; unknown of a word."""
     value = known_signals(facts.mind).get(name)
-    plain = _is_number(value) or isinstance(value, bool | np.bool_)
+    plain = isinstance(value, bool | np.bool_) or _number_of(value) is not None
     return _code(bool(value) if plain else None)
 
 
@@ -46,9 +44,12 @@ def is_known(facts: Snapshot, name: str) -> Codes:
     return _code(known_signals(facts.mind).get(name) is not None)
 
 
-def _is_number(value: object) -> bool:
-    plain = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return plain and bool(np.isfinite(value))  # type: ignore[arg-type]
+def _number_of(value: Any) -> float | None:
+    """A signal as a number; None of what is none."""
+    plain = isinstance(value, int | float | np.integer | np.floating)
+    if not plain or isinstance(value, bool) or not np.isfinite(value):
+        return None
+    return float(value)
 
 
 def _code(value: bool | None) -> Codes:

@@ -118,13 +118,14 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         text = actions[name].text
         if isinstance(fact, Comparison):
             amounts = [task.amount(a) for a in bounds_of(fact)]
-            measured = _measure(task, name, amounts[0])
+            measured = _measure(task, fact, amounts[0])
             looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
             said = " and ".join(map(str, amounts))
             text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
+            text = f"as `{fact}` says" if name in SIGNAL_WORDS else text
         elif name in SIGNAL_WORDS:
             looks[key] = _word(name, tuple(map(str, fact.words)))
-            text = f"at {' '.join(map(str, fact.words))}"
+            text = f"as `{fact}` says"
         else:
             zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
@@ -189,8 +190,10 @@ def _outside(within: FactEvaluator) -> FactEvaluator:
     return lambda facts, ids: NEGATION[within(facts, ids)]
 
 
-def _measure(task: Task, name: str, amount: Number) -> Measured:
+def _measure(task: Task, fact: Comparison, amount: Number) -> Measured:
     """How a quantity is measured: a gap in metres on the floor, all else as rules do."""
+    name = action_of(fact).name
+    words = tuple(map(str, action_of(fact).words)) if name in SIGNAL_WORDS else ()
     if name == "gap" and dimension(amount) == SIZE:
         distance = floor_distance(task.ground)
 
@@ -201,7 +204,7 @@ def _measure(task: Task, name: str, amount: Number) -> Measured:
         return on_floor
 
     def plain(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
-        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts, *words))
         return low, high
 
     return plain

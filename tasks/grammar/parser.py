@@ -158,7 +158,7 @@ class _TaskBuilder(Transformer[Token, Any]):
     def stage(self, items: list[Any]) -> Stage:
         marked = items[0].type == "TASK"
         head, *rest = items[1:] if marked else items
-        text = _unquoted(rest[0]) if isinstance(rest[0], Token) else ""
+        text = str(rest[0])[1:-1] if isinstance(rest[0], Token) else ""
         return Stage(_bare(head), rest[-1], text, marked, _of(head))
 
     def actors(self, items: list[Token]) -> Actors:
@@ -241,7 +241,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Parameter(str(items[0]), items[1], _of(items[0]))
 
     def include(self, items: list[Token]) -> Include:
-        return Include(_unquoted(items[0]), _of(items[0]))
+        return Include(str(items[0])[1:-1], _of(items[0]))
 
     def invariant(self, items: list[Any]) -> Invariant:
         when = cast('Literal["never", "always"]', str(items[0]))
@@ -363,12 +363,8 @@ def _names(tokens: list[Token]) -> tuple[Name, ...]:
     return tuple([Name(str(t), _of(t)) for t in tokens])
 
 
-def _unquoted(token: Token) -> str:
-    return str(token)[1:-1]
-
-
 def _bare(token: Token) -> str:
-    """The name between the angle brackets of a head or a reference."""
+    """The name between the angle brackets."""
     return canonical(str(token)[1 : str(token).index(">")])
 
 

@@ -31,7 +31,7 @@ from visup.tasks.learning.order import (
     with_loops,
     without,
 )
-from visup.tasks.learning.relevance import Event, relevant
+from visup.tasks.learning.relevance import CourseEvent, relevant
 from visup.tasks.learning.traces import RunTrace, Symbol
 
 STAGE_NAMES = {
@@ -92,7 +92,7 @@ class _Draft:
     plan: Plan
     times: Times
     runs: Sequence[RunTrace]
-    rows: Sequence[Sequence[Event]]
+    rows: Sequence[Sequence[CourseEvent]]
     declared: Mapping[str, Actor]
     forbidden: list[Symbol] = field(default_factory=list)
     holding: bool = True
@@ -264,7 +264,7 @@ def stage_names(plan: Plan) -> dict[Occurrence, str]:
     return found
 
 
-def event_of(row: Sequence[Event], occurrence: Occurrence) -> Event | None:
+def event_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> CourseEvent | None:
     """Something that happened for the n-th time in a run, or None."""
     item, number = occurrence
     first = item
@@ -274,13 +274,13 @@ def event_of(row: Sequence[Event], occurrence: Occurrence) -> Event | None:
     return found[number] if number < len(found) else None
 
 
-def begin_of(row: Sequence[Event], occurrence: Occurrence) -> float | None:
+def begin_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> float | None:
     """When something happened in a run for the n-th time, or None."""
     found = event_of(row, occurrence)
     return None if found is None else found.happening.begin
 
 
-def _at_once(rows: Sequence[Sequence[Event]], a: Occurrence, b: Occurrence) -> bool:
+def _at_once(rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence) -> bool:
     """Whether two things come so close in some run that their order may be chance."""
     both = [(event_of(row, a), event_of(row, b)) for row in rows]
     pairs = [(x, y) for x, y in both if x is not None and y is not None]

@@ -22,7 +22,7 @@ ENDED_S = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class CourseEvent:
     """A happening in the row of a run.
 
     Attributes:
@@ -60,7 +60,7 @@ class Meeting:
         return self.coupled if action == "coupled" else self.touching
 
 
-def relevant(runs: Sequence[RunTrace]) -> list[list[Event]]:
+def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
     """What each run is made of, in order.
 
     A touch that becomes a coupling is that coupling, where it does so in all runs; else both are touches.
@@ -70,7 +70,7 @@ def relevant(runs: Sequence[RunTrace]) -> list[list[Event]]:
     order = pairs_by_weight(runs)
     met = [meetings_of(run, order) for run in runs]
     if not any(met):
-        return [[Event(h, h.begin) for h in run.happenings] for run in runs]
+        return [[CourseEvent(h, h.begin) for h in run.happenings] for run in runs]
     words = _words(met)
     hidden = {m.pair for rows in met for m in rows} - _shared_pairs(met)
     return [
@@ -87,13 +87,15 @@ def _shared_pairs(met: Sequence[Collection[Meeting]]) -> set[Pair]:
     return set.intersection(*({m.pair for m in rows} for rows in met))
 
 
-def _towards(run: RunTrace, rows: Sequence[Meeting], pairs: Collection[Pair]) -> Iterator[Event]:
+def _towards(
+    run: RunTrace, rows: Sequence[Meeting], pairs: Collection[Pair]
+) -> Iterator[CourseEvent]:
     """Approaches whose meeting is not seen in this run, as when one goes into the other and is hidden."""
     met = {m.pair for m in rows}
     for pair in pairs:
         found = [h for h in run.happenings if h.symbol == ("converging", pair)]
         if pair not in met and found:
-            yield Event(found[0], found[0].begin)
+            yield CourseEvent(found[0], found[0].begin)
 
 
 _RANK = {"converging": 0, "touching": 1, "coupled": 1, "apart": 2, "decoupled": 2}
@@ -116,7 +118,7 @@ def _words(met: Sequence[Collection[Meeting]]) -> dict[Pair, str]:
 
 def _events(
     run: RunTrace, meetings: Sequence[Meeting], words: Mapping[Pair, str]
-) -> Iterator[Event]:
+) -> Iterator[CourseEvent]:
     for meeting in meetings:
         action, pair = words[meeting.pair], meeting.pair
         spell = meeting.spell(action)
@@ -126,11 +128,11 @@ def _events(
         lasts = end > run.end - ENDED_S
         approach = _approach(run, pair, meeting.touching[0], begin)
         if approach is not None:
-            yield Event(approach, begin)
-        yield Event(Happening((action, pair), begin, end), begin, lasts)
+            yield CourseEvent(approach, begin)
+        yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
         if not lasts:
             parting = "decoupled" if action == "coupled" else "apart"
-            yield Event(Happening((parting, pair), end, run.end), end)
+            yield CourseEvent(Happening((parting, pair), end, run.end), end)
 
 
 def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happening | None:

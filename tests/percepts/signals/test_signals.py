@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -30,7 +30,7 @@ VALUES = st.one_of(
 )
 
 
-def written(path: Path, rows: list[tuple[float, Mapping[str, Value | None]]]) -> Path:
+def written(path: Path, rows: Sequence[tuple[float, Mapping[str, Value | None]]]) -> Path:
     lines = ["time,level,mode"]
     for time, row in rows:
         cells = ("" if v is None else repr(v) if isinstance(v, float) else str(v) for v in (
@@ -109,9 +109,7 @@ def test_words_about_signals_know_what_is_told_and_no_more(value: Value | None) 
         assert (low, high) == (-math.inf, math.inf)
         assert on is Truth.UNKNOWN
     unknown = value is None
-    assert auto is (
-        Truth.UNKNOWN if unknown else Truth.TRUE if value == "auto" else Truth.FALSE
-    )
+    assert auto is (Truth.UNKNOWN if unknown else Truth.TRUE if value == "auto" else Truth.FALSE)
 
 
 RULES = """

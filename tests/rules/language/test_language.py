@@ -63,6 +63,7 @@ windows = st.builds(lambda d: TimeWindow(ZERO, d), durations) | st.builds(
 def arguments(takes: tuple[str, ...]) -> tuple[str, ...]:
     objects = iter("ab")
     other = {"relation": "converging", "kind": "region", "name": "probe", "zone": "bay"}
+    other |= {"signal": "battery", "word": "auto"}
     return tuple(next(objects) if t == "object" else other[t] for t in takes)
 
 

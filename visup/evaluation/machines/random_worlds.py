@@ -72,7 +72,8 @@ def evaluate_random(
         worlds[name] = scores
         progress(f"{len(worlds)} of {count} worlds")
     ordered = dict(sorted(worlds.items()))
-    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in dict.fromkeys(t.kind for t in trials)}
+    watched = dict.fromkeys(t.kind for t in trials)
+    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in watched}
     items = {kind: machine_total(found) for kind, found in by_kind.items() if found}
     figures = {"total": machine_total(list(ordered.values())), "items": items, "worlds": ordered}
     rivals = [w["baseline"] for w in ordered.values() if "baseline" in w]

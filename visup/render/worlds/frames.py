@@ -61,7 +61,7 @@ class WorldRenderer:
         if not self.movers:
             return plate.labels.copy()
         scene = PlacedThings(self.movers, index)
-        width, height = self.world.size
+        width = self.world.size[0]
         places = np.flatnonzero(self._window(self.movers, index))
         far = np.linalg.norm(plate.points.reshape(-1, 3)[places] - self._eye, axis=1)
         at = np.column_stack([places % width, places // width]).astype(float)
