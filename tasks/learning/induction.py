@@ -20,6 +20,7 @@ from visup.tasks.learning.judging import JudgedRun, judged
 from visup.tasks.learning.order import (
     Free,
     Item,
+    Joint,
     Loop,
     Occurrence,
     Plan,
@@ -31,7 +32,7 @@ from visup.tasks.learning.order import (
     with_loops,
     without,
 )
-from visup.tasks.learning.relevance import CourseEvent, relevant
+from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.traces import RunTrace, Symbol
 
 STAGE_NAMES = {
@@ -48,8 +49,6 @@ LEAST_DEADLINE_S = 10.0
 HELD_SHARE = 0.5
 LONGEST_HOLD_S = 6.0
 """What a run ends with must hold for that share of the least time for which it did, or of this."""
-AT_ONCE_S = 0.3
-"""Relations are judged with delays: what comes closer together than so may be seen in either order."""
 SHARE = 0.8
 """What is in so many of the good runs is part of the course."""
 FORBIDDEN = ("touching", "coupled")
@@ -123,9 +122,11 @@ class _Draft:
         if not spans or self._last(occurrence):
             held = self._held(occurrence) if self._last(occurrence) else 0.0
             clause = f" for {held:g} s" if held else ""
-            return f"<{name}> ::= {_action(item)}{clause}  # {seen}"
+            course = f"({_action(item)})" if held and isinstance(item, Joint) else _action(item)
+            return f"<{name}> ::= {course}{clause}  # {seen}"
         took = f"{min(spans):.1f} to {max(spans):.1f} s"
-        return f"<{name}> ::= {_action(item)} within {deadline(spans)} s  # {seen}, {took}"
+        course = f"({_action(item)})" if isinstance(item, Joint) else _action(item)
+        return f"<{name}> ::= {course} within {deadline(spans)} s  # {seen}, {took}"
 
     def _last(self, occurrence: Occurrence) -> bool:
         plan = self.plan
@@ -182,8 +183,8 @@ def learn_task(
     Raises:
         TaskError: Nothing happens in the good runs that they have in common.
     """
-    rows = relevant(good)
-    words = [tuple(e.symbol for e in row) for row in rows]
+    rows = joined(relevant(good))
+    words = [tuple(e.item for e in row) for row in rows]
     folded, times = with_loops(words)
     core = shared(folded, SHARE)
     if not core:
@@ -270,7 +271,7 @@ def event_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> CourseEvent 
     first = item
     while isinstance(first, Loop):
         first = first.body[0]
-    found = [e for e in row if e.symbol == first]
+    found = [e for e in row if e.item == first]
     return found[number] if number < len(found) else None
 
 
@@ -284,9 +285,13 @@ def _at_once(rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence
     """Whether two things come so close in some run that their order may be chance."""
     both = [(event_of(row, a), event_of(row, b)) for row in rows]
     pairs = [(x, y) for x, y in both if x is not None and y is not None]
-    if any(x.symbol[1] == y.symbol[1] for x, y in pairs):
+    if any(_pairs(x.item) & _pairs(y.item) for x, y in pairs):
         return False
     return any(abs(x.at - y.at) < AT_ONCE_S for x, y in pairs)
+
+
+def _pairs(item: Item) -> set[tuple[str, ...]]:
+    return {actors for _, actors in _symbols(item)}
 
 
 def deadline(spans: Sequence[float]) -> int:
@@ -304,18 +309,25 @@ def _course(plan: Plan, names: Mapping[Occurrence, str]) -> str:
 
 
 def _symbols(item: Item) -> list[Symbol]:
+    if isinstance(item, Joint):
+        return list(item.parts)
     return [s for i in item.body for s in _symbols(i)] if isinstance(item, Loop) else [item]
 
 
 def _action(symbol: Item) -> str:
     if isinstance(symbol, Loop):
         return " ".join(map(_action, symbol.body))
+    if isinstance(symbol, Joint):
+        return " & ".join(map(_action, symbol.parts))
     action, actors = symbol
     return f"{action}({', '.join(actors)})"
 
 
 def _plain(item: Item) -> str:
-    return "repeat" if isinstance(item, Loop) else STAGE_NAMES.get(item[0], item[0])
+    if isinstance(item, Loop):
+        return "repeat"
+    words = [STAGE_NAMES.get(action, action) for action, _ in _symbols(item)]
+    return "_and_".join(dict.fromkeys(words))
 
 
 def _who(item: Item) -> str:

@@ -24,7 +24,14 @@ class Loop:
     body: tuple[Item, ...]
 
 
-Item = Symbol | Loop
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """What begins about the same time and then goes on together: each asked for beside the others."""
+
+    parts: tuple[Symbol, ...]
+
+
+Item = Symbol | Loop | Joint
 Word = tuple[Item, ...]
 
 

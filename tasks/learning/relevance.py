@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from visup.tasks.learning.order import Item, Joint
 from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Symbol
 
 Pair = tuple[str, ...]
@@ -29,16 +30,23 @@ class CourseEvent:
         happening: What, from when to when.
         at: Seconds by which it is ordered: an approach comes with its meeting.
         lasts: Whether it goes on to the end of the run.
+        beside: What happens with it.
     """
 
     happening: Happening
     at: float
     lasts: bool = False
+    beside: tuple[Symbol, ...] = ()
 
     @property
     def symbol(self) -> Symbol:
-        """What happens."""
+        """What happens; the first of several."""
         return self.happening.symbol
+
+    @property
+    def item(self) -> Item:
+        """What happens."""
+        return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,3 +211,65 @@ def _carried(meeting: Happening, meetings: Sequence[Happening]) -> bool:
             if any({x, b} == set(m.symbol[1]) and m.end > meeting.end - CLOSE_S for m in overlap):
                 return True
     return False
+
+
+AT_ONCE_S = 0.3
+"""Relations are judged with delays: what comes closer together than so may be seen in either order."""
+
+Row = Sequence[CourseEvent]
+
+
+def joined(rows: Sequence[Row]) -> list[list[CourseEvent]]:
+    """Rows in which what comes about at once, and goes on together in all runs, is one event.
+
+    Which of the two is seen first is chance, so that no order of theirs is asked for.
+    """
+    once = [{e.symbol: e for e in row if _single(e, row)} for row in rows]
+    shared = sorted(set.intersection(*(set(events) for events in once))) if once else []
+    groups: list[list[Symbol]] = []
+    for symbol in shared:
+        if symbol[0] == "converging":
+            continue
+        group = next((g for g in groups if all(_together(once, symbol, s) for s in g)), None)
+        if group is None:
+            groups.append([symbol])
+        else:
+            group.append(symbol)
+    return [_with_joints(row, [g for g in groups if len(g) > 1]) for row in rows]
+
+
+def _single(event: CourseEvent, row: Row) -> bool:
+    return sum(e.symbol == event.symbol for e in row) == 1
+
+
+def _together(once: Sequence[Mapping[Symbol, CourseEvent]], a: Symbol, b: Symbol) -> bool:
+    """Whether two come at once in some run, and go on together for a while in all."""
+    if a[1] == b[1]:
+        return False
+    pairs = [(events[a], events[b]) for events in once]
+    close = any(abs(x.at - y.at) < AT_ONCE_S for x, y in pairs)
+    return close and all(_overlap(x.happening, y.happening) > AT_ONCE_S for x, y in pairs)
+
+
+def _overlap(a: Happening, b: Happening) -> float:
+    return min(a.end, b.end) - max(a.begin, b.begin)
+
+
+def _with_joints(row: Row, groups: Sequence[Sequence[Symbol]]) -> list[CourseEvent]:
+    """A row with each group in the place of its last one."""
+    found = list(row)
+    for group in groups:
+        parts = sorted((e for e in found if e.symbol in group), key=lambda e: group.index(e.symbol))
+        last = max(parts, key=lambda e: e.at)
+        end = min(e.happening.end for e in parts)
+        joint = CourseEvent(
+            Happening(parts[0].symbol, last.happening.begin, end),
+            last.at,
+            all(e.lasts or e.symbol[0] in PARTINGS for e in parts),
+            tuple(e.symbol for e in parts[1:]),
+        )
+        found = [joint if e is last else e for e in found if e is last or e not in parts]
+    return found
+
+
+PARTINGS = ("apart", "decoupled")

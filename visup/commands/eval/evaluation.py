@@ -98,6 +98,21 @@ def folder_argument(about: str) -> Parameter:
     return Parameter("folder", Parameter.KEYWORD_ONLY, annotation=annotation)
 
 
+def count(name: str, default: int | None, about: str, at_least: int | None = 1) -> Setting:
+    """A whole number."""
+    kind = int if default is not None else int | None
+    return Setting(name, kind, default, Option(about, at_least=at_least))
+
+
+def flag(name: str, about: str) -> Setting:
+    """What is on or off."""
+    return Setting(name, bool, False, Option(about, f"--{name}"))
+
+
+FOLDER = folder_argument("Folder with the data and its ground truth.")
+LIMIT = count("limit", None, "Frames (or shapes) of each item, for a quick look.", None)
+
+
 def _check_paths(folder: Path | None, json_file: Path | None) -> None:
     """Refuse what cannot work before an evaluation of minutes begins.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import statistics
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,8 @@ from visup.evaluation.motion.mask_scores import (
     region_similarity,
 )
 from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth
+from visup.evaluation.motion.variants import AS_IT_IS, Variant
+from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import open_source
@@ -99,8 +101,34 @@ def evaluate_motion(
     items: dict[str, dict[str, Any]] = {}
     for sequence in find_sequences(folder):
         progress(sequence.name)
-        items[sequence.name] = _scores(sequence, _run(sequence, every, limit))
+        items[sequence.name] = score_sequence(sequence, every=every, limit=limit)
     return {"total": _total(list(items.values())), "items": items}
+
+
+def score_sequence(
+    sequence: LabelledSequence,
+    *,
+    every: int = 1,
+    limit: int | None = None,
+    settings: MotionSettings | None = None,
+    variant: Variant = AS_IT_IS,
+) -> dict[str, Any]:
+    """The figures of one sequence.
+
+    Args:
+        sequence: What to segment and compare with.
+        every: Use every n-th frame only.
+        limit: Most frames, before a variant leaves out some, or None for all.
+        settings: Of the segmenter; the defaults when None.
+        variant: How it is shown.
+
+    Returns:
+        As an item of `evaluate_motion`.
+    """
+    if limit is not None:
+        limit = max(1, limit // variant.every)
+    frames = _frames(sequence, every * variant.every, limit)
+    return _scores(sequence, _run(sequence, frames, MotionSegmenter(settings), variant))
 
 
 def find_sequences(folder: Path) -> list[LabelledSequence]:
@@ -133,14 +161,19 @@ def find_sequences(folder: Path) -> list[LabelledSequence]:
     return out
 
 
-def _run(sequence: LabelledSequence, every: int, limit: int | None) -> SequenceMeasurements:
+def _run(
+    sequence: LabelledSequence,
+    frames: Iterable[tuple[Frame, bool]],
+    segmenter: MotionSegmenter,
+    variant: Variant,
+) -> SequenceMeasurements:
     """Segment one sequence and gather what its scores need."""
     tally = SequenceMeasurements()
     names = _truth(sequence).get("labels", {})
-    segmenter = MotionSegmenter()
     dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     before: NDArray[np.uint8] | None = None
-    for number, (frame, last) in enumerate(_frames(sequence, every, limit)):
+    for number, (taken, last) in enumerate(frames):
+        frame = variant.shown(taken)
         start = time.perf_counter()
         regions = segmenter.step(frame)
         tally.ms.append(1e3 * (time.perf_counter() - start))
@@ -152,7 +185,7 @@ def _run(sequence: LabelledSequence, every: int, limit: int | None) -> SequenceM
         before = grey
         tally.boxes[frame.index] = {r.id: _box(r) for r in regions}
         if frame.index in sequence.masks:
-            labels = _labels(sequence.masks[frame.index], frame.size)
+            labels = variant.labels(_labels(sequence.masks[frame.index], taken.size))
             masks = {r.id: r.full_mask(frame.size) for r in regions}
             _tally_masks(tally, labels, masks, inner=number > 0 and not last)
             if names:

@@ -1,0 +1,105 @@
+"""`visup eval motion`: all sequences below a folder, or what was left out by folds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from visup.commands.eval.evaluation import FOLDER, LIMIT, EvaluationCommand, count, flag
+from visup.commands.options import Setting
+from visup.runs.settings import Option
+
+Figures = Mapping[str, Any]
+Progress = Callable[[str], None]
+
+
+def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) -> Figures:
+    """Segmentation and tracking, of all sequences or by folds.
+
+    Raises:
+        SettingsError: An option stands without the folds that it belongs to.
+    """
+    if folds is not None:
+        from visup.evaluation.motion.fold_runner import FoldPlan, evaluate_folds
+
+        options["tries"] = options["tries"] or ()
+        return evaluate_folds(folder, FoldPlan(folds, **options), progress)
+    from visup.agent.model.errors import SettingsError
+    from visup.evaluation.motion.runner import evaluate_motion
+
+    for option, name in (
+        ("--try", "tries"),
+        ("--stability", "stability"),
+        ("--against", "against"),
+    ):
+        if options[name]:
+            raise SettingsError(
+                f"{option} says nothing without folds", expected="--folds N beside it"
+            )
+    return evaluate_motion(folder, limit=options["limit"], progress=progress)
+
+
+def motion_settings(given: dict[str, Any]) -> dict[str, Any]:
+    """The options of `visup eval motion` that its figures follow from."""
+    by_folds = ("folds", "tries", "stability") if given["folds"] is not None else ()
+    return {k: given[k] for k in ("limit", *by_folds)}
+
+
+def motion_closing(figures: Figures) -> Iterator[str]:
+    """How sure the mean over left-out sequences is, and whether what was tried is to be kept."""
+    total = figures["total"]
+    if "spread" not in total:
+        return
+    yield (
+        f"J {total['J']:.3f} +- {total['spread']:.3f} over {total['sequences']} sequences of "
+        f"{total['families']} families; {total['weak']} below 0.25"
+    )
+    if "gain" in total:
+        kept = total["gain"] > total["gain_spread"]
+        yield (
+            f"gain {total['gain']:+.3f} +- {total['gain_spread']:.3f}: "
+            f"{'more' if kept else 'no more'} than its spread"
+        )
+    if "unstable" in total:
+        yield (
+            f"between variants J moves by {total['moved']:.3f} in the mean, "
+            f"by more than 0.05 in {total['unstable']} sequences"
+        )
+    if len(set(figures["choice"].values())) > 1 or "gain" in total:
+        for fold, settings in figures["choice"].items():
+            yield f"fold {fold} is scored with {settings}"
+
+
+MOTION = EvaluationCommand(
+    "motion",
+    """Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.
+
+    With --folds each family of sequences is scored with settings that were chosen on the others.
+    """,
+    "visup.commands.eval.motion:motion",
+    "segmenting",
+    (
+        *("fold", "J", "F", "J_object", "ghost", "id_switches", "mota", "idf1"),
+        *("gain", "moved", "most", "ms", "ratio"),
+    ),
+    (
+        LIMIT,
+        count("folds", None, "Folds of families: choose settings on the others, score on each."),
+        Setting(
+            "tries",
+            list[str] | None,
+            None,
+            Option("Settings to choose from, such as confirm_s=0.3,evidence=0.8.", "--try"),
+        ),
+        flag(
+            "stability",
+            "Show variants as well: mirrored, half the frames, smaller, compressed.",
+        ),
+        Setting("against", Path | None, None, Option("Figures of an earlier run to compare with.")),
+        Setting("cache", Path, Path("runs/folds"), Option("Folder for what folds measured.")),
+    ),
+    FOLDER,
+    motion_closing,
+    recorded=motion_settings,
+)

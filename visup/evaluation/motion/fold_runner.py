@@ -1,0 +1,256 @@
+"""`visup eval motion --folds`: settings chosen on some families of sequences are scored on the others.
+
+Each (sequence, settings, variant) is measured once and kept in a cache, under a digest of the code that
+sees, of the settings and of the sequence's files: what is read from it is what would be measured.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, fields, replace
+from importlib import resources
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import SettingsError, SourceError
+from visup.evaluation.figures import Progress, mean_of, silent
+from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_and_spread
+from visup.evaluation.motion.runner import LabelledSequence, find_sequences, score_sequence
+from visup.evaluation.motion.variants import PLAIN, VARIANTS
+from visup.percepts.motion.features.settings import MotionSettings
+
+WEAK = 0.25  # J below which a sequence counts as lost
+UNSTABLE = 0.05  # most by which J may move between variants
+KEPT = ("J", "F", "ghost")
+ROOMS = ("agent/model", "evaluation/motion", "percepts/motion", "percepts/video")
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One sequence to be measured in one way.
+
+    Attributes:
+        sequence: Which.
+        settings: Of the segmenter.
+        variant: Name of the variant that is shown.
+        limit: Most frames of the video that are shown, or None.
+        cache: Folder of what was measured before.
+    """
+
+    sequence: LabelledSequence
+    settings: MotionSettings
+    variant: str
+    limit: int | None
+    cache: Path
+
+
+@dataclass(frozen=True, slots=True)
+class FoldPlan:
+    """What is measured by folds.
+
+    Attributes:
+        folds: How many folds.
+        cache: Folder for what was measured; made when missing.
+        tries: Settings to choose from beside the defaults, each as 'name=value,name=value'.
+        stability: Whether variants of each sequence are shown as well, with the default settings.
+        against: Figures of an earlier evaluation, written with `--json`, to be compared with.
+        limit: Most frames of each sequence.
+        workers: Processes that share the work; as many as there are cores when None.
+    """
+
+    folds: int
+    cache: Path
+    tries: Sequence[str] = ()
+    stability: bool = False
+    against: Path | None = None
+    limit: int | None = None
+    workers: int | None = None
+
+
+def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) -> dict[str, Any]:
+    """Score the segmenter on sequences that were left out when its settings were chosen.
+
+    Args:
+        folder: As for `evaluate_motion`; only sequences with masks count.
+        plan: What is measured.
+        progress: Shows what is being done.
+
+    Returns:
+        `items` by sequence: J, F, ghost with the settings chosen without its family, `fold`, `gain` over the
+        defaults or over the figures compared with, and with `stability` `moved`, the greatest difference
+        of J from that of a variant, and `most`, which variant. `total`: means, `spread` and `gain_spread`
+        (standard errors over families), `weak` and `unstable` sequences. `choice`: the settings of each fold.
+
+    Raises:
+        SettingsError: Nothing can be scored, or settings are unknown.
+        SourceError: The figures to compare with cannot be read.
+    """
+    before = _figures(plan.against) if plan.against else None
+    settings = [MotionSettings(), *(tried_settings(text) for text in plan.tries)]
+    sequences = {s.name: s for s in find_sequences(folder) if s.masks}
+    ways = [(s, PLAIN) for s in settings]
+    ways += [(settings[0], v) for v in VARIANTS if plan.stability and v != PLAIN]
+    trials = {
+        (name, way): Trial(sequence, *ways[way], plan.limit, plan.cache)
+        for way in range(len(ways))
+        for name, sequence in sequences.items()
+    }
+    measured = dict(_measured(trials, plan.workers or os.cpu_count() or 1, progress))
+    names = [n for n in sequences if "J" in measured[n, 0]]
+    if not names:
+        raise SettingsError("no sequence has masks to be scored by", where=str(folder))
+    fold = dealt(names, plan.folds)
+    tried = [{n: measured[n, k]["J"] for n in names} for k in range(len(settings))]
+    choice = chosen(tried, fold)
+    items = {n: {**measured[n, choice[fold[n]]], "fold": fold[n]} for n in names}
+    if len(settings) > 1 or before is not None:
+        left_out = {n: item["J"] for n, item in items.items()}
+        for n, gain in gains(left_out, tried[0] if before is None else before).items():
+            items[n]["gain"] = gain
+    if plan.stability:
+        variants = {v: k for k, (_, v) in enumerate(ways) if v != PLAIN}
+        for n in names:
+            seen = {v: measured[n, k]["J"] for v, k in variants.items() if "J" in measured[n, k]}
+            items[n] |= _moved(measured[n, 0]["J"], seen)
+    told = ["defaults", *plan.tries]
+    return {
+        "total": _total(items),
+        "items": items,
+        "choice": {str(f): told[k] for f, k in choice.items()},
+    }
+
+
+def tried_settings(text: str) -> MotionSettings:
+    """Settings from text such as 'confirm_s=0.3,evidence=0.8'; the others are the defaults.
+
+    Raises:
+        SettingsError: A setting is unknown or its value is no number.
+    """
+    known = {f.name: f.type for f in fields(MotionSettings) if f.type in ("int", "float")}
+    given: dict[str, Any] = {}
+    for part in text.split(","):
+        name, _, value = (p.strip() for p in part.partition("="))
+        if name not in known:
+            raise SettingsError(
+                f"there is no setting {name!r} to be tried",
+                where="--try",
+                expected=f"name=value with one of {', '.join(known)}",
+            )
+        try:
+            given[name] = int(value) if known[name] == "int" else float(value)
+        except ValueError:
+            raise SettingsError(
+                f"{value!r} is no value for {name}", where="--try", expected="a number"
+            ) from None
+    return replace(MotionSettings(), **given)
+
+
+def _figures(path: Path) -> dict[str, float]:
+    """J by sequence, of an earlier evaluation."""
+    try:
+        items = json.loads(path.read_text(encoding="utf-8"))["items"]
+        return {name: float(item["J"]) for name, item in items.items() if "J" in item}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise SourceError(
+            "these figures cannot be read",
+            where=str(path),
+            expected="a file that 'visup eval motion --json' wrote",
+        ) from fault
+
+
+def _moved(plain: float, seen: Mapping[str, float]) -> dict[str, Any]:
+    """The greatest difference of J between a sequence and its variants, and which variant it is."""
+    if not seen:
+        return {}
+    most = max(seen, key=lambda v: abs(seen[v] - plain))
+    return {"moved": abs(seen[most] - plain), "most": most, "variants": dict(seen)}
+
+
+def _total(items: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    values = list(items.values())
+    out: dict[str, Any] = {k: mean_of(values, k) for k in KEPT}
+    out["spread"] = mean_and_spread({n: i["J"] for n, i in items.items()})[1]
+    out["sequences"] = len(items)
+    out["families"] = len({family_of(n) for n in items})
+    out["weak"] = sum(i["J"] < WEAK for i in values)
+    if gained := {n: i["gain"] for n, i in items.items() if "gain" in i}:
+        out["gain"], out["gain_spread"] = mean_and_spread(gained)
+    if moved := [i["moved"] for i in values if "moved" in i]:
+        out["moved"] = sum(moved) / len(moved)
+        out["unstable"] = sum(m > UNSTABLE for m in moved)
+    return out
+
+
+def _measured(
+    trials: Mapping[Any, Trial], workers: int, progress: Progress
+) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """The figures of trials, by their keys, as they come."""
+    for count, (key, figures) in enumerate(_scored(trials, workers), 1):
+        progress(f"{count} of {len(trials)}")
+        yield key, figures
+
+
+def _scored(trials: Mapping[Any, Trial], workers: int) -> Iterator[tuple[Any, dict[str, Any]]]:
+    if min(workers, len(trials)) <= 1:
+        yield from ((key, _score(trial)) for key, trial in trials.items())
+        return
+    # Fresh processes: a fork would share the state of OpenCV's threads.
+    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
+        waiting = {pool.submit(_score, trial): key for key, trial in trials.items()}
+        for done in as_completed(waiting):
+            yield waiting[done], done.result()
+
+
+def _alone() -> None:
+    """One thread for each process: the processes share the cores already."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+def _score(trial: Trial) -> dict[str, Any]:
+    """The figures of one trial, from the cache when it was measured before."""
+    file = trial.cache / f"{_digest(trial)}.json"
+    if file.is_file():
+        return dict(json.loads(file.read_text(encoding="utf-8")))
+    figures = score_sequence(
+        trial.sequence,
+        limit=trial.limit,
+        settings=trial.settings,
+        variant=VARIANTS[trial.variant],
+    )
+    kept = {k: figures[k] for k in KEPT if k in figures}
+    trial.cache.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(kept), encoding="utf-8")
+    return kept
+
+
+def _digest(trial: Trial) -> str:
+    """What the figures of a trial follow from."""
+    digest = hashlib.sha256(_code())
+    says = (asdict(trial.settings), trial.variant, trial.limit, trial.sequence.name)
+    digest.update(json.dumps(says).encode())
+    for file in (*_files(trial.sequence.source), *trial.sequence.masks.values()):
+        state = file.stat()
+        digest.update(f"{file.name} {state.st_size} {state.st_mtime_ns}\n".encode())
+    return digest.hexdigest()
+
+
+def _files(source: Path) -> Iterable[Path]:
+    return sorted(source.iterdir()) if source.is_dir() else [source]
+
+
+def _code() -> bytes:
+    """A digest of all code and data that figures depend on."""
+    digest = hashlib.sha256()
+    package = Path(str(resources.files("visup")))
+    for room in ROOMS:
+        for file in sorted((package / room).rglob("*")):
+            if file.is_file() and file.parent.name != "__pycache__":
+                digest.update(file.read_bytes())
+    return digest.digest()

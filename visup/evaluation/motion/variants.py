@@ -1,0 +1,66 @@
+"""The same footage shown otherwise: what ought to change nothing, and so tells how stable a figure is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame
+
+Image = NDArray[np.uint8]
+
+SMALLER = 0.75  # size of the smaller picture, as a share
+QUALITY = 50  # of JPEG: blocks can be seen, things can still be told
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A way to show a video.
+
+    Attributes:
+        image: What is made of each picture, (H, W, 3) uint8.
+        labels: What is made of its mask, (H, W) uint8, so that it fits.
+        every: One frame in so many is shown.
+    """
+
+    image: Callable[[Image], Image] = lambda image: image
+    labels: Callable[[Image], Image] = lambda labels: labels
+    every: int = 1
+
+    def shown(self, frame: Frame) -> Frame:
+        """A frame as it is shown."""
+        return replace(frame, image=self.image(frame.image))
+
+
+def _mirrored(image: Image) -> Image:
+    return np.ascontiguousarray(image[:, ::-1])
+
+
+def _smaller(how: int) -> Callable[[Image], Image]:
+    def resized(image: Image) -> Image:
+        height, width = image.shape[:2]
+        size = (max(1, round(width * SMALLER)), max(1, round(height * SMALLER)))
+        return np.asarray(cv2.resize(image, size, interpolation=how), dtype=np.uint8)
+
+    return resized
+
+
+def _compressed(image: Image) -> Image:
+    _, data = cv2.imencode(".jpg", image, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
+
+
+PLAIN = "plain"
+AS_IT_IS = Variant()
+VARIANTS: Mapping[str, Variant] = {
+    PLAIN: AS_IT_IS,
+    "mirrored": Variant(_mirrored, _mirrored),
+    "half the frames": Variant(every=2),
+    "smaller": Variant(_smaller(cv2.INTER_AREA), _smaller(cv2.INTER_NEAREST)),
+    "compressed": Variant(_compressed),
+}
+"""Ways to show a video, by name; the first is as it is."""
