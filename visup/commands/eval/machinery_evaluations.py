@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from visup.commands.eval import adapters
-from visup.commands.eval.evaluation import EvaluationCommand, folder_argument
-from visup.commands.eval.shared_options import (
-    ADAPTERS,
-    SEED,
-    count,
-    flag,
-)
+from visup.commands.eval.evaluation import EvaluationCommand, count, flag, folder_argument
 from visup.commands.options import Setting
 from visup.runs.settings import Option
+
+_SEED = count("seed", 0, "Of all that is drawn.", 0)
+_ADAPTERS = "visup.commands.eval.adapters"
 
 MACHINERY_EVALUATIONS = (
     EvaluationCommand(
@@ -23,7 +20,7 @@ MACHINERY_EVALUATIONS = (
         "tests.oracles.runtime.behaviour_faults:evaluate_faults",
         "injecting",
         ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
-        (count("count", 1000, "How many faults are injected."), SEED),
+        (count("count", 1000, "How many faults are injected."), _SEED),
         closing=adapters.failures_closing("number {number}, {fault} in '{kind}': {problem}"),
         failed=adapters.any_failures,
     ),
@@ -38,7 +35,7 @@ MACHINERY_EVALUATIONS = (
         ("files", "read", "refused", "raised", "slow", "crashed", "memory", "ran"),
         (
             count("count", 5000, "Damaged files of each kind."),
-            SEED,
+            _SEED,
             count("races", 100, "How often two writers begin at once.", 0),
             Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
         ),
@@ -54,7 +51,7 @@ MACHINERY_EVALUATIONS = (
         (
             count("draws", 10_000, "Random pairs for the oracles."),
             Setting("minutes", float, 10.0, Option("How long boxes rest.", at_least=0.1)),
-            SEED,
+            _SEED,
         ),
         closing=adapters.relations_closing,
         recorded=adapters.relations_settings,
@@ -68,7 +65,7 @@ MACHINERY_EVALUATIONS = (
             *("formulas", "samples", "online", "different", "us", "samples_per_s", "times_rtamt"),
             *("rules", "ms", "concerns", "kept", "kb_each", "slower"),
         ),
-        (count("formulas", 10_000, "How many random formulas.", 10), SEED),
+        (count("formulas", 10_000, "How many random formulas.", 10), _SEED),
         closing=adapters.rules_closing,
         failed=adapters.rules_differ,
     ),
@@ -92,7 +89,7 @@ MACHINERY_EVALUATIONS = (
     EvaluationCommand(
         "reasoning",
         "Reasoning alone, on percepts made from the truth with noise: identity, events, verdicts.",
-        f"{ADAPTERS}:reasoning",
+        f"{_ADAPTERS}:reasoning",
         "reasoning",
         (
             *("identity", "event_precision", "event_recall", "event_f1", "false_coupled"),
@@ -129,7 +126,7 @@ MACHINERY_EVALUATIONS = (
     EvaluationCommand(
         "recognition",
         "Recognise random tasks: as the exact oracle does, seen badly, and fast.",
-        f"{ADAPTERS}:recognition",
+        f"{_ADAPTERS}:recognition",
         "recognising",
         (),
         (
@@ -143,7 +140,7 @@ MACHINERY_EVALUATIONS = (
     EvaluationCommand(
         "resume",
         "Kill runs with SIGKILL, resume them, and compare them with an unbroken run.",
-        f"{ADAPTERS}:resume",
+        f"{_ADAPTERS}:resume",
         "killing",
         ("kills", "early", "resumed", "equal", "lost", "resume_s"),
         (

@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
+from inspect import Parameter
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from visup.commands.eval import adapters
-from visup.commands.eval.evaluation import EvaluationCommand, folder_argument
-from visup.commands.eval.shared_options import (
-    ADAPTERS,
-    CLIP_NAMES,
+from visup.commands.eval.evaluation import (
     FOLDER,
     LIMIT,
-    SEED,
+    EvaluationCommand,
     count,
     flag,
+    folder_argument,
 )
 from visup.commands.options import Setting
 from visup.runs.settings import Option
 
+_SEED = count("seed", 0, "Of all that is drawn.", 0)
+_ADAPTERS = "visup.commands.eval.adapters"
+_CLIP_NAMES = Parameter(
+    "names",
+    Parameter.KEYWORD_ONLY,
+    default=None,
+    annotation=Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="Which clips; all if none.")
+    ],
+)
+
 SCENE_EVALUATIONS = (
-    EvaluationCommand(
-        "motion",
-        "Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.",
-        "visup.evaluation.motion.runner:evaluate_motion",
-        "segmenting",
-        ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio"),
-        (LIMIT,),
-        FOLDER,
-    ),
     EvaluationCommand(
         "shapes",
         "Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time.",
@@ -78,7 +82,7 @@ SCENE_EVALUATIONS = (
 
         Kinds are spread evenly over the count; rows are kinds.
         """,
-        f"{ADAPTERS}:random_worlds",
+        f"{_ADAPTERS}:random_worlds",
         "rendering and watching",
         (
             *("verdicts_right", "verdicts", "stage_f1", "actors"),
@@ -87,7 +91,7 @@ SCENE_EVALUATIONS = (
         (
             Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
             count("count", 60, "How many worlds."),
-            SEED,
+            _SEED,
             flag("eyes", "Regions are made from the masks: reasoning by itself."),
             Setting("baseline", bool, False, Option("Let CSRT watch, too.", "--baseline/--alone")),
             LIMIT,
@@ -102,14 +106,14 @@ SCENE_EVALUATIONS = (
         Rows are kinds of mission. Exit code 1 when a kind misses its bar: all good runs accepted, nine
         of ten bad ones refused.
         """,
-        f"{ADAPTERS}:learning",
+        f"{_ADAPTERS}:learning",
         "watching and learning",
         ("accepted", "good", "refused", "bad", "unlike"),
         (
             Setting("kind", list[str] | None, None, Option("Which kinds; five if none.")),
             count("runs", 3, "Good runs that each task is learned from."),
             count("count", 10, "Further good runs of each kind, and as many bad ones."),
-            SEED,
+            _SEED,
             count("workers", None, "Processes that share the work; as many as there are cores."),
         ),
         closing=adapters.learning_closing,
@@ -126,7 +130,7 @@ SCENE_EVALUATIONS = (
         ),
         (
             count("faults", 100, "How many faults are injected."),
-            SEED,
+            _SEED,
             count("limit", None, "Frames of each video when it is run unharmed."),
         ),
         folder_argument("Folder with sound video anywhere below it."),
@@ -149,11 +153,11 @@ SCENE_EVALUATIONS = (
 
         Each has a bar. Exit code 1 when a clip misses its bar.
         """,
-        f"{ADAPTERS}:clips",
+        f"{_ADAPTERS}:clips",
         "rendering and segmenting",
         (),
         (Setting("cache", Path, Path("runs/clips"), Option("Folder for the rendered clips.")),),
-        CLIP_NAMES,
+        _CLIP_NAMES,
         adapters.clips_closing,
         lambda figures: figures["total"]["passed"] < figures["total"]["clips"],
         lambda given: {"clips": given["names"] or "all"},
@@ -161,13 +165,13 @@ SCENE_EVALUATIONS = (
     EvaluationCommand(
         "scale",
         "Model databases that grow: opening, answering, memory, and what the index loses.",
-        f"{ADAPTERS}:scale",
+        f"{_ADAPTERS}:scale",
         "growing",
         (
             *("open_ms", "first_ms", "ms_query", "ms_search", "ms_cpu"),
             *("ms_worst", "rss_mb", "compared", "lost"),
         ),
-        (count("views", 100_000, "Views of the largest database."), SEED),
+        (count("views", 100_000, "Views of the largest database."), _SEED),
         folder_argument("Folder of meshes (*.ply)."),
         adapters.scale_closing,
     ),
@@ -180,7 +184,7 @@ SCENE_EVALUATIONS = (
         (
             count("files", 2000, "How many damaged database files.", 0),
             count("masks", 2000, "How many odd masks.", 0),
-            SEED,
+            _SEED,
         ),
         closing=adapters.failures_closing("{kind}, number {number}: {what}, {seconds:.2f} s"),
         failed=adapters.any_failures,
