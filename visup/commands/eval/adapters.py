@@ -231,6 +231,17 @@ def resume_failed(figures: Figures) -> bool:
     return bool(total["equal"] < total["kills"] or total["lost"] > 0)
 
 
+def soak(frames: int, traffic: float, progress: Progress) -> Figures:
+    """A run of hours; with `traffic` so many of three lanes of cars."""
+    if traffic:
+        from visup.evaluation.runtime.traffic import evaluate_traffic
+
+        return evaluate_traffic(traffic, progress=progress)
+    from visup.evaluation.runtime.soak import evaluate_soak
+
+    return evaluate_soak(frames, progress=progress)
+
+
 def totals_closing(figures: Figures) -> Iterator[str]:
     """Each total on a line of its own."""
     for name, value in figures["total"].items():

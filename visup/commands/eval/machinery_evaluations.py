@@ -153,11 +153,18 @@ MACHINERY_EVALUATIONS = (
     ),
     EvaluationCommand(
         "soak",
-        "A run of hours of scripted percepts: time of a step and memory at its start and end.",
-        "visup.evaluation.runtime.soak:evaluate_soak",
+        """A run of hours of scripted percepts: time of a step and memory at its start and end.
+
+        With --traffic instead so many hours of three lanes of cars: growth of memory in the second half,
+        and of the journal.
+        """,
+        f"{_ADAPTERS}:soak",
         "soaking",
         ("ms", "rss_mb"),
-        (count("frames", 200_000, "Length of the run.", None),),
+        (
+            count("frames", 200_000, "Length of the run.", None),
+            Setting("traffic", float, 0.0, Option("Hours of traffic.", at_least=0.0)),
+        ),
         closing=adapters.totals_closing,
     ),
     EvaluationCommand(
