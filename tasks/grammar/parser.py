@@ -130,6 +130,7 @@ def collect(statements: Several[object], file: str) -> Task:
         file=file,
         grounds=of(Ground),
         bystanders=tuple(a for a in of(Actor) if a.bystander),
+        recovered=tuple(r.stage for r in of(Recovery)),
     )
 
 

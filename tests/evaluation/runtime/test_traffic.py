@@ -13,7 +13,7 @@ def test_cars_come_in_pass_and_go_each_under_its_own_number() -> None:
         regions = observation.of("region")
         assert len(regions) <= 3 * LANES
         for region in regions:
-            x, y, w, h = region.bbox
+            x, _, w, h = region.bbox
             assert x >= 0
             assert x + w <= SIZE[0]
             assert region.mask.shape == (h, w)
