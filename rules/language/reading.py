@@ -13,12 +13,11 @@ from lark import Lark, UnexpectedInput
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SourceLocation
 from visup.rules.language.diagnostics import Diagnostic, Source, either
-from visup.rules.language.edits import edits, hint_of
+from visup.rules.language.edits import Repair, edits, hint_of
 from visup.rules.language.fixes import fix_of
 from visup.rules.language.repair import (
     MOST_REPAIRS,
     WORDS,
-    Repair,
     end_before,
     find_repair,
     place_of,
