@@ -64,8 +64,10 @@ def edits(
         unread: Whether the line cannot be read, so that a sign may be missing.
     """
     end = min(len(line), begin + max(1, length))
-    yield from (Repair(at, at, new) for at, new in _put_in(line, begin, end))
     tokens = [(m.start(), m.end(), m[0]) for m in TOKEN.finditer(line)]
+    # Words are left out whole.
+    end = max([end, *(stop for start, stop, _ in tokens if start < end <= stop)])
+    yield from (Repair(at, at, new) for at, new in _put_in(line, begin, end))
     tokens.sort(key=lambda t: _away(t, begin, end))
     near = tokens[: 2 * NEAR + 1]
     for _, stop, word in tokens:
@@ -99,11 +101,11 @@ def _left_out(
     """The fault with what joins it to the rest, then all from a word near it to the end of the line."""
     joints = "|".join(rf"\b{j}\b" if j.isalpha() else re.escape(j) for j in JOINTS)
     before = re.search(rf"(?:{joints})\s*$", line[:begin])
-    after = re.match(rf"\s*(?:{joints})\s*", line[end:])
+    after = re.compile(rf"\s*(?:{joints})\s*").match(line, end)
     if before is not None:
         yield Repair(before.start(), end, "")
     if after is not None:
-        yield Repair(begin, end + after.end(), "")
+        yield Repair(begin, after.end(), "")
     yield Repair(begin, end, "")
     yield from _clause(line, begin, end, joints)
     last = len(line.rstrip())
@@ -115,12 +117,12 @@ def _left_out(
 def _clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
     """All that stands between the joints to either side of a fault, with one of them."""
     before = list(re.finditer(joints, line[:begin]))
-    after = re.search(joints, line[end:])
+    after = re.compile(joints).search(line, end)
     start = before[-1].start() if before else None
     if start is not None:
-        yield Repair(start, end + after.start() if after else len(line.rstrip()), "")
+        yield Repair(start, after.start() if after else len(line.rstrip()), "")
     if after is not None:
-        yield Repair(before[-1].end() + 1 if before else begin, end + after.end() + 1, "")
+        yield Repair(before[-1].end() + 1 if before else begin, after.end() + 1, "")
 
 
 def _away(token: tuple[int, int, str], begin: int, end: int) -> int:

@@ -235,7 +235,7 @@ def _with_edit(
 ) -> Diagnostic:
     place = fault.place
     own = fix_of(block, place, fault.hint)
-    if own is not None and weigh(own.applied(block)) < before:
+    if own is not None and weigh(own.applied(block)) <= before:
         return fault
     for repair in edits(place.text, place.column - 1, place.length, EDIT_WORDS):
         hint = hint_of(place.text, repair)

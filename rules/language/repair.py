@@ -7,8 +7,9 @@ is wrong in the same rule is told as well.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import inf
 
 from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
@@ -16,6 +17,8 @@ from visup.agent.model.did_you_mean import closest
 from visup.rules.language.edits import Repair, edits
 
 MOST_REPAIRS = 12
+MUCH_FURTHER = 8
+"""Where a usual slip lets so many more characters be read, it is what was meant, whatever else is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,22 +150,55 @@ def find_repair(
         A change after which all makes sense, else there is no syntax error left, else only later ones.
     """
     at, length = place_of(text, error)
-    further: Repair | None = None
-    readable: Repair | None = None
-    for repair in _candidates(text, at, length):
-        repair = replace(repair, old=text[repair.begin : repair.end])
-        if repair.old == repair.new:
-            continue
-        left = error_of(repair.applied(text))
-        if left is None:
-            if is_sound(repair.applied(text)):
-                return repair
-            readable = readable or repair
-            continue
-        moved = place_of(repair.applied(text), left)[0] - len(repair.new)
-        if further is None and moved > repair.end + 1 and moved > at + length:
-            further = repair
-    return readable or further
+    trial = _Trial(text, at, length, error_of, is_sound)
+    usual = trial.best(_candidates(text, at, length))
+    if usual is not None and trial.moved > MUCH_FURTHER:
+        return usual
+    places = dict.fromkeys((at, max(0, end_before(text, at) - 1)))
+    return trial.best(r for place in places for r in _edited(text, place)) or usual
+
+
+@dataclass
+class _Trial:
+    """Changes of a text that cannot be read, tried one by one.
+
+    Attributes:
+        text: It cannot be read.
+        at: Where it cannot.
+        length: How long that is.
+        error_of: Reads a text.
+        is_sound: Whether a text without syntax errors makes sense, too.
+        moved: By how many characters the last that was chosen lets the text be read further.
+    """
+
+    text: str
+    at: int
+    length: int
+    error_of: Parses
+    is_sound: Callable[[str], bool]
+    moved: float = 0.0
+
+    def best(self, repairs: Iterable[Repair]) -> Repair | None:
+        """The first that makes sense, else that can be read, else that can be read further."""
+        further: Repair | None = None
+        readable: Repair | None = None
+        for tried in repairs:
+            repair = replace(tried, old=self.text[tried.begin : tried.end])
+            if repair.old == repair.new:
+                continue
+            changed = repair.applied(self.text)
+            left = self.error_of(changed)
+            if left is None:
+                self.moved = inf
+                if self.is_sound(changed):
+                    return repair
+                readable = readable or repair
+                continue
+            moved = place_of(changed, left)[0] - len(repair.new)
+            if further is None and moved > repair.end + 1 and moved > self.at + self.length:
+                further, self.moved = repair, moved - self.at
+        self.moved = self.moved if readable is None else inf
+        return readable or further
 
 
 def place_of(text: str, error: UnexpectedInput) -> tuple[int, int]:
@@ -214,14 +250,14 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
     previous = _word_before(text, before)
     if previous:
         yield Repair(before - len(previous), before, "")
-    for place in dict.fromkeys((at, max(0, before - 1))):
-        yield from _edited(text, place)
 
 
 def _edited(text: str, at: int) -> Iterator[Repair]:
     """Small edits of the line that holds a place."""
     begin, end = text.rfind("\n", 0, at) + 1, text.find("\n", at)
     line = text[begin : end if end >= 0 else len(text)]
+    if line.lstrip().startswith("rule"):
+        return  # without its variables nothing else of a rule makes sense
     for edit in edits(line, at - begin, 1, WORDS):
         yield Repair(begin + edit.begin, begin + edit.end, edit.new)
 

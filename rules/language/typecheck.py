@@ -29,6 +29,7 @@ from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variabl
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.dimensions import check_constant, check_dimensions
 from visup.rules.language.transform import Fault
+from visup.rules.predicates.qualitative_words import ALLEN_RELATIONS, TPCC_RELATIONS
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import PERCEPT_KINDS, RULES, Vocabulary
 from visup.rules.wording.sentences import mentions
@@ -241,6 +242,8 @@ class _FormulaChecker:
             "object": self.scope,
             "relation": RELATION_NAMES,
             "kind": (*PERCEPT_KINDS, word),
+            "allen": ALLEN_RELATIONS,
+            "tpcc": TPCC_RELATIONS,
         }.get(wanted, (word,))
         if word not in known:
             what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
@@ -256,7 +259,7 @@ class _FormulaChecker:
 
 
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
-EXAMPLES |= {"signal": "battery", "word": "auto"}
+EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
 
 
 def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:

@@ -19,6 +19,7 @@ from visup.rules.predicates import image_quantities as image
 from visup.rules.predicates import signals as signal_words
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
+from visup.rules.predicates.qualitative_words import along, three_points
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
     SIGMAS,
@@ -56,7 +57,8 @@ class PredicateDefinition:
     """A word of the rule language that stands for something true, false or unknown.
 
     Attributes:
-        takes: What its arguments are: 'object', 'relation', 'kind', 'name', 'zone', 'signal' or 'word'.
+        takes: What its arguments are: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
+            'word', 'allen' or 'tpcc' (relations of these calculi).
         look: Its meaning: codes of all objects, one dimension for each argument 'object', in their
             order; the other arguments come as words.
         meaning: One clause for people.
@@ -314,6 +316,15 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
             ("kind",), stale, "percepts of that kind could not be observed"
         ),
         "healthy": PredicateDefinition((), healthy, "the image is sound"),
+        **{
+            name: PredicateDefinition(
+                ("allen", *_TWO), along(axis), f"Allen's relation of boxes, {way}"
+            )
+            for name, axis, way in (("along_x", 0, "to the right"), ("along_y", 1, "downwards"))
+        },
+        "tpcc": PredicateDefinition(
+            ("tpcc", *_TWO, "object"), three_points, "where the third is, for one from a to b"
+        ),
         "signal_on": PredicateDefinition(
             ("signal",), signal_words.is_on, "the signal is true, or a number other than 0"
         ),
