@@ -64,13 +64,13 @@ def worded_once(events: Sequence[Event]) -> list[Event]:
 
 
 def _cause(event: Event) -> str:
-    """What two events of a step must share to be told as one."""
+    """What two events of a step must share to be told as one, whatever its first letter."""
     _, _, reason = event.text.partition(": ")
     if reason and event.severity > Severity.INFO:
-        return reason
+        return reason.casefold()
     if reason and event.kind in ("stage_started", "stage_progressing"):
         return f"{event.data.get('task')} {event.data.get('stage')}: {reason}"
-    return event.text
+    return event.text.casefold()
 
 
 def prose(text: str) -> str:

@@ -1,9 +1,30 @@
-"""Boxes that somebody else found: a detector's or a tracker's file in place of visup's own eyes.
+"""Boxes that somebody else found, in place of visup's own eyes: a detector's file, its network, or its code.
 
-Read `files.py` (MOT and COCO files) and `behaviour.py` (boxes as regions, their names as hypotheses).
+Read `boxes.py` (a box), `files.py` (MOT and COCO files), `yolo.py` and `network.py` (ONNX files of the YOLO
+family), `supervision.py` (the boxes of that library, in and out), `numbering.py` (the same thing keeps its
+number) and `behaviour.py` (boxes as regions, their names as hypotheses).
 """
 
-from visup.percepts.detections.behaviour import DetectionsBehaviour
-from visup.percepts.detections.files import Detection, read_detections
+from visup.percepts.detections.behaviour import (
+    DetectionsBehaviour,
+    DetectorBehaviour,
+    NetworkBehaviour,
+)
+from visup.percepts.detections.boxes import Detection
+from visup.percepts.detections.files import read_detections
+from visup.percepts.detections.network import YoloNetwork
+from visup.percepts.detections.supervision import from_supervision, to_supervision
+from visup.percepts.detections.yolo import decode_yolo, letterbox
 
-__all__ = ["Detection", "DetectionsBehaviour", "read_detections"]
+__all__ = [
+    "Detection",
+    "DetectionsBehaviour",
+    "DetectorBehaviour",
+    "NetworkBehaviour",
+    "YoloNetwork",
+    "decode_yolo",
+    "from_supervision",
+    "letterbox",
+    "read_detections",
+    "to_supervision",
+]

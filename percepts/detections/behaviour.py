@@ -1,14 +1,18 @@
-"""Boxes of a file as regions, and their names as hypotheses."""
+"""Boxes of a detector as regions, and their names as hypotheses."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
-from visup.percepts.detections.files import Detection, Frames
+from visup.percepts.detections.boxes import Detection
+from visup.percepts.detections.files import Frames
+from visup.percepts.detections.network import YoloNetwork
+from visup.percepts.detections.numbering import BoxNumbering
 
 PAST_S = 0.4
 """Velocities are those over so long a time."""
@@ -20,45 +24,55 @@ LEAST_SIDE = 2
 """What shows of a box within the picture must be so wide and high, pixels."""
 
 
-class DetectionsBehaviour:
-    """Reports the boxes that a file has for each frame; see `read_detections`.
+class DetectorBehaviour:
+    """A detector as a behaviour: its boxes are regions, and their names hypotheses.
+
+    A plug-in is a subclass with a `find` of its own (and a `start`, where it must load something); boxes
+    without numbers are numbered.
 
     Args:
-        frames: Index of a frame -> its boxes.
+        find: Gives the boxes of a frame; a subclass may define it instead.
+
+    Attributes:
+        names: All that things may be said to be, where that is known beforehand.
     """
 
     contract = Contract("detections", gives=("region", "hypothesis"))
+    names: tuple[str, ...] = ()
 
-    def __init__(self, frames: Frames) -> None:
-        self._frames = frames
+    def __init__(self, find: Callable[[Frame], Iterable[Detection]] | None = None) -> None:
+        if find is not None:
+            self.find = find  # type: ignore[method-assign,assignment]  # a function in place of it
+        self._numbering = BoxNumbering()
         self._past: dict[int, list[tuple[float, float, float]]] = {}
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All that things are said to be."""
-        found = {d.name for boxes in self._frames.values() for d in boxes if d.name}
-        return tuple(sorted(found))
+    def find(self, frame: Frame) -> Iterable[Detection]:
+        """The boxes of a frame."""
+        raise NotImplementedError("a detector says in `find` what there is in a frame")
 
     def save(self) -> Mapping[str, Any]:
         """Where things were a moment ago."""
-        return {"past": {track: list(map(tuple, rows)) for track, rows in self._past.items()}}
+        past = {track: list(map(list, rows)) for track, rows in self._past.items()}
+        return {"past": past, "numbering": self._numbering.save()}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same file remembered."""
+        """Take on what a behaviour of the same detector remembered."""
         self._past = {int(k): [tuple(r) for r in rows] for k, rows in state["past"].items()}
+        self._numbering.load(state["numbering"])
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """One region for each box that shows in the picture, and what it is said to be."""
-        for detection in self._frames.get(frame.index, ()):
+        source = self.contract.name
+        for detection in self._numbering.number(frame.index, tuple(self.find(frame))):
             region = self._region(detection, frame)
             if region is None:
                 continue
-            yield Percept("region", region, frame.time, "detections", region.confidence)
+            yield Percept("region", region, frame.time, source, region.confidence)
             if detection.name:
                 named = Hypothesis(region.id, detection.name, 0, detection.score)
-                yield Percept("hypothesis", named, frame.time, "detections", detection.score)
+                yield Percept("hypothesis", named, frame.time, source, detection.score)
 
     def _region(self, detection: Detection, frame: Frame) -> Region | None:
         x, y, w, h = detection.box
@@ -91,3 +105,31 @@ class DetectionsBehaviour:
             return (0.0, 0.0)
         then = past[0]
         return (here[1] - then[1]) / (now - then[0]), (here[2] - then[2]) / (now - then[0])
+
+
+class DetectionsBehaviour(DetectorBehaviour):
+    """Reports the boxes that a file has for each frame; see `read_detections`.
+
+    Args:
+        frames: Index of a frame -> its boxes.
+    """
+
+    def __init__(self, frames: Frames) -> None:
+        super().__init__(lambda frame: frames.get(frame.index, ()))
+        found = {d.name for boxes in frames.values() for d in boxes if d.name}
+        self.names = tuple(sorted(found))
+
+
+class NetworkBehaviour(DetectorBehaviour):
+    """Reports what a network finds in each frame; see `YoloNetwork`.
+
+    Args:
+        path: The ONNX file.
+    """
+
+    contract = Contract("detections", gives=("region", "hypothesis"), cost_ms=100)
+
+    def __init__(self, path: Path) -> None:
+        network = YoloNetwork(path)
+        super().__init__(network)
+        self.names = network.names

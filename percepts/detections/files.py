@@ -1,37 +1,20 @@
-"""Tracked boxes from files: MOT Challenge text, and COCO JSON with `track_id`."""
+"""Boxes from files: MOT Challenge text and COCO JSON, with the numbers of a tracker or without."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError
+from visup.percepts.detections.boxes import Detection
 
 EXPECTED = (
     "MOT lines `frame,id,left,top,width,height,score,...` (frames from 1), or COCO JSON whose "
-    "annotations have `image_id`, `bbox` and `track_id`"
+    "annotations have `image_id` and `bbox` (and `track_id`, where a tracker has numbered them)"
 )
 MOST_BYTES = 2**30
-
-
-@dataclass(frozen=True, slots=True)
-class Detection:
-    """One box in one frame.
-
-    Attributes:
-        track: Number of the thing, the same from frame to frame, from 1.
-        box: (x, y, width, height), pixels.
-        score: How sure the detector is, 0 to 1.
-        name: What it is said to be, or None.
-    """
-
-    track: int
-    box: tuple[float, float, float, float]
-    score: float = 1.0
-    name: str | None = None
 
 
 Frames = Mapping[int, tuple[Detection, ...]]
@@ -41,8 +24,10 @@ Frames = Mapping[int, tuple[Detection, ...]]
 def read_detections(path: Path) -> Frames:
     """The boxes of a file, by frame.
 
+    Boxes are numbered by the tracker that wrote them, or have no number (0) each.
+
     Raises:
-        SettingsError: It cannot be read, is of neither form, or its boxes are not tracked.
+        SettingsError: It cannot be read, is of neither form, or some of its boxes have numbers and some not.
     """
     try:
         if path.stat().st_size > MOST_BYTES:
@@ -60,14 +45,18 @@ def read_detections(path: Path) -> Frames:
         said = f"no {fault}" if isinstance(fault, KeyError) else str(fault)
         what = f"the detections cannot be used: {said}"
         raise SettingsError(what, where=str(path), expected=EXPECTED) from fault
+    numbered = {d.track > 0 for boxes in found.values() for d in boxes}
+    if len(numbered) > 1:
+        what = (
+            "the detections cannot be used: some boxes have the number of a track, others have none"
+        )
+        raise SettingsError(what, where=str(path), expected=EXPECTED)
     return {frame: tuple(boxes) for frame, boxes in found.items()}
 
 
 def _check(frame: int, detection: Detection) -> None:
     if frame < 0:
         raise ValueError(f"there is no frame {frame}")
-    if detection.track < 1:
-        raise ValueError("boxes without a track: let a tracker number them first")
     if not min(detection.box[2:]) > 0:
         raise ValueError(f"a box of {detection.box[2]:g} x {detection.box[3]:g} pixels")
 
@@ -82,7 +71,8 @@ def _mot(text: str) -> Iterator[tuple[int, Detection]]:
         x, y, w, h = (float(c) for c in cells[2:6])
         score = float(cells[6]) if len(cells) > 6 else 1.0
         sure = min(1.0, score) if score > 0 else 1.0
-        yield int(float(cells[0])) - 1, Detection(int(float(cells[1])), (x, y, w, h), sure)
+        track = max(0, int(float(cells[1])))  # -1 where only a detector spoke
+        yield int(float(cells[0])) - 1, Detection(track, (x, y, w, h), sure)
 
 
 def _coco(told: Any) -> Iterator[tuple[int, Detection]]:
@@ -93,4 +83,5 @@ def _coco(told: Any) -> Iterator[tuple[int, Detection]]:
         x, y, w, h = (float(v) for v in row["bbox"])
         score = min(1.0, max(0.0, float(row.get("score", 1.0))))
         name = names.get(row.get("category_id"))
-        yield order[row["image_id"]], Detection(int(row["track_id"]), (x, y, w, h), score, name)
+        track = max(0, int(row.get("track_id", 0)))
+        yield order[row["image_id"]], Detection(track, (x, y, w, h), score, name)

@@ -119,12 +119,24 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     Raises:
         UnreadableImageError: It cannot be read, is no image, or ends too early.
     """
-    import cv2
-
     try:
         data = read_bounded(path, LARGEST_FILE_BYTES)
     except OSError as e:
         raise UnreadableImageError(f"cannot be read ({e.strerror or e})") from e
+    return decode_image(data)
+
+
+def decode_image(data: bytes) -> NDArray[np.uint8]:
+    """The picture of an image file, from its bytes.
+
+    Returns:
+        (H, W, 3) uint8 BGR.
+
+    Raises:
+        UnreadableImageError: It is no image, or ends too early.
+    """
+    import cv2
+
     if not data:
         raise UnreadableImageError("is empty")
     if _ends_early(data):

@@ -17,6 +17,7 @@ from visup.percepts.video.capture import (
 )
 from visup.percepts.video.image_folder import open_folder
 from visup.percepts.video.live_source import LiveSource, Reconnection
+from visup.percepts.video.ros_bag import is_bag, open_bag
 from visup.percepts.video.source import VideoSource
 from visup.percepts.video.video_file import VideoFile, open_file
 
@@ -36,7 +37,7 @@ def open_source(
 
     Args:
         source: A video file, a folder of images (or a MOT or DAVIS sequence folder), the index of
-            a camera such as '0', or a URL (rtsp, http, ...).
+            a camera such as '0', a URL (rtsp, http, ...), or a ROS 2 bag (`bag` or `bag#/topic`).
         every: Give only every n-th frame; frames keep their number and time in the source.
         fps: Frames per second to assume in place of what the source says.
         factory: What opens files, cameras and URLs.
@@ -118,6 +119,9 @@ def _open_url(url: str, opening: _Opening) -> VideoFile | LiveSource:
 
 def _open_path(path: Path, opening: _Opening) -> VideoSource:
     try:
+        bag = _bag(path)
+        if bag:
+            return open_bag(*bag, every=opening.every, fps=opening.fps)
         if path.is_dir():
             return open_folder(path, every=opening.every, fps=opening.fps)
         if path.is_char_device():
@@ -135,6 +139,14 @@ def _open_path(path: Path, opening: _Opening) -> VideoSource:
         expected="a video file, a folder of images, a camera index or a URL",
         hint=_nearest(path),
     )
+
+
+def _bag(path: Path) -> tuple[Path, str | None] | None:
+    """A bag and the topic that is named after a `#`, or None when it is no bag."""
+    if path.exists():
+        return (path, None) if is_bag(path) else None
+    name, mark, topic = str(path).partition("#")
+    return (Path(name), topic) if mark and is_bag(Path(name)) else None
 
 
 def _nearest(path: Path) -> str:

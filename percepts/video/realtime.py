@@ -39,20 +39,33 @@ class RealTimeFrames(Iterator[Frame], ABC):
 
     Args:
         name: What their source is called.
+        clock: Seconds from any start.
 
     Attributes:
         dropped: Frames that were dropped so far.
         given: Frames that were given so far.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.name = name
+        self.clock = clock
         self.dropped = 0
         self.given = 0
         self._recent: deque[tuple[float, int]] = deque()
+        self._origin: float | None = None
+
+    def lag(self, time: float) -> float:
+        """How long ago it was what a frame shows, seconds; the first frame is taken to have come at once.
+
+        Args:
+            time: Of the frame, seconds.
+        """
+        return 0.0 if self._origin is None else max(0.0, self.clock() - self._origin - time)
 
     def __next__(self) -> Frame:
         frame, missed = self._newest()
+        if self._origin is None:
+            self._origin = self.clock() - frame.time
         self.dropped += missed
         self.given += 1
         self._recent.append((frame.time, missed))
@@ -111,17 +124,16 @@ class PacedRecording(RealTimeFrames):
         clock: Callable[[], float] = time.monotonic,
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
-        super().__init__(name)
-        self._frames = frames
-        self._clock, self._wait = clock, wait
+        super().__init__(name, clock)
+        self._frames, self._wait = frames, wait
         self._start: float | None = None
         self._ahead: Frame | None = None
 
     def _newest(self) -> tuple[Frame, int]:
         frame, missed = self._ahead or next(self._frames), 0
         if self._start is None:
-            self._start = self._clock() - frame.time
-        now = self._clock() - self._start
+            self._start = self.clock() - frame.time
+        now = self.clock() - self._start
         if frame.time > now:
             self._wait(frame.time - now)
         self._ahead = next(self._frames, None)

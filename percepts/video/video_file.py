@@ -22,6 +22,9 @@ from visup.percepts.video.source import Ending, VideoSource
 
 SNIFFED_BYTES = 4096
 ROUNDING_S = 0.002
+LEAST_STEP = 0.1
+"""Two frames are no nearer in time than that, in usual intervals: nothing is at two places at once, and a
+velocity between two moments that are the same but for rounding has no bounds."""
 STILL_IMAGE = "it is a single image, not a video"
 TEXT = "it is a text file, not a video"
 
@@ -32,7 +35,8 @@ class ContainerClock:
 
     Containers round their times (WebM to a millisecond), so that where they agree with a constant
     rate the exact quotient is used. Where they differ the rate varies and the container is right.
-    A container that goes back in time is wrong, and the rate carries on from the last good time.
+    A container that goes back in time, or stands still, is wrong, and the rate carries on from the last good
+    time.
 
     Attributes:
         fps: Frames per second, above 0.
@@ -52,14 +56,15 @@ class ContainerClock:
             container_s: What the container says, seconds from any start.
 
         Returns:
-            Seconds, greater than for the frame before.
+            Seconds, greater than for the frame before by at least a tenth of the usual interval.
         """
         if self._first is None:
             self._first = container_s if np.isfinite(container_s) else 0.0
         even, told = index / self.fps, container_s - self._first
         if self.constant or abs(told - even) <= ROUNDING_S:
             told = even
-        if not (np.isfinite(told) and told > self._last):
+        least = self._last + LEAST_STEP / self.fps if index else self._last
+        if not (np.isfinite(told) and told > least):
             told = self._last + 1.0 / self.fps if index else 0.0
         self._last = told
         return told

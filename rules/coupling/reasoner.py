@@ -77,6 +77,7 @@ class CouplingSettings:
         moving_share: usual relative speed of bodies that move each by itself, as such a share.
         rest_s: For how long they must be at rest, where they do not move: what turns back rests, too.
         odds: Logarithm of the odds of rest from which on it is believed.
+        carried_share: The same as a share, where both are on the move.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
@@ -89,9 +90,10 @@ class CouplingSettings:
     path_s: float = 1.2
     moving: float = 0.0125
     still_share: float = 0.2
-    moving_share: float = 0.6
+    moving_share: float = 1.0
     rest_s: float = 0.8
     odds: float = 5.0
+    carried_share: float = 0.7
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.35
@@ -274,10 +276,12 @@ class CouplingReasoner:
         yield Condition("both are seen near each other", watched)
         text = "log odds that they touch and are at rest"
         together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
-        # That they move together was judged over a while of its own.
-        yield at_least(text, evidence.rest_odds, (0.4 if together else 1.0) * s.odds)
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
         moving = common_speed(mind, seen.pair) > least
+        # That they move together was judged over a while of its own; and what goes along is hardly
+        # ever at rest to the other by chance.
+        share = 0.4 if together else s.carried_share if moving else 1.0
+        yield at_least(text, evidence.rest_odds, share * s.odds)
         if not (moving or together) and evidence.rest_since is not None:
             lasted = mind.time - evidence.rest_since
             yield at_least("at rest for", lasted, s.rest_s, " s", slack=1e-6)

@@ -51,7 +51,7 @@ from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
-from visup.rules.wording.sentences import called, seems, spaced
+from visup.rules.wording.sentences import TOLD_NAMES, called, seems, spaced
 
 VoteCounts = tuple[tuple[str, float], ...]
 
@@ -290,6 +290,8 @@ class IdentityReasoner:
             every[object_id] = votes
         mind = mind.with_objects(*beliefs)
         mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(every)))
+        told = {i: votes.reported for i, votes in every.items() if votes.reported is not None}
+        mind = mind.remember(TOLD_NAMES, MappingProxyType(told))
         return Outcome(mind, tuple(events))
 
     def _conditions(

@@ -317,7 +317,8 @@ def classify_motion(
             )
             lately = min(_speed(now.motion[2], i), _speed(now.motion[2], j))
             codes[2, k] = _together(relative, halves, slower, lately, state[2, k], limits.rest)
-            if now.marks[k] & COUPLED and touching == 1 and found == DIVERGING:
+            meets = tables[PairQuantity.GAP, i, j] <= limits.touch[0]
+            if now.marks[k] & COUPLED and meets and found == DIVERGING:
                 # One body that turns changes its outline; it parts when its parts no longer touch.
                 found = KEEPING
             if now.marks[k] & MERGED:

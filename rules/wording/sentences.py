@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
 TOLD = 0.7
 """Likelihood from which on an object is told to be something; see `VoteSettings.settle`."""
+
+TOLD_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", None)
+"""Object id -> the model that it was last told to be; None where nobody tells names. Who counts the votes
+remembers it."""
 
 SURE, LIKELY = 0.95, 0.5
 """Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
@@ -49,6 +55,26 @@ def believed_name(mind: Mind, object_id: int) -> str | None:
     return called(mind, belief.name)
 
 
+def spoken_name(mind: Mind, object_id: int) -> str | None:
+    """What an object is called in sentences: as `believed_name`, but no name before it has been told.
+
+    What leads the votes for a moment is no news, and names that come and go would be a story that contradicts
+    itself: who is called otherwise than before was told to be so.
+
+    Args:
+        mind: The mind.
+        object_id: Any object id.
+
+    Returns:
+        A name, or None when none was told.
+    """
+    name, told = believed_name(mind, object_id), mind.recall(TOLD_NAMES)
+    played = any(b.object_id == object_id for task in mind.tasks for b in task.bindings)
+    if name is None or played or told is None or object_id in mind.answers:
+        return name
+    return called(mind, told[object_id]) if object_id in told else None
+
+
 def called(mind: Mind, model: str) -> str:
     """What an object of a model is called: the actor that is bound to the model, else the model."""
     return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
@@ -65,7 +91,7 @@ def describe(mind: Mind, object_id: int) -> str:
         Such as 'object 2, believed to be the satellite', 'object 2, in the part of the gripper' when a task
         takes it for that though it does not look so, or 'object 3' when nobody knows what it is.
     """
-    name = believed_name(mind, object_id)
+    name = spoken_name(mind, object_id)
     if name is None:
         return f"object {object_id}"
     how = "believed to be" if _looks_like(mind, object_id, name) else "in the part of"
@@ -79,6 +105,8 @@ def _looks_like(mind: Mind, object_id: int, name: str) -> bool:
         return False
     bindings = (b for task in mind.tasks for b in task.bindings if b.object_id == object_id)
     first = next(bindings, None)
+    if first is None:
+        return True  # it is called as it was told
     models = first.models if first else ()
     same = belief.name in models or called(mind, belief.name) == name
     return same or belief.confidence < TOLD
@@ -86,7 +114,7 @@ def _looks_like(mind: Mind, object_id: int, name: str) -> bool:
 
 def short(mind: Mind, object_id: int) -> str:
     """An object in two words, for lists and evidence: 'the satellite' or 'object 3'."""
-    name = believed_name(mind, object_id)
+    name = spoken_name(mind, object_id)
     return f"the {spaced(name)}" if name is not None else f"object {object_id}"
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cmp_to_key
 
 from visup.tasks.learning.order import Item, Joint
 from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Symbol
@@ -18,6 +19,8 @@ LET_GO_S = 0.6
 """What is carried meets others no longer than so long after it was let go."""
 CLOSE_S = 2.0
 """An approach may end so long before its meeting; relations are judged with delays."""
+MUCH_LESS = 0.7
+"""Pairs whose meetings differ by less are told apart by who rests."""
 ENDED_S = 0.3
 """A meeting that ends so long before the run does has ended, and is not cut off."""
 
@@ -154,7 +157,10 @@ def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happenin
 
 
 def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
-    """Pairs that touch, those that do so in the fewest runs, and for the shortest time, first."""
+    """Pairs that touch: in the fewest runs, or for much less long, first; then those that move most.
+
+    What is put on a thing that rests meets that thing, and not what was put on it before.
+    """
     seconds: dict[Pair, list[float]] = {}
     for run in runs:
         mine: dict[Pair, float] = {}
@@ -163,7 +169,17 @@ def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
                 mine[h.symbol[1]] = mine.get(h.symbol[1], 0.0) + h.end - h.begin
         for pair, long in mine.items():
             seconds.setdefault(pair, []).append(long)
-    return sorted(seconds, key=lambda p: (len(seconds[p]), sum(seconds[p]), p))
+
+    def moved(pair: Pair) -> float:
+        return sum(run.moved_s.get(name, 0.0) for run in runs for name in pair)
+
+    def compared(p: Pair, q: Pair) -> float:
+        runs_more, long, other = len(seconds[p]) - len(seconds[q]), sum(seconds[p]), sum(seconds[q])
+        if runs_more or min(long, other) < MUCH_LESS * max(long, other):
+            return runs_more or long - other
+        return moved(q) - moved(p) or (1 if p > q else -1)
+
+    return sorted(seconds, key=cmp_to_key(compared))
 
 
 def meetings_of(run: RunTrace, pairs: Sequence[Pair]) -> list[Meeting]:

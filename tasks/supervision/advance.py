@@ -108,7 +108,9 @@ class Advance:
             return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._goes_on(transition):
             return Support.OVER
-        nearer = ways == 1 and all(self._nearer(s) for s in transition.entered)
+        # What fails is not left behind unseen.
+        fails = any(x.payload.status in BAD for x in transition.left)
+        nearer = ways == 1 and not fails and all(self._nearer(s) for s in transition.entered)
         return Support.NEARER if nearer else Support.NONE
 
     def _chance(
@@ -171,7 +173,8 @@ class Advance:
         state = transition.taken(leaves(hypothesis.state), entered(self.now))
         begun = set(transition.transition.begun)
         under_way = [
-            self._begun(x, opened) if i in begun else x for i, x in enumerate(leaves(state))
+            self._begun(_in_turn(x, transition.left), opened) if i in begun else x
+            for i, x in enumerate(leaves(state))
         ]
         left = tuple(x.step for x in transition.left)
         if self._early(hypothesis, transition):
@@ -226,7 +229,9 @@ class Advance:
     ) -> tuple[StageBelief, ...]:
         """The latest word on the stages that lie behind, once a transition is taken."""
         found = {p.stage: p for p in hypothesis.past}
-        endings = sorted((self._ending(x) for x in transition.left), key=lambda e: WORSE[e.status])
+        followed = self._followed(transition)
+        left = (self._ending(x, followed) for x in transition.left)
+        endings = sorted(left, key=lambda e: WORSE[e.status])
         for ending in endings:
             failed = ending.status is Status.FAILED
             before = found.get(ending.stage)
@@ -236,11 +241,25 @@ class Advance:
                 found[ending.stage] = ending
         return tuple(found.values())
 
-    def _ending(self, leaf: Leaf[StepMonitor]) -> StageBelief:
+    def _followed(self, transition: OpenTransition) -> float | None:
+        """Since when what a transition enters is seen, if it is."""
+        seen = (self.observe(s) for s in transition.entered)
+        since = [r.since for o in seen if (r := o.helps or o.entry) is not None]
+        return min(since, default=None)
+
+    def _ending(self, leaf: Leaf[StepMonitor], followed: float | None) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
         meaning = self.steps.actions[leaf.step.action]
-        status, why = outcome(leaf.step, meaning, leaf.payload, self.now)
+        status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
+
+
+def _in_turn(leaf: Leaf[StepMonitor], left: tuple[Leaf[StepMonitor], ...]) -> Leaf[StepMonitor]:
+    """A step that begins, with since when what shows it counts."""
+    same = any(leaf.step.same_as(x.step) for x in left)
+    begun = (x.payload.begun for x in left)
+    turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
+    return replace(leaf, payload=replace(leaf.payload, turn=turn))
 
 
 def _may_end(transition: OpenTransition) -> bool:

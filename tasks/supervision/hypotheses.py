@@ -101,6 +101,15 @@ def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
 
 
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
+    """Whether of two steps of a stage the first speaks for it.
+
+    One that comes nearer within the stage shows that it is under way, though another is still waited
+    for; one that was so before shows nothing.
+    """
+    pair = leaf.payload, other.payload
+    if {p.status for p in pair} == {Status.ACTIVE, Status.PROGRESSING}:
+        going = next(p for p in pair if p.status is Status.PROGRESSING)
+        return (leaf.payload is going) is going.begun_anew
     return WORST_FIRST.index(leaf.payload.status) < WORST_FIRST.index(other.payload.status)
 
 

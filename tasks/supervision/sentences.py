@@ -65,9 +65,21 @@ def evidence(
 
 
 def outcome(
-    step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor, now: float
+    step: TaskStep,
+    meaning: ActionDefinition,
+    monitor: StepMonitor,
+    now: float,
+    followed: float | None = None,
 ) -> tuple[Status, str]:
     """How a step that has been left ended, and why.
+
+    Args:
+        step: The step.
+        meaning: Its action.
+        monitor: What is kept about it.
+        now: Seconds.
+        followed: Since when what comes next has been seen, where that is told: what goes on until then is not
+            told to have gone on for longer.
 
     Returns:
         DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
@@ -87,10 +99,29 @@ def outcome(
     if meaning.lasts and monitor.begun is None:
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
     if meaning.lasts or monitor.held:
-        return Status.DONE, f"{who} {was} {meaning.text} until {now:.1f} s"
+        return Status.DONE, f"{who} {_held(step, meaning, monitor, now, followed)}"
     if monitor.broken_since is not None:
         return Status.FAILED, f"{who} should be {meaning.text}, and {was} not"
     return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"
+
+
+def _held(
+    step: TaskStep,
+    meaning: ActionDefinition,
+    monitor: StepMonitor,
+    now: float,
+    followed: float | None,
+) -> str:
+    """From or until when a step that is done was what it should be."""
+    was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
+    if not meaning.lasts and monitor.held_s > 0.0:
+        return f"{have} been {meaning.text} since {max(0.0, now - monitor.held_s):.1f} s"
+    over = now if monitor.helped_at is None else monitor.helped_at
+    if not meaning.lasts and monitor.broken_since is not None:
+        over = monitor.broken_since
+    if followed is not None and (monitor.begun is None or followed > monitor.begun):
+        over = min(over, followed)
+    return f"{was} {meaning.text} until {over:.1f} s"
 
 
 def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
@@ -100,6 +131,8 @@ def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
 
 def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
     """The sentence of a verdict."""
+    # What interrupts is an alert's own sentence.
+    why = f"o{why[1:]}" if why.startswith("Object ") else why
     return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
 
 

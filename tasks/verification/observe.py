@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -237,13 +238,16 @@ def _moving_together(
     mind: Mind, relations: RelationLookup, ids: tuple[int, ...]
 ) -> Relation | None:
     """Moving together when they are coupled and on the move, however much one of them sways."""
+    # Where one is cut by the border, or hidden, it moves as the other does.
+    speeds = [kinematics(mind).one("speed", i) for i in ids]
+    slower = min((speed for speed in speeds if not math.isnan(speed)), default=0.0)
+    moves = slower > CARRIED_SPEED * image_diagonal(mind.frame_size)
+    on_the_move = relations.lasting("on_the_move", ids, Truth.TRUE if moves else Truth.FALSE)
     coupled = relations.find("coupled", ids)
-    if coupled.truth is not Truth.TRUE:
+    if coupled.truth is not Truth.TRUE or not moves:
         return None
-    slower = min(kinematics(mind).one("speed", i) for i in ids)
-    if not slower > CARRIED_SPEED * image_diagonal(mind.frame_size):
-        return None
-    return relations.lasting("moving_together", ids, Truth.TRUE)
+    since = max(on_the_move.since, coupled.since)
+    return Relation("moving_together", ids, Truth.TRUE, since)
 
 
 def _in_contact(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,9 +34,12 @@ class StepMonitor:
 
     Attributes:
         entered: When the step was entered.
+        turn: What was true before this shows nothing: the stage before it asked for the same, or had not
+            begun then.
         status: How it stands.
         since: Since when it stands so.
         begun: When it was first seen to hold or to come nearer, or None.
+        first_since: Since when the relation was true by which it was, or None.
         held: Whether it ever held.
         held_s: How long it has held without a break.
         broken_since: Since when it has not held, or None.
@@ -60,9 +64,11 @@ class StepMonitor:
     """
 
     entered: float
+    turn: float = -math.inf
     status: Status = Status.ACTIVE
     since: float = 0.0
     begun: float | None = None
+    first_since: float | None = None
     held: bool = False
     held_s: float = 0.0
     broken_since: float | None = None
@@ -83,6 +89,11 @@ class StepMonitor:
     opened: bool = False
     early: bool = False
     parted_s: float = 0.0
+
+    @property
+    def begun_anew(self) -> bool:
+        """Whether what first showed that it holds or comes nearer came about in its turn."""
+        return self.first_since is not None and self.first_since >= self.turn
 
 
 def entered(now: float) -> StepMonitor:
@@ -201,6 +212,9 @@ def _note_progress(
     return replace(
         monitor,
         begun=_first(monitor.begun, now) if helping else monitor.begun,
+        first_since=_first(monitor.first_since, seen.helps.since)
+        if seen.helps
+        else monitor.first_since,
         held=monitor.held or seen.holds is Truth.TRUE,
         held_s=held,
         broken_since=broken,

@@ -36,6 +36,24 @@ def test_mot_and_coco_hold_the_same_boxes(run: Path, tmp_path: Path) -> None:
     assert all((i["width"], i["height"]) == (96, 72) for i in made["images"])
 
 
+def test_fiftyone_has_the_same_boxes_as_shares_of_the_picture(run: Path, tmp_path: Path) -> None:
+    seen = [o for o in visup.open_run(run).objects if o.confirmed and o.presence == "seen"]
+    assert export(run, "fiftyone", tmp_path / "a.json") == len(seen)
+    frames = json.loads((tmp_path / "a.json").read_text())["frames"]
+    told = [
+        (int(number) - 1, o["index"], o["label"], o["bounding_box"])
+        for number, frame in frames.items()
+        for o in frame["objects"]["objects"]
+    ]
+    assert [t[:3] for t in told] == [(o.frame_index, o.id, o.name) for o in seen]
+    for (*_, corners), o in zip(told, seen, strict=True):
+        (left, top), (right, bottom) = (
+            (round(96 * corners[k]["x"], 6), round(72 * corners[k]["y"], 6))
+            for k in ("top_left", "bottom_right")
+        )
+        assert (left, top, right - left, bottom - top) == pytest.approx(o.bbox)
+
+
 def test_csv_holds_all_that_was_believed(run: Path, tmp_path: Path) -> None:
     count = export(run, "csv", tmp_path / "a.csv")
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
@@ -44,7 +62,7 @@ def test_csv_holds_all_that_was_believed(run: Path, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written_is_refused(run: Path, tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match="one of: mot, coco, csv"):
+    with pytest.raises(SettingsError, match="one of: mot, coco, fiftyone, csv"):
         export(run, "xml", tmp_path / "a.xml")
     with pytest.raises(OutputError):
         export(run, "mot", tmp_path / "no" / "a.txt")

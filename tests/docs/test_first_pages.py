@@ -14,7 +14,10 @@ from visup.rules.language.parser import parse_rules
 from visup.runs.inputs.presets import PRESETS
 from visup.runs.inputs.zones import load_zones
 
-PAGES = ("troubleshooting.md", "watching-a-road.md", "which-tool.md", "your-own-cell.md")
+PAGES = (
+    *("troubleshooting.md", "watching-a-road.md", "which-tool.md", "your-own-cell.md"),
+    *("first-task.md", "first-plugin.md", "deployment.md", "other-tools.md"),
+)
 TREES = [
     path.read_text(encoding="utf-8")
     for room in ("agent", "percepts", "rules", "tasks", "visup")
@@ -45,7 +48,8 @@ def test_every_message_that_is_quoted_is_one_that_visup_says(message: str) -> No
 @pytest.mark.parametrize("name", PAGES)
 def test_every_command_and_option_exists(name: str) -> None:
     commands = re.findall(r"^visup .*|`(visup [^`]+)`", page(name), re.MULTILINE)
-    lines = [c for c in re.findall(r"`?(visup [a-z][^`\n]*)", page(name)) if commands]
+    text = re.sub(r"<!--.*?-->", "", page(name))
+    lines = [c for c in re.findall(r"`?(visup [a-z][^`\n]*)", text) if commands]
     for line in lines:
         words = line.split("#")[0].split()[1:]
         names = (
@@ -80,3 +84,21 @@ def test_links_between_pages_lead_somewhere(name: str) -> None:
     for target in re.findall(r"\]\(([^)#:]+\.md)(?:#[\w-]+)?\)", page(name)):
         assert (ROOT / "docs" / target).is_file()
     assert name in (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+
+
+def anchors(path: Path) -> set[str]:
+    """What the headings of a page are called in links."""
+    text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    plain = (re.sub(r"[^\w\s-]", "", h.lower()).strip() for h in headings)
+    return {re.sub(r"[\s-]+", "-", h) for h in plain}
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))])
+def test_links_to_headings_lead_to_headings(page: Path) -> None:
+    links = re.findall(r"\]\(([^)#:]*\.md)?#([\w-]+)\)", page.read_text(encoding="utf-8"))
+    assert [
+        (name, anchor)
+        for name, anchor in links
+        if anchor not in anchors(page.parent / name if name else page)
+    ] == []

@@ -1,4 +1,4 @@
-"""The tutorial's commands, outlines and tasks are those that ship and work."""
+"""The commands, outlines and tasks of `docs/your-own-cell.md` are those that ship and work."""
 
 from __future__ import annotations
 

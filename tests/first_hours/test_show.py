@@ -42,3 +42,19 @@ def test_what_cannot_be_shown_is_told(
     clip.unlink()
     piped(monkeypatch, "step 3", "show")
     assert "cannot be had again" in visup("step", tmp_path / "run").out
+
+
+def test_what_an_answer_rests_on_is_marked_in_its_frame(
+    visup: Call, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    piped(monkeypatch, "step 30", "show why object 1 why.png", "show plain.png")
+    done = visup("step", clip)
+    assert done.code == 0, done.out
+    why, plain = (cv2.imread(str(tmp_path / n)) for n in ("why.png", "plain.png"))
+    assert why is not None
+    assert plain is not None
+    assert why[:20, :20].mean() < 0.5 * plain[:20, :20].mean()  # far from the disc it is dim
+    piped(monkeypatch, "step 30", "show why", "show why not stale_perception x.png")
+    done = visup("step", clip)
+    assert "show why WHAT" in done.out
+    assert done.code == 2

@@ -114,8 +114,11 @@ def test_labels_stay_inside_and_apart(boxes: list[tuple[int, int, int, int]]) ->
 
 def test_labels_tell_name_and_share() -> None:
     belief = mind_at(20).objects[1]
-    assert label_of(belief) == f"1 spartan {belief.strength * 100:.0f} %"
-    assert label_of(replace(belief, candidates=())) == "1 unknown"
+    mind = Mind()
+    assert label_of(belief, mind) == f"1 spartan {belief.strength * 100:.0f} %"
+    assert label_of(replace(belief, candidates=()), mind) == "1 unknown"
+    played = replace(mind, actors={"the_satellite": ("spartan",)})
+    assert label_of(belief, played) == f"1 the satellite {belief.strength * 100:.0f} %"
 
 
 def test_neighbouring_objects_differ_in_colour() -> None:

@@ -1,11 +1,11 @@
-"""Recorded objects in the forms of other tools: MOT, COCO, CSV."""
+"""Recorded objects in the forms of other tools: MOT, COCO, FiftyOne, CSV."""
 
 from __future__ import annotations
 
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
@@ -37,8 +37,9 @@ def export(
 
     Args:
         run: A run, or its folder.
-        form: `mot` (MOT Challenge: a line a box, frames from 1), `coco` (COCO JSON with `track_id`) or `csv`
-            (all that is believed, also of hidden objects).
+        form: `mot` (MOT Challenge: a line a box, frames from 1), `coco` (COCO JSON with `track_id`),
+            `fiftyone` (labels of a video for FiftyOne: boxes as shares of the picture, frames from 1) or
+            `csv` (all that is believed, also of hidden objects).
         target: The file.
 
     Returns:
@@ -109,6 +110,33 @@ def _coco(run: RecordedRun) -> tuple[str, int]:
     return json.dumps(made) + "\n", len(annotations)
 
 
+def _fiftyone(run: RecordedRun) -> tuple[str, int]:
+    width, height = run.facts.get("size") or (1, 1)
+    frames: dict[str, dict[str, Any]] = {}
+    count = 0
+    for o in _seen(run):
+        count += 1
+        number = o.frame_index + 1
+        frame = frames.setdefault(str(number), {"frame_number": number, "objects": {"objects": []}})
+        frame["objects"]["objects"].append(
+            {
+                "label": o.name,
+                "confidence": o.share or 1.0,
+                "index": o.id,
+                "bounding_box": _corners(o.bbox, width, height),
+            }
+        )
+    return json.dumps({"frames": frames}) + "\n", count
+
+
+def _corners(box: Sequence[int], width: int, height: int) -> dict[str, dict[str, float]]:
+    x, y, w, h = box
+    return {
+        "top_left": {"x": x / width, "y": y / height},
+        "bottom_right": {"x": (x + w) / width, "y": (y + h) / height},
+    }
+
+
 def _csv(run: RecordedRun) -> tuple[str, int]:
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -121,6 +149,6 @@ def _csv(run: RecordedRun) -> tuple[str, int]:
 
 
 FORMS: Mapping[str, Callable[[RecordedRun], tuple[str, int]]] = MappingProxyType(
-    {"mot": _mot, "coco": _coco, "csv": _csv}
+    {"mot": _mot, "coco": _coco, "fiftyone": _fiftyone, "csv": _csv}
 )
 """Form -> what makes its text, and counts its boxes."""

@@ -36,6 +36,7 @@ class WatchOptions(TypedDict, total=False):
     signals: Sequence[str | os.PathLike[str]]
     patience_s: float
     detections: str | os.PathLike[str] | None
+    motion: bool
     preset: str | None
     attention: bool
 

@@ -11,7 +11,7 @@ from visup.terminal.console import make_console
 
 if TYPE_CHECKING:
     from visup.percepts.video import VideoSource
-    from visup.runs.runner import Progress
+    from visup.runs.runner import RunProgress
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -53,7 +53,7 @@ def motion(
     console.print(f"{written} frames in {target}", markup=False)
 
 
-def _write(video: VideoSource, target: Path, limit: int | None, advance: Progress) -> int:
+def _write(video: VideoSource, target: Path, limit: int | None, advance: RunProgress) -> int:
     """Segment, draw and write; the number of frames written."""
     from itertools import islice
 

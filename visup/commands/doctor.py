@@ -32,7 +32,7 @@ LIBRARIES = {
 
 EXTRAS = {
     "report": ("the report of a run", ("plotly",)),
-    "onnx": ("detectors of your own as ONNX files", ("onnxruntime",)),
+    "onnx": ("detectors as ONNX files (--detections)", ("onnxruntime",)),
     "render": ("visup render, models from meshes", ("trimesh", "embreex")),
     "lsp": ("visup task lsp: task files in editors", ("pygls",)),
     "eval": (
@@ -44,6 +44,7 @@ EXTRAS = {
         "traces and metrics for OpenTelemetry",
         ("opentelemetry-sdk", "opentelemetry-exporter-otlp-proto-http"),
     ),
+    "ros": ("the pictures of ROS 2 bags", ("rosbags",)),
     "rerun": ("the Rerun viewer", ("rerun-sdk",)),
     "tables": ("runs as pandas and Arrow tables", ("pandas", "pyarrow")),
     "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),

@@ -10,15 +10,15 @@ import typer
 
 def export(
     run: Annotated[Path, typer.Argument(help="Run folder of `visup watch`, or its journal.")],
-    form: Annotated[str, typer.Argument(help="mot, coco or csv.", metavar="FORM")],
+    form: Annotated[str, typer.Argument(help="mot, coco, fiftyone or csv.", metavar="FORM")],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Where to (default: RUN.FORM).")
     ] = None,
 ) -> None:
-    """Write the objects of a run, frame by frame, as MOT, COCO or CSV."""
+    """Write the objects of a run, frame by frame, as MOT, COCO, FiftyOne or CSV."""
     from visup.api.exports import export as write
     from visup.terminal.console import echo
 
-    suffix = {"mot": "txt", "coco": "json"}.get(form, form)
+    suffix = {"mot": "txt", "coco": "json", "fiftyone": "json"}.get(form, form)
     target = out or Path(f"{run.name}-{form}.{suffix}")
     echo(f"{target}: {write(run, form, target)} boxes")

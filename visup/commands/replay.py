@@ -125,13 +125,25 @@ def _speed(told: Transcript) -> str:
     return f"{told.steps} frames replayed in {told.seconds:.1f} s ({rate:.0f} a second)"
 
 
+def _told_otherwise(changed: TranscriptDiff) -> Iterator[str]:
+    """What only one of both runs told, by time; events that read alike are one line."""
+    from visup.wording import prose
+
+    gone, new = (
+        dict.fromkeys((float(e.get("time", 0)), str(e.get("text", ""))) for e in events)
+        for events in (changed.gone, changed.new)
+    )
+    marked = [("-", e) for e in gone if e not in new] + [("+", e) for e in new if e not in gone]
+    for mark, (time, text) in sorted(marked, key=lambda m: m[1][0]):
+        yield f"{mark} {time:7.1f} s  {prose(text)}"
+
+
 def _lines(changed: TranscriptDiff, quiet: bool) -> Iterator[str]:
     if not changed:
         yield "Nothing changes."
         return
-    marked = [("-", e) for e in changed.gone] + [("+", e) for e in changed.new]
-    for mark, event in [] if quiet else sorted(marked, key=lambda m: float(m[1].get("time", 0))):
-        yield f"{mark} {float(event.get('time', 0)):7.1f} s  {event.get('text', '')}"
+    if not quiet:
+        yield from _told_otherwise(changed)
     for group, (gone, new) in changed.counts().items():
         if gone or new:
             yield f"{group}: {gone} gone, {new} new"

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 OPTIONS = (
     *("tasks", "models", "rules", "actors", "every", "behaviours", "plugins", "fps"),
     *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention", "preset"),
+    *("detections", "motion"),
 )
 """Settings of a run that matter when it is stepped: nothing is late here, and nothing recorded."""
 
@@ -60,11 +61,19 @@ def step(
 
 
 def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
+    from visup.percepts.video.realtime import in_real_time
+    from visup.runs.monotonic_clock import MonotonicFrames
     from visup.runs.wiring import build_agent, open_video
 
     agent = build_agent(settings)
     stack.callback(agent.close)
-    return agent, stack.enter_context(open_video(settings))
+    video = stack.enter_context(open_video(settings))
+    if not video.live:
+        return agent, video
+    # While one looks at a step a camera goes on: the next step is to be of what it sees then.
+    newest = in_real_time(video, video)
+    stack.callback(newest.close)
+    return agent, MonotonicFrames(newest, video.fps)
 
 
 def _pictures(source: str, stack: ExitStack) -> Callable[[int], NDArray[np.uint8]] | None:

@@ -21,7 +21,11 @@ if TYPE_CHECKING:
 
     from visup.runs.result import RunResult
     from visup.runs.resume import InterruptedRun
-    from visup.runs.runner import Progress
+    from visup.runs.runner import RunProgress
+
+
+LAG_TOLD_S = 0.5
+"""A camera is told to be watched late from so long on: less than that nobody notices."""
 
 
 def _parse_answers(texts: list[str]) -> dict[int, str]:
@@ -186,7 +190,7 @@ def no_empty_folder(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[Progress]:
+def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[RunProgress]:
     """A progress bar on a terminal; nothing where the output is not one.
 
     Args:
@@ -212,10 +216,11 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
     with bar:
         task = bar.add_task(word, total=None, rate="")
 
-        def tell(done: int, total: int | None) -> None:
+        def tell(done: int, total: int | None, lag_s: float | None = None) -> None:
             took = bar.tasks[0].elapsed or 0.0
             rate = f"{done / took:.1f} frames/s" if took > 1.0 else ""
-            bar.update(task, completed=done, total=total, rate=rate)
+            late = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= LAG_TOLD_S else ""
+            bar.update(task, completed=done, total=total, rate=f"{rate}{late}")
 
         yield tell
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from visup.agent import Alert, Mind, ObjectBelief, Presence, Severity, StageBelief, Status
 from visup.report.image_text import fitted, ink, shade, write
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, Rgb, object_colour
+from visup.rules.wording.sentences import called, spaced
 from visup.wording import prose
 
 WHITE: Rgb = (255, 255, 255)
@@ -71,15 +72,15 @@ def annotate(image: Image, mind: Mind) -> Image:
         _outline(out, belief, scale)
     top = _alerts(out, mind.alerts, scale)
     bottom = _stages(out, mind, scale)
-    _labels(out, shown, (top, bottom), scale)
+    _labels(out, mind, shown, (top, bottom), scale)
     return out
 
 
-def label_of(belief: ObjectBelief) -> str:
-    """What an object is called in a picture, such as '2 spartan 87 %'."""
+def label_of(belief: ObjectBelief, mind: Mind) -> str:
+    """What an object is called in a picture, as sentences call it, such as '2 satellite 87 %'."""
     if not belief.candidates:
         return f"{belief.id} unknown"
-    name = belief.name.replace("_", " ")
+    name = spaced(called(mind, belief.name))
     return f"{belief.id} {name} {belief.strength:.0%}".replace("%", " %")
 
 
@@ -123,14 +124,14 @@ def _dashes(points: NDArray[np.int32], length: float) -> list[NDArray[np.int32]]
 
 
 def _labels(
-    image: Image, beliefs: list[ObjectBelief], edges: tuple[int, int], scale: Scale
+    image: Image, mind: Mind, beliefs: list[ObjectBelief], edges: tuple[int, int], scale: Scale
 ) -> None:
     """Name tags next to their objects, none over another."""
     placed: list[Box] = []
     for belief in sorted(beliefs, key=lambda b: b.region.bbox[1]):
         hidden = " (hidden)" if belief.presence is Presence.HIDDEN else ""
         room = image.shape[1] - 4 * scale.pad
-        text = fitted(label_of(belief) + hidden, scale.letters, room)
+        text = fitted(label_of(belief, mind) + hidden, scale.letters, room)
         width = ink(text, scale.letters).shape[1] + 3 * scale.pad if text else 0
         box = _place(belief.region.bbox, (width, scale.row), placed, edges, image.shape[1])
         placed.append(box)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator,
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 from visup.agent import Frame, Severity, Verdict
 from visup.agent.execution.runners import error_line
@@ -31,8 +31,18 @@ from visup.version import __version__
 if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
 
-Progress = Callable[[int, int | None], None]
-"""Called after each step with how many frames are done and how many there are (None when not known)."""
+
+class RunProgress(Protocol):
+    """Told after each step how far a run has come."""
+
+    def __call__(self, done: int, total: int | None, lag_s: float | None = None, /) -> None:
+        """Take it down.
+
+        Args:
+            done: Frames that were looked at.
+            total: Frames that there are, or None where nobody knows.
+            lag_s: How long ago it was what is told now, seconds; None of what is not watched in real time.
+        """
 
 
 def fresh_folder(out: Path | None, source: str) -> Path:
@@ -91,7 +101,7 @@ class Audience:
     """
 
     observers: Sequence[Observer] = ()
-    progress: Progress | None = None
+    progress: RunProgress | None = None
     operator: HumanOperator | None = None
     notice: Callable[[str], None] | None = None
 
@@ -268,7 +278,7 @@ class _Run:
         self._faults.add_source(monotonic.runtime_faults)
         return monotonic
 
-    def watch(self, frames: Iterable[Frame], progress: Progress | None) -> Iterator[Step]:
+    def watch(self, frames: Iterable[Frame], progress: RunProgress | None) -> Iterator[Step]:
         """Step through frames until they end or the user stops."""
         count = self.source.frame_count
         total = None if count is None else -(-count // self.source.every)
@@ -280,7 +290,8 @@ class _Run:
                         self._agent, step, lambda: recorder_state(self._recorder)
                     )
                 if progress:
-                    progress(self._steps, total)
+                    lag = self._pace.lag(step.time) if self._pace else None
+                    progress(self._steps, total, lag)
                 yield step
         except KeyboardInterrupt:
             self._stopped = True

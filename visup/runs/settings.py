@@ -170,9 +170,14 @@ class WatchSettings:
     detections: Annotated[
         Path | None,
         Option(
-            "Boxes of a detector (MOT or COCO file), in place of visup's own eyes.", metavar="FILE"
+            "Boxes of a detector in place of visup's own eyes: a MOT or COCO file, or a YOLO network "
+            "(.onnx).",
+            metavar="FILE",
         ),
     ] = None
+    motion: Annotated[
+        bool, Option("See what moves; without it a behaviour of yours gives the regions.")
+    ] = True
     preset: Annotated[
         str | None,
         Option(
@@ -190,6 +195,11 @@ class WatchSettings:
             raise SettingsError(f"--every is {self.every}", expected="1 or more")
         if self.fps is not None and not 0 < self.fps <= 1000:
             raise SettingsError(f"--fps is {self.fps}", expected="more than 0, at most 1000")
+        if not (self.motion or self.behaviours or self.plugins or self.detections):
+            raise SettingsError(
+                "nothing would see: --no-motion leaves seeing to another behaviour, and there is none",
+                hint="add --behaviour FILE, --plugin NAME or --detections FILE",
+            )
         fov = self.fov_vertical_deg
         if fov is not None and not 0 < fov < 180:
             raise SettingsError(f"--fov is {fov}", expected="degrees between 0 and 180")

@@ -15,7 +15,12 @@ from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
-from visup.percepts.detections import DetectionsBehaviour, read_detections
+from visup.percepts.detections import (
+    DetectionsBehaviour,
+    DetectorBehaviour,
+    NetworkBehaviour,
+    read_detections,
+)
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
@@ -119,10 +124,12 @@ def build_agent(
     )
 
 
-def _boxes(settings: WatchSettings) -> DetectionsBehaviour | None:
-    """What sees in place of visup's own eyes, where a detector has."""
+def _boxes(settings: WatchSettings) -> DetectorBehaviour | None:
+    """What sees in place of visup's own eyes, where a detector does."""
     if settings.detections is None:
         return None
+    if settings.detections.suffix.lower() == ".onnx":
+        return NetworkBehaviour(settings.detections)
     return DetectionsBehaviour(read_detections(settings.detections))
 
 
@@ -211,7 +218,7 @@ def _limits(settings: WatchSettings, live: bool) -> Limits:
 def _behaviours(
     settings: WatchSettings,
     database: ModelDatabase | None,
-    boxes: DetectionsBehaviour | None,
+    boxes: DetectorBehaviour | None,
     sizes_m: Mapping[str, float],
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
@@ -221,6 +228,8 @@ def _behaviours(
         moving = PlacedBehaviour(places, taught)
     if boxes:
         return [HealthBehaviour(), boxes, *user_behaviours(settings)]
+    if not settings.motion:
+        return [HealthBehaviour(), *user_behaviours(settings)]
     seeing: list[Behaviour] = [HealthBehaviour(), moving]
     if database is not None:
         seeing += [

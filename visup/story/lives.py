@@ -10,7 +10,7 @@ from visup.agent import Frame, Mind, ObjectBelief, Presence
 from visup.agent.model.step import Step
 from visup.percepts.colour import palette
 from visup.rules.geometry.outlines import outline_gap
-from visup.rules.wording.sentences import believed_name
+from visup.rules.wording.sentences import spoken_name
 from visup.story.colour_words import colour_word
 from visup.story.places import Box, place_of, sides_of
 
@@ -173,7 +173,7 @@ class LifeLog:
             life = ObjectLife(belief.id, size, since, self._now, box, box, from_start=start)
             self.alive[belief.id] = life
         life.until, life.last, life.left = self._now, box, False
-        life.name = believed_name(mind, belief.id)
+        life.name = spoken_name(mind, belief.id)
         life.area = max(life.area, belief.region.area)
         if frame is not None and belief.region.area > GROWN * self._looked.get(belief.id, 0.0):
             self._looked[belief.id] = belief.region.area

@@ -18,17 +18,20 @@ from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.model.step import Step
 from visup.report.annotate import annotate
-from visup.report.pictures import png, text_picture
+from visup.report.graphics import terminal_picture
+from visup.report.pictures import png
+from visup.report.spotlight import spotlight
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
 from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
 from visup.terminal.console import make_console
-from visup.terminal.narrator import event_row
+from visup.terminal.narrator import event_line, event_row
 from visup.terminal.session_commands import COMMANDS
 from visup.terminal.session_views import VIEWS, Refusal, number_in, refusal, usage
 from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
 from visup.wording import prose, worded_once
 
 Answer = RenderableType | None
+PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 
 
 class Session:
@@ -93,7 +96,7 @@ class Session:
             answer = self.execute(command)
             refused |= isinstance(answer, Refusal)
             if answer is not None:
-                self.console.print(answer)
+                self.console.print(answer, soft_wrap=not self.console.is_terminal)
         return 2 if refused else 0
 
     def execute(self, command: str) -> Answer:
@@ -146,7 +149,10 @@ class Session:
 
     def _tell(self, step: Step) -> None:
         for event in worded_once(step.events):
-            self.console.print(event_row(event))
+            if self.console.is_terminal:
+                self.console.print(event_row(event))
+            else:  # a pipe has no width
+                self.console.print(Text(event_line(event)), soft_wrap=True)
 
     def _place(self, stopped: StepResult | None = None) -> RenderableType:
         """Where the session is: why it stopped, what is watched, frame and time."""
@@ -201,17 +207,42 @@ class Session:
         return Text(f"step {self.stepper.at} is '{words[0]}'", style="dim")
 
     def _show(self, words: Sequence[str]) -> Answer:
-        mind = self.stepper.mind
-        if mind.frame_index < 0:
+        if self.stepper.mind.frame_index < 0:
             return refusal("no step was taken yet")
         if self._picture is None:
             return refusal(
                 "the frames of this source cannot be had again, so that none can be shown"
             )
+        if words and words[0] == "why":
+            return self._show_why(self._picture, words[1:])
+        mind = self.stepper.mind
         image = annotate(self._picture(mind.frame_index), mind)
-        if self.console.is_terminal and not words:
-            return text_picture(image, self.console.width)
-        path = Path(words[0] if words else f"frame-{mind.frame_index:05d}.png")
+        return self._shown(image, mind.frame_index, words[0] if words else None)
+
+    def _show_why(
+        self, picture: Callable[[int], NDArray[np.uint8]], words: Sequence[str]
+    ) -> Answer:
+        """The frame that an answer rests on, with the regions that it rests on."""
+        file = words[-1] if words and words[-1].endswith(PICTURES) else None
+        asked = list(words[:-1] if file else words)
+        if not asked:
+            return refusal("show why WHAT, such as: show why alert 1")
+        negated, ask = asked[0] == "not", " ".join(asked)
+        why = (
+            self.stepper.why_not(ask.removeprefix("not").strip())
+            if negated
+            else self.stepper.why(ask)
+        )
+        frame, regions = why.regions
+        if frame is None:
+            return refusal("the answer rests on no region of a frame: nothing can be marked")
+        return self._shown(spotlight(picture(frame), regions), frame, file)
+
+    def _shown(self, image: NDArray[np.uint8], frame: int, file: str | None) -> Answer:
+        """A picture on a terminal, or in a file."""
+        if self.console.is_terminal and file is None:
+            return terminal_picture(image, self.console.width)
+        path = Path(file or f"frame-{frame:05d}.png")
         try:
             path.write_bytes(png(image))
         except OSError as fault:
@@ -251,8 +282,6 @@ class Session:
             return refusal(usage("unwatch"))
         self.stepper.unwatch(number)
         return self._watch(())
-
-    # Why
 
     # What if
 

@@ -116,10 +116,12 @@ _COMMANDS = (
     Command("leave", "back to the timeline that this branch left"),
     Command("mind", "all that is believed, in short"),
     Command(
-        "show [FILE]",
+        "show [why [not] WHAT] [FILE]",
         "the frame with what is believed drawn over it",
-        "On a terminal it is drawn in characters; with FILE, or from a pipe, it is\n"
-        "written as a picture.",
+        "'show why WHAT' lights the regions that the answer to 'why WHAT' rests on,\n"
+        "in the frame that it speaks of. A terminal that can show pictures (kitty,\n"
+        "sixel) shows them, others draw them in characters; with FILE, or from a\n"
+        "pipe, the picture is written.",
     ),
     Command("percepts", "what was perceived in this step, by behaviour"),
     Command("regions", "what moved in the last frame"),

@@ -46,14 +46,13 @@ def test_mot_counts_frames_from_one_and_coco_by_the_order_of_its_images(tmp_path
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ("1,-1,10,20,30,40,1", "without a track"),
+        ("1,-1,10,20,30,40,1\n2,3,10,20,30,40,1", "some boxes have the number of a track"),
         ("0,1,10,20,30,40,1", "no frame -1"),
         ("1,1,10,20,0,40,1", "a box of 0 x 40 pixels"),
         ("1,1,10", "line 1 has 3 values"),
         ("a,b,c,d,e,f", "could not convert"),
         ("{", "cannot be used"),
         ({"annotations": []}, "no 'images'"),
-        ({**COCO, "annotations": [{"image_id": 7, "bbox": [1, 2, 3, 4]}]}, "no 'track_id'"),
         ({**COCO, "annotations": [{"image_id": 8, "bbox": [1, 2, 3, 4], "track_id": 1}]}, "no 8"),
     ],
 )
@@ -128,3 +127,35 @@ def test_names_of_a_detector_play_the_actors_of_a_task(tmp_path: Path) -> None:
     run = visup.watch(clip, task=task, detections=written(tmp_path, told), fps=10).finish()
     assert [e.text for e in run.events if "cup" in e.text]
     assert run.steps[-1].mind.tasks[0].bindings[0].object_id is not None
+
+
+def test_boxes_without_numbers_are_numbered_while_they_are_watched(tmp_path: Path) -> None:
+    lines = [f"{k + 1},-1,{2 + k},20,20,20,1\n{k + 1},-1,{62},40,20,20,1" for k in range(20)]
+    found = read_detections(written(tmp_path, "\n".join(lines)))
+    eyes = DetectionsBehaviour(found)
+    tracks = []
+    for k in range(20):
+        frame = Frame(k, k / 10.0, flat(100, frames=1)[0].frame.image)
+        seen = eyes.perceive(frame, Observation(k, k / 10.0, frame.size), ())
+        tracks.append([(p.value.id, p.value.bbox[0]) for p in seen])
+    assert tracks == [[(1, 2 + k), (2, 62)] for k in range(20)]
+
+
+PLUGIN = """
+from visup.percepts.detections import Detection, DetectorBehaviour
+
+
+class Cups(DetectorBehaviour):
+    def find(self, frame):
+        return [Detection(0, (2 + frame.index, 20, 20, 20), 1.0, "cup")]
+"""
+
+
+def test_a_detector_of_ten_lines_sees_in_place_of_visup(tmp_path: Path) -> None:
+    clip = write_clip(tmp_path / "clip.avi", moving_disc(20))
+    (tmp_path / "cups.py").write_text(PLUGIN)
+    run = visup.watch(clip, behaviours=[tmp_path / "cups.py"], motion=False).finish()
+    mind = run.steps[-1].mind
+    assert [(b.name, b.region.bbox) for b in mind.present()] == [("cup", (21, 20, 20, 20))]
+    with pytest.raises(SettingsError, match="nothing would see"):
+        visup.watch(clip, motion=False)

@@ -192,3 +192,16 @@ def test_a_recording_is_watched_whole_unless_asked(tmp_path: Path) -> None:
     with open_source(str(clip)) as source:
         assert not source.live
     assert supervise(WatchSettings(str(clip)), None).steps == 8
+
+
+@given(costs)
+def test_lag_is_how_long_ago_a_frame_was(work: list[int]) -> None:
+    clock = Clock()
+    paced = PacedRecording(
+        frames([k / 10 for k in range(400)]), "clip", clock=clock, wait=clock.pass_by
+    )
+    assert paced.lag(0.0) == 0.0
+    for cost in work:
+        frame = next(paced)
+        clock.pass_by(cost / 10)
+        assert paced.lag(frame.time) == pytest.approx(clock.now - 50.0 - frame.time)

@@ -112,7 +112,8 @@ def test_trend_touch_and_moving_together_are_those_of_arrays(seed: int, m: int) 
     rate, sigma = now.rate[i, j], now.rate_sigma[i, j]
     trend = twin.trends(rate, sigma, sway, state[0], pending[0], depth)
     touch = twin.touches(gap, now.depth, state[1])
-    trend = np.where((marks & 1 == 1) & (touch == 1) & (trend == 2), 1, trend)
+    meets = now.gap[i, j] <= bounds.touch[0]
+    trend = np.where((marks & 1 == 1) & meets & (trend == 2), 1, trend)
     merged = marks & 2 == 2
     assert (found[0] == np.where(merged, -1, trend)).all()
     assert (found[1] == np.where(merged, 1, touch)).all()

@@ -51,6 +51,17 @@ class Why:
         """All percepts that it rests on."""
         return tuple(w.percept for w in self.walk() if w.percept is not None)
 
+    @property
+    def regions(self) -> tuple[int | None, tuple[Region, ...]]:
+        """The latest frame of which it rests on regions, and these; None and none where there are none."""
+        found = [
+            (w.frame_index, w.percept.value)
+            for w in self.walk()
+            if w.percept is not None and isinstance(w.percept.value, Region)
+        ]
+        frame = max((n for n, _ in found if n is not None), default=None)
+        return frame, tuple(region for n, region in found if n == frame)
+
     def __str__(self) -> str:
         return "\n".join(self.lines())
 

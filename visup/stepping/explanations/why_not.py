@@ -29,6 +29,14 @@ from visup.rules.wording.conditions import Condition, DecisionLog
 from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import Why, explanation_tree
 
+STANDS = {
+    Status.ACTIVE: "nothing of it was seen yet",
+    Status.DONE: "is complete",
+    Status.FAILED: "has failed",
+    Status.UNKNOWN: "cannot be judged",
+}
+"""How a stage stands, where its status alone is no clause."""
+
 
 def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     """Why a rule is not true.
@@ -88,9 +96,9 @@ def stage_unmet(mind: Mind, stage: str) -> Why:
             if s.stage != stage:
                 continue
             if s.status is not Status.PENDING:
-                return Why(
-                    f"stage {stage} has begun: it is {s.status.value}. {s.evidence}".rstrip()
-                )
+                stands = STANDS.get(s.status, f"is {s.status.value}")
+                why = f": {s.evidence}" if s.evidence else ""
+                return Why(f"stage {stage} has begun, and {stands}{why}")
             return Why(f"stage {stage} is pending", tuple(_before_stage(mind, task, number)))
     known = ", ".join(s.stage for t in mind.tasks for s in t.stages) or "no task was given"
     raise SettingsError(f"there is no stage '{stage}'", expected=known)

@@ -1,0 +1,178 @@
+"""Networks of the YOLO family: a frame as they take it, and boxes from the arrays that they give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.detections.boxes import Detection
+
+GREY = 114
+"""What fills the picture up to the size of the network: the grey that these networks were trained with."""
+
+LEAST_SCORE, MOST_OVERLAP = 0.25, 0.45
+"""Boxes below the first are left out; of two of a class that overlap by more than the second, the lesser."""
+
+CHOSEN_COLUMNS = 6
+
+
+class Layout(Enum):
+    """What the columns of a candidate are."""
+
+    CLASSES = "middle and size, a score for each class"
+    ANYTHING = "middle and size, a score that there is anything, a score for each class"
+    CHOSEN = "corners, score, number of the class"
+
+
+@dataclass(frozen=True, slots=True)
+class Letterbox:
+    """How a picture was fitted into the square of a network.
+
+    Attributes:
+        scale: Pixels of the network for one of the picture.
+        left: Empty pixels at its left,
+        top: and at its top.
+    """
+
+    scale: float
+    left: int
+    top: int
+
+    def back(self, boxes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Corners (N, 4) x1, y1, x2, y2 in pixels of the picture."""
+        moved = boxes - np.array([self.left, self.top] * 2, np.float32)
+        return (moved / self.scale).astype(np.float32)
+
+
+def letterbox(
+    image: NDArray[np.uint8], size: tuple[int, int]
+) -> tuple[NDArray[np.float32], Letterbox]:
+    """A picture as these networks take it: fitted whole, the rest grey, RGB, 0 to 1.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        size: (width, height) that the network takes.
+
+    Returns:
+        (1, 3, height, width) float32, and how it was fitted.
+    """
+    import cv2
+
+    height, width = image.shape[:2]
+    scale = min(size[0] / width, size[1] / height)
+    fitted = round(width * scale), round(height * scale)
+    left, top = (size[0] - fitted[0]) // 2, (size[1] - fitted[1]) // 2
+    canvas = np.full((size[1], size[0], 3), GREY, np.uint8)
+    canvas[top : top + fitted[1], left : left + fitted[0]] = cv2.resize(image, fitted)
+    blob = canvas[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255.0
+    return np.ascontiguousarray(blob), Letterbox(scale, left, top)
+
+
+def decode_yolo(
+    output: NDArray[np.floating],
+    names: Sequence[str] = (),
+    fitted: Letterbox = Letterbox(1.0, 0, 0),  # frozen
+    *,
+    least_score: float = LEAST_SCORE,
+    most_overlap: float = MOST_OVERLAP,
+) -> tuple[Detection, ...]:
+    """Boxes from what a network gives for one picture.
+
+    The layouts that are known, with C classes and N candidates:
+
+    - (1, 4 + C, N): v8, v9, v11, v12: middle and size, then a score for each class.
+    - (1, N, 5 + C): v3, v5, v6, v7 and YOLOX with its grid decoded: a score that there is anything besides.
+    - (1, N, 6): v10, v26 and others that choose by themselves: corners, score, class.
+
+    Which it is, is told by the shape, and by the number of names where they are known; without names the
+    longer side is taken for the candidates, and rows for the older layout.
+
+    Args:
+        output: The array, with or without the leading 1.
+        names: Of the classes, where they are known.
+        fitted: How the picture was fitted into the network; as `letterbox` gives it.
+        least_score: Boxes below are left out.
+        most_overlap: Of two boxes of one class that overlap by more, the lesser is left out.
+
+    Returns:
+        The boxes without numbers, pixels of the picture, the surest first.
+
+    Raises:
+        ValueError: The array has a shape that no layout has.
+    """
+    rows, layout = _rows(np.asarray(output, np.float32), len(names))
+    if layout is Layout.CHOSEN:
+        corners, scores, classes = rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64)
+        keep = np.flatnonzero(scores >= least_score)
+        keep = keep[np.argsort(-scores[keep], kind="stable")]
+    else:
+        corners, scores, classes = _scored(rows, layout)
+        keep = _not_twice(corners, scores, classes, least_score, most_overlap)
+    corners = fitted.back(corners)
+    return tuple(_detection(corners[k], float(scores[k]), int(classes[k]), names) for k in keep)
+
+
+def _rows(output: NDArray[np.float32], classes: int) -> tuple[NDArray[np.float32], Layout]:
+    """Candidates as rows, and what their columns are."""
+    if output.ndim == 3 and output.shape[0] == 1:
+        output = output[0]
+    if output.ndim != 2 or (output.shape[1] < 5 and output.shape[0] < 5):
+        raise ValueError(f"an array of shape {output.shape} is no layout of YOLO's")
+    if _chosen(output):
+        return output, Layout.CHOSEN
+    known = {5 + classes: Layout.ANYTHING, 4 + classes: Layout.CLASSES} if classes else {}
+    if output.shape[1] in known:
+        return output, known[output.shape[1]]
+    if output.shape[0] in known:
+        return output.T, known[output.shape[0]]
+    if output.shape[0] < output.shape[1]:
+        return output.T, Layout.CLASSES
+    return output, Layout.ANYTHING
+
+
+def _chosen(output: NDArray[np.float32]) -> bool:
+    """Whether rows are corners, a score and the number of a class; scores alone are hardly ever whole."""
+    if output.shape[1] != CHOSEN_COLUMNS:
+        return False
+    ordered = (output[:, 2] >= output[:, 0]) & (output[:, 3] >= output[:, 1])
+    whole = output[:, 5] == np.round(output[:, 5])
+    return bool((ordered & whole).all())
+
+
+def _scored(
+    rows: NDArray[np.float32], layout: Layout
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
+    """Corners, scores and classes of candidates that are told by their middles."""
+    middle, half = rows[:, :2], rows[:, 2:4] / 2
+    corners = np.hstack([middle - half, middle + half]).astype(np.float32)
+    of_each = rows[:, 4:] if layout is Layout.CLASSES else rows[:, 5:] * rows[:, 4:5]
+    best = of_each.argmax(axis=1)
+    return corners, of_each[np.arange(len(rows)), best], best
+
+
+def _not_twice(
+    corners: NDArray[np.float32],
+    scores: NDArray[np.float32],
+    classes: NDArray[np.int64],
+    least: float,
+    most: float,
+) -> NDArray[np.int64]:
+    """Places of the candidates that are left, the surest first."""
+    import cv2
+
+    boxes = np.hstack([corners[:, :2], corners[:, 2:] - corners[:, :2]])
+    kept = cv2.dnn.NMSBoxesBatched(boxes.tolist(), scores.tolist(), classes.tolist(), least, most)
+    places = np.asarray(kept, np.int64).reshape(-1)
+    return places[np.argsort(-scores[places], kind="stable")]
+
+
+def _detection(
+    corners: NDArray[np.float32], score: float, number: int, names: Sequence[str]
+) -> Detection:
+    left, top, right, bottom = (float(v) for v in corners)
+    name = names[number] if 0 <= number < len(names) else f"class {number}"
+    return Detection(0, (left, top, right - left, bottom - top), min(1.0, score), name)

@@ -1,0 +1,90 @@
+"""Numbers of boxes: each thing keeps its own, whatever the order in which boxes come."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import random
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.percepts.detections.boxes import Box, Detection, overlap
+from visup.percepts.detections.numbering import PATIENCE_FRAMES, BoxNumbering
+
+BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.floats(5, 40))
+NAMES = st.sampled_from([None, "cup", "hand"])
+FRAMES = st.lists(st.lists(st.tuples(BOXES, NAMES), max_size=4), max_size=6)
+
+
+def found(boxes: list[tuple[Box, str | None]]) -> list[Detection]:
+    return [Detection(0, box, 1.0, name) for box, name in boxes]
+
+
+@given(FRAMES)
+def test_no_two_boxes_of_a_frame_share_a_number_and_a_number_keeps_its_name(
+    frames: list[list[tuple[Box, str | None]]],
+) -> None:
+    numbering = BoxNumbering()
+    names: dict[int, str | None] = {}
+    for index, boxes in enumerate(frames):
+        given_ = found(boxes)
+        numbered = numbering.number(index, given_)
+        assert [(d.box, d.name) for d in numbered] == boxes
+        tracks = [d.track for d in numbered]
+        assert len(set(tracks)) == len(tracks)
+        assert all(t >= 1 for t in tracks)
+        assert all(names.setdefault(d.track, d.name) == d.name for d in numbered)
+
+
+@given(FRAMES, st.randoms(use_true_random=False))
+def test_a_state_that_was_saved_goes_on_as_the_one_that_was_not(
+    frames: list[list[tuple[Box, str | None]]], chance: random.Random
+) -> None:
+    one, other = BoxNumbering(), BoxNumbering()
+    for index, boxes in enumerate(frames):
+        if chance.random() < 0.5:
+            state = json.loads(json.dumps(other.save()))
+            other = BoxNumbering()
+            other.load(state)
+        assert one.number(index, found(boxes)) == other.number(index, found(boxes))
+
+
+@given(st.lists(BOXES, min_size=1, max_size=4), st.lists(BOXES, min_size=1, max_size=4))
+def test_numbers_go_on_so_that_boxes_overlap_the_most_in_all(
+    before: list[Box], now: list[Box]
+) -> None:
+    numbering = BoxNumbering()
+    numbering.number(0, found([(b, None) for b in before]))
+    kept = numbering.number(1, found([(b, None) for b in now]))
+    # All that lie upon each other at all, whatever is thought too little afterwards.
+    best = max(
+        sum(overlap(before[i], now[j]) for i, j in enumerate(order) if j is not None)
+        for order in itertools.permutations([*range(len(now)), *[None] * len(before)], len(before))
+    )
+    got = sum(overlap(before[d.track - 1], d.box) for d in kept if 1 <= d.track <= len(before))
+    least = 0.2 * min(len(before), len(now))
+    assert best - least <= got + 1e-9 <= best + 2e-9
+
+
+def test_who_passes_behind_another_keeps_its_number_by_how_it_moves() -> None:
+    numbering = BoxNumbering()
+    for k in range(30):
+        boxes: list[tuple[Box, str | None]] = [((50.0, 20.0, 10.0, 20.0), None)]
+        if not 13 <= k <= 17:  # hidden for a moment
+            boxes.append(((4.0 * k - 10, 22.0, 12.0, 20.0), None))
+        numbered = numbering.number(k, found(boxes))
+        assert [d.track for d in numbered] == [1, 2][: len(boxes)]
+
+
+def test_who_was_away_for_long_is_somebody_new() -> None:
+    numbering = BoxNumbering()
+    box: list[tuple[Box, str | None]] = [((5.0, 5.0, 10.0, 10.0), "cup")]
+    assert numbering.number(0, found(box))[0].track == 1
+    assert numbering.number(PATIENCE_FRAMES + 1, found(box))[0].track == 1
+    assert numbering.number(2 * PATIENCE_FRAMES + 3, found(box))[0].track == 2
+
+
+def test_numbers_of_a_tracker_are_kept() -> None:
+    boxes = [Detection(7, (0.0, 0.0, 9.0, 9.0)), Detection(3, (1.0, 0.0, 9.0, 9.0))]
+    assert list(BoxNumbering().number(0, boxes)) == boxes

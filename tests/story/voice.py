@@ -1,0 +1,190 @@
+"""Laws of one voice: what is told of a run agrees with itself.
+
+Each law takes what was told, line by line, and gives back what breaks it. `python -m tests.story.voice RUN`
+reasons again about recorded runs and prints what breaks a law.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from visup.agent import Event, TaskBelief, Verdict
+from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
+from visup.runs.replay import replay, settings_for
+from visup.story import Narrative
+
+MENTION = re.compile(
+    r"[Oo]bject (\d+)(?:, taken for the [a-z0-9_ ]+)?,? "
+    r"(believed to be|in the part of|is|appears to be|may be) the ([a-z0-9_ ]+?)(?=[,.]| is\b)"
+)
+"""Id, how it is called so, and what."""
+SPAN = re.compile(r"(?:^|: )(the .+?) (?:has|have) been ([a-z ]+?) since ([\d.]+) s")
+ENDED = re.compile(r"(?:^|: )(the .+?) (?:was|were) ([a-z ]+?) until ([\d.]+) s")
+EXCLUDING = (
+    frozenset({"converging", "diverging"}),
+    frozenset({"converging", "touching"}),
+    frozenset({"converging", "coupled"}),
+    frozenset({"diverging", "coupled"}),
+)
+TOLERANCE_S = 0.11
+"""Times are told to a tenth of a second."""
+
+AWAY, BACK = ("exit",), ("entry", "reappearance", "found", "noticed")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a run told, and what it believed.
+
+    Attributes:
+        lines: Lines of the narrative, in order.
+        steps: All steps, without their percepts.
+    """
+
+    lines: Sequence[Event]
+    steps: Sequence[Step]
+
+
+Law = Callable[[Told], Iterator[str]]
+
+
+def a_name_changes_only_with_a_word(told: Told) -> Iterator[str]:
+    """Who is called otherwise than before is told to be so."""
+    names: dict[int, str] = {}
+    for line in told.lines:
+        for number, how, name in MENTION.findall(line.text):
+            before = names.get(int(number), name)
+            if name and how == "believed to be" and name != before:
+                yield f"{line.time:.2f} s: object {number} was the {before}: {line.text}"
+            if name:
+                names[int(number)] = name
+
+
+def times_that_are_told_exclude_each_other_rightly(told: Told) -> Iterator[str]:
+    """Of the same actors no two relations that exclude each other are told for the same time."""
+    spans: list[tuple[str, str, float, float, str]] = []
+    for line in told.lines:
+        for who, what, since in SPAN.findall(line.text):
+            spans.append((who, what, float(since), line.time, line.text))
+        for who, what, until in ENDED.findall(line.text):
+            spans.append((who, what, float(until) - 0.5, float(until), line.text))
+    for n, (who, what, since, until, text) in enumerate(spans):
+        if since > until + TOLERANCE_S:
+            yield f"{who} {what}: since {since} s, told at {until:.2f} s: {text}"
+        for other in spans[:n]:
+            overlap = min(until, other[3]) - max(since, other[2])
+            if other[0] == who and {what, other[1]} in EXCLUDING and overlap > TOLERANCE_S:
+                yield f"{other[4]} | {text}"
+
+
+def nothing_is_told_twice_at_once(told: Told) -> Iterator[str]:
+    """No sentence comes again within a second."""
+    last: dict[str, float] = {}
+    for line in told.lines:
+        if line.time - last.get(line.text, -10.0) < 1.0:
+            yield f"{line.time:.2f} s, twice: {line.text}"
+        last[line.text] = line.time
+
+
+def what_is_done_is_not_failing(told: Told) -> Iterator[str]:
+    """A stage that was told complete fails only once it was told to have begun again, or to be undone."""
+    done: set[object] = set()
+    for line in told.lines:
+        stage = line.data.get("task"), line.data.get("stage")
+        if line.kind == "stage_done":
+            done.add(stage)
+        elif line.kind in ("stage_started", "stage_revised"):
+            done.discard(stage)
+        elif line.kind in ("stage_failing", "stage_failed", "stage_progressing") and stage in done:
+            yield f"{line.time:.2f} s: {line.text}"
+
+
+def who_has_left_does_nothing(told: Told) -> Iterator[str]:
+    """Of who has left nothing is told but that it comes back."""
+    away: set[int] = set()
+    for line in told.lines:
+        if line.kind in BACK:
+            away -= set(line.objects)
+        if line.kind in ("relation", "coupled", "occlusion") and away & set(line.objects):
+            yield f"{line.time:.2f} s: {line.text}"
+        if line.kind in AWAY:
+            away |= set(line.objects)
+
+
+def prospects_agree_with_the_verdict(told: Told) -> Iterator[str]:
+    """What is over is not going to end otherwise, and shares of what comes next are shares of one whole."""
+    for step in told.steps:
+        for task in step.mind.tasks:
+            yield from (f"{step.time:.2f} s: {task.task}: {x}" for x in _prospects(task))
+
+
+def a_stage_fails_as_its_task_does(told: Told) -> Iterator[str]:
+    """A task that has succeeded has no stage that failed; one in progress none that has failed for good."""
+    for step in told.steps:
+        for task in step.mind.tasks:
+            bad = [s.stage for s in task.stages if s.status.value == "failed"]
+            if bad and task.verdict in (Verdict.SUCCEEDED, Verdict.IN_PROGRESS):
+                yield f"{step.time:.2f} s: {task.task} is {task.verdict}, {bad} failed"
+
+
+LAWS: tuple[Law, ...] = (
+    a_name_changes_only_with_a_word,
+    times_that_are_told_exclude_each_other_rightly,
+    nothing_is_told_twice_at_once,
+    what_is_done_is_not_failing,
+    who_has_left_does_nothing,
+    prospects_agree_with_the_verdict,
+    a_stage_fails_as_its_task_does,
+)
+
+
+def breaches(told: Told) -> list[str]:
+    """All that breaks a law, with the name of the law."""
+    return [f"{law.__name__}: {x}" for law in LAWS for x in law(told)]
+
+
+def told_of(steps: Iterable[Step]) -> Told:
+    """What the narrative tells of steps."""
+    narrative, lines, kept = Narrative(), [], []
+    for step in steps:
+        lines += narrative.lines(step, None)
+        kept.append(replace(step, frame=None))
+    return Told([*lines, *(narrative.rest(kept[-1]) if kept else [])], kept)
+
+
+def replayed(run: Path) -> Told:
+    """What is told of a recorded run when it is reasoned about again."""
+    recording, steps = Recording.open(run), list[Step]()
+    replay(recording, settings_for(recording), tell=steps.append)
+    return told_of(steps)
+
+
+def _prospects(task: TaskBelief) -> Iterator[str]:
+    total = sum(p.probability for p in task.prospects)
+    if total > 1.0 + 1e-6:
+        yield f"what comes next adds up to {total:.3f}"
+    if task.success is None:
+        return
+    if not -1e-9 <= task.success <= 1.0 + 1e-9:
+        yield f"ends well with {task.success}"
+    if task.verdict in (Verdict.FAILED, Verdict.INTERRUPTED) and task.success > 0.005:
+        yield f"is {task.verdict} and ends well with {task.success:.2f}"
+    if task.verdict is Verdict.SUCCEEDED and task.success < 0.5:
+        yield f"is {task.verdict} and ends well with {task.success:.2f}"
+
+
+if __name__ == "__main__":
+    for place in sys.argv[1:]:
+        try:
+            found = breaches(replayed(Path(place)))
+        except Exception as fault:
+            print(place, type(fault).__name__, fault)
+            continue
+        print(place, len(found))
+        for breach in found[:12]:
+            print("   ", breach)

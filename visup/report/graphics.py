@@ -1,0 +1,140 @@
+"""Pictures on terminals that can show them: kitty's protocol and sixels, else coloured characters.
+
+A terminal is not asked what it can, since its answer would stand among what is typed; it is known by what it
+sets in the environment. `VISUP_GRAPHICS=kitty|sixel|text` goes before that.
+"""
+
+from __future__ import annotations
+
+import os
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+from rich.console import RenderableType
+from rich.segment import ControlType, Segment, Segments
+
+from visup.report.pictures import png, text_picture
+
+Image = NDArray[np.uint8]
+COLOURS = 128
+"""Of a picture in sixels, of at most 256."""
+
+CHUNK = 4096
+"""So many characters of a picture kitty takes at once."""
+
+WIDEST_PX = 1000
+
+
+class Graphics(StrEnum):
+    """How pictures reach a terminal."""
+
+    KITTY = "kitty"
+    SIXEL = "sixel"
+    TEXT = "text"
+
+
+KITTY_PROGRAMS = ("kitty", "ghostty", "wezterm", "konsole")
+SIXEL_TERMINALS = ("foot", "mlterm", "yaft", "xterm-sixel", "contour")
+
+
+def graphics_of(environment: Mapping[str, str] = os.environ) -> Graphics:
+    """What a terminal can show, by what it sets in the environment.
+
+    >>> graphics_of({"TERM": "xterm-kitty"}), graphics_of({"TERM": "foot"}), graphics_of({"TERM": "xterm"})
+    (<Graphics.KITTY: 'kitty'>, <Graphics.SIXEL: 'sixel'>, <Graphics.TEXT: 'text'>)
+    """
+    wanted = environment.get("VISUP_GRAPHICS", "").lower()
+    if wanted in tuple(Graphics):
+        return Graphics(wanted)
+    term = environment.get("TERM", "").lower()
+    if term.startswith(("tmux", "screen")):
+        return Graphics.TEXT  # which pass on neither
+    program = environment.get("TERM_PROGRAM", "").lower()
+    if "KITTY_WINDOW_ID" in environment or any(p in (program, term[6:]) for p in KITTY_PROGRAMS):
+        return Graphics.KITTY
+    return Graphics.SIXEL if term.startswith(SIXEL_TERMINALS) else Graphics.TEXT
+
+
+def terminal_picture(
+    image: Image, columns: int = 80, graphics: Graphics | None = None
+) -> RenderableType:
+    """An image as a terminal can show it.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        columns: Width of a picture in characters.
+        graphics: How; None for what the environment says.
+    """
+    graphics = graphics or graphics_of()
+    if graphics is Graphics.TEXT:
+        return text_picture(image, columns)
+    small = _no_wider(image)
+    codes = kitty_codes(small) if graphics is Graphics.KITTY else sixel_codes(small)
+    # What rich takes for control is written as it is, and to terminals alone.
+    return Segments([Segment(codes, None, [(ControlType.BELL,)]), Segment.line()])
+
+
+def kitty_codes(image: Image) -> str:
+    """An image by the graphics protocol of kitty: a PNG file in pieces of base64.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+    """
+    data = b64encode(png(image)).decode()
+    pieces = [data[n : n + CHUNK] for n in range(0, len(data), CHUNK)]
+    told = (
+        f"\x1b_G{'a=T,f=100,' if n == 0 else ''}m={int(n < len(pieces) - 1)};{piece}\x1b\\"
+        for n, piece in enumerate(pieces)
+    )
+    return "".join(told)
+
+
+def sixel_codes(image: Image) -> str:
+    """An image in sixels: a palette, then bands of six rows, colour by colour (DEC VT340).
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+    """
+    picture = Pillow.fromarray(np.ascontiguousarray(image[:, :, ::-1])).quantize(COLOURS)
+    places = np.asarray(picture)
+    palette = np.asarray(picture.getpalette(), int).reshape(-1, 3)
+    height, width = places.shape
+    colours = "".join(
+        f"#{n};2;{r};{g};{b}" for n, (r, g, b) in enumerate((palette * 100 + 127) // 255)
+    )
+    bands = "-".join(_band(places[top : top + 6]) for top in range(0, height, 6))
+    return f'\x1bPq"1;1;{width};{height}{colours}{bands}\x1b\\'
+
+
+def _band(rows: NDArray[np.uint8]) -> str:
+    """Six rows: for each colour in them a line of characters whose bits are its pixels."""
+    bits = (1 << np.arange(len(rows)))[:, None]
+    lines = (
+        f"#{n}{''.join(_runs((((rows == n) * bits).sum(axis=0) + 63).tolist()))}"
+        for n in np.unique(rows).tolist()
+    )
+    return "$".join(lines)
+
+
+def _runs(codes: list[int]) -> Iterator[str]:
+    """Characters, four and more of the same as a count."""
+    begin = 0
+    for end in range(1, len(codes) + 1):
+        if end < len(codes) and codes[end] == codes[begin]:
+            continue
+        count, char = end - begin, chr(codes[begin])
+        yield f"!{count}{char}" if count > 3 else count * char
+        begin = end
+
+
+def _no_wider(image: Image) -> Image:
+    height, width = image.shape[:2]
+    if width <= WIDEST_PX:
+        return image
+    size = WIDEST_PX, round(height * WIDEST_PX / width)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
