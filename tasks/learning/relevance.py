@@ -19,7 +19,7 @@ LET_GO_S = 0.6
 """What is carried meets others no longer than so long after it was let go."""
 CLOSE_S = 2.0
 """An approach may end so long before its meeting; relations are judged with delays."""
-MUCH_LESS = 0.7
+MUCH_LESS = 0.9
 """Pairs whose meetings differ by less are told apart by who rests."""
 ENDED_S = 0.3
 """A meeting that ends so long before the run does has ended, and is not cut off."""
@@ -173,11 +173,11 @@ def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
     def moved(pair: Pair) -> float:
         return sum(run.moved_s.get(name, 0.0) for run in runs for name in pair)
 
-    def compared(p: Pair, q: Pair) -> float:
+    def compared(p: Pair, q: Pair) -> int:
         runs_more, long, other = len(seconds[p]) - len(seconds[q]), sum(seconds[p]), sum(seconds[q])
         if runs_more or min(long, other) < MUCH_LESS * max(long, other):
-            return runs_more or long - other
-        return moved(q) - moved(p) or (1 if p > q else -1)
+            return runs_more or (1 if long > other else -1)
+        return 1 if (moved(q), p) > (moved(p), q) else -1
 
     return sorted(seconds, key=cmp_to_key(compared))
 
