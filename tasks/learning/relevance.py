@@ -138,12 +138,18 @@ def _events(
         begin, end = spell
         lasts = end > run.end - ENDED_S
         approach = _approach(run, pair, meeting.touching[0], begin)
-        if approach is not None:
+        if approach is not None and not _held_elsewhere(meeting, begin, meetings):
             yield CourseEvent(approach, begin)
         yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
         if not lasts:
             parting = "decoupled" if action == "coupled" else "apart"
             yield CourseEvent(Happening((parting, pair), end, run.end), end)
+
+
+def _held_elsewhere(meeting: Meeting, at: float, meetings: Sequence[Meeting]) -> bool:
+    """Whether a third holds one of two when they meet: how it is carried there is no stage."""
+    others = (m.coupled for m in meetings if set(m.pair) & set(meeting.pair) and m is not meeting)
+    return any(spell is not None and spell[0] < at <= spell[1] + CLOSE_S for spell in others)
 
 
 def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happening | None:
