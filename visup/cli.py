@@ -25,6 +25,7 @@ from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
 from visup.terminal.console import complain, echo
+from visup.terminal.overview import Overview
 from visup.version import __version__
 
 BAD_INPUT = 2
@@ -40,6 +41,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 app = typer.Typer(
     name="visup",
+    cls=Overview,
     help="The visual supervisor: it watches machines work and says in plain words whether it goes well.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

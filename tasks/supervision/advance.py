@@ -13,8 +13,8 @@ from visup.tasks.automaton.derivatives import Leaf, TaskStep, leaves, with_leave
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import outcome
-from visup.tasks.supervision.step_model import StepModel
 from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last

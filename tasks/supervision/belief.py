@@ -127,27 +127,6 @@ def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
     return tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(model.task))
 
 
-def with_begun(
-    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...]
-) -> tuple[StageBelief, ...]:
-    """Stages, each with whether it has begun: whose turn has come waits until something of it is seen.
-
-    Args:
-        before: The stages as they were believed last, in the same order.
-        stages: As they are believed now.
-    """
-    first = all(s.status is Status.PENDING for s in before)
-    pairs = zip(before, stages, strict=True)
-    return tuple([replace(s, begun=True) if _begun(b, s, first) else s for b, s in pairs])
-
-
-def _begun(before: StageBelief, now: StageBelief, first: bool) -> bool:
-    if now.status is Status.PENDING:
-        return False
-    anew = before.status is Status.DONE and now.status is Status.ACTIVE
-    return first or (before.begun and not anew) or now.status not in (Status.ACTIVE, Status.UNKNOWN)
-
-
 def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
     """What is believed of a task that is probably not going on.
 

@@ -19,6 +19,7 @@ from visup.rules.wording.sentences import describe
 from visup.tasks.automaton.backpointers import Revision
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import stages_inside
+from visup.tasks.supervision.beginning import is_first
 from visup.tasks.supervision.sentences import stage_sentence, verdict_sentence
 from visup.tasks.supervision.task_inference import TaskActivity
 from visup.tasks.verification.step_monitor import BAD
@@ -50,7 +51,7 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
     if not changed and now.verdict is before.verdict:
         return
     mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
-    first = all(s.status is Status.PENDING for s in before.stages)
+    first = is_first(before.stages)
     for stage in changed:
         for kind in _kinds(was.get(stage.stage), stage):
             event = _stage_event(kind, stage, now, mind)
@@ -185,7 +186,7 @@ def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
 
 def _own_words(name: str, before: TaskBelief, task: Task) -> str:
     """What the task file itself says of a stage that begins, and of those that begin with it."""
-    begun = {s.stage for s in before.stages if s.status is not Status.PENDING}
+    begun = {s.stage for s in before.stages if s.begun}
     groups = [s for s in task.stages if s.text and s.name != name]
     inside = ((g, stages_inside(task, g.name)) for g in groups)
     texts = [g.text for g, names in inside if name in names and not names & begun]

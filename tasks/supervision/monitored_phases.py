@@ -27,8 +27,8 @@ from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.advance import Advance, Observe
 from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransitions
-from visup.tasks.supervision.step_model import StepModel
 from visup.tasks.verification.settings import TaskSettings
+from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment
 
 LEAST = 1e-13  # a hypothesis with less of the mass is given up

@@ -38,12 +38,12 @@ from visup.tasks.casting.matching import (
     unexplained,
 )
 from visup.tasks.grammar.nodes import Task
+from visup.tasks.supervision.beginning import is_first, stirring, with_begun
 from visup.tasks.supervision.belief import (
     failed_belief,
     pending_stages,
     suppressed,
     task_belief,
-    with_begun,
 )
 from visup.tasks.supervision.events import (
     activity_events,
@@ -249,7 +249,9 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     one = machines(model.task, bindings)
-    stages = with_begun(memory.belief.stages, belief.stages)
+    told = memory.belief.stages
+    stirs = is_first(told) and stirring(snapshot, posterior)
+    stages = with_begun(told, belief.stages, stirs=stirs)
     belief = replace(belief, stages=stages, unexplained=lasting, bystanders=let_be, machines=one)
     return TaskMemory(
         now,

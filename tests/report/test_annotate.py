@@ -116,7 +116,7 @@ def test_labels_tell_name_and_share() -> None:
     belief = mind_at(20).objects[1]
     mind = Mind()
     assert label_of(belief, mind) == f"1 spartan {belief.strength * 100:.0f} %"
-    assert label_of(replace(belief, candidates=()), mind) == "1 unknown"
+    assert label_of(replace(belief, candidates=()), mind) == "1"
     played = replace(mind, actors={"the_satellite": ("spartan",)})
     assert label_of(belief, played) == f"1 the satellite {belief.strength * 100:.0f} %"
 

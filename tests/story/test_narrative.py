@@ -54,7 +54,7 @@ def times(seconds: float) -> list[float]:
 def told(steps: Sequence[Step], detail: Detail = Detail.USUAL) -> list[Event]:
     narrative = Narrative(detail)
     lines = [e for s in steps for e in narrative.lines(s, None)]
-    return [*lines, *narrative.rest(steps[-1])]
+    return [*lines, *narrative.rest(steps[-1].time, 0)]
 
 
 def event(kind: str, now: float, *ids: int, severity: Severity = Severity.INFO) -> Event:
@@ -99,7 +99,9 @@ def test_who_comes_twice_is_named_once() -> None:
 def test_specks_and_glimpses_are_only_counted() -> None:
     steps = [step(t, *([crossing(2, 1.0, 1.4, t)] if t >= 1.0 else [])) for t in times(5)]
     narrative = Narrative()
-    assert [e for s in steps for e in narrative.lines(s, None)] + narrative.rest(steps[-1]) == []
+    assert [e for s in steps for e in narrative.lines(s, None)] + narrative.rest(
+        steps[-1].time, 0
+    ) == []
     assert next(iter(summary_lines(narrative.log))) == "Seen: 1 object."
 
 
@@ -171,7 +173,7 @@ def test_a_summary_names_the_busiest_pair_and_the_longest_stay() -> None:
         )
         narrative.lines(last, None)
     assert last is not None
-    narrative.rest(last)
+    narrative.rest(last.time, last.frame_index)
     assert list(summary_lines(narrative.log)) == [
         "Seen: 3 objects, at most 3 at a time.",
         "Longest in view: object 1, 8.0 s, last in the middle.",

@@ -154,7 +154,9 @@ def told_of(steps: Iterable[Step]) -> Told:
     for step in steps:
         lines += narrative.lines(step, None)
         kept.append(replace(step, frame=None))
-    return Told([*lines, *(narrative.rest(kept[-1]) if kept else [])], kept)
+    return Told(
+        [*lines, *(narrative.rest(kept[-1].time, kept[-1].frame_index) if kept else [])], kept
+    )
 
 
 def replayed(run: Path) -> Told:

@@ -79,7 +79,7 @@ def annotate(image: Image, mind: Mind) -> Image:
 def label_of(belief: ObjectBelief, mind: Mind) -> str:
     """What an object is called in a picture, as sentences call it, such as '2 satellite 87 %'."""
     if not belief.candidates:
-        return f"{belief.id} unknown"
+        return str(belief.id)
     name = spaced(called(mind, belief.name))
     return f"{belief.id} {name} {belief.strength:.0%}".replace("%", " %")
 
@@ -128,7 +128,9 @@ def _labels(
 ) -> None:
     """Name tags next to their objects, none over another."""
     placed: list[Box] = []
-    for belief in sorted(beliefs, key=lambda b: b.region.bbox[1]):
+    # Who is out of sight and has no name is nobody whom a reader would look for.
+    told = (b for b in beliefs if b.presence is not Presence.HIDDEN or b.candidates)
+    for belief in sorted(told, key=lambda b: b.region.bbox[1]):
         hidden = " (hidden)" if belief.presence is Presence.HIDDEN else ""
         room = image.shape[1] - 4 * scale.pad
         text = fitted(label_of(belief, mind) + hidden, scale.letters, room)

@@ -30,6 +30,7 @@ from visup.report.records import (
     Sample,
 )
 from visup.rules.wording.sentences import called
+from visup.story import Narrative
 from visup.tasks.tools.outline import Branch
 from visup.wording import worded_once
 
@@ -83,6 +84,7 @@ class Collector:
     _spans: SpanRecorder = field(init=False, repr=False)
     _pictures: Heaviest[KeyFrame] = field(init=False, repr=False)
     _events: list[Event] = field(default_factory=list, init=False, repr=False)
+    _narrative: Narrative = field(default_factory=Narrative, init=False, repr=False)
     _left_out: int = field(default=0, init=False, repr=False)
     _alerts: dict[int, Alert] = field(default_factory=dict, init=False, repr=False)
     _subjects: dict[int, ReportedObject] = field(default_factory=dict, init=False, repr=False)
@@ -115,10 +117,10 @@ class Collector:
         self._remember_alerts(step.alerts + mind.alerts)
         self._remember_matches(step)
         self._remember_tolls(step)
-        events = worded_once(step.events)
+        told, events = self._narrative.lines(step, frame), worded_once(step.events)
         room = max(0, self.limits.events - len(self._events))
-        self._events.extend(events[:room])
-        self._left_out += max(0, len(events) - room)
+        self._events.extend(told[:room])
+        self._left_out += max(0, len(told) - room)
         self._spans.note(step.time, state_of(mind))
         self._samples.offer(lambda: sample_of(mind))
         weight = weight_of(step.events) if self._frames > 1 else ENDS_WEIGHT
@@ -165,6 +167,7 @@ class Collector:
         """
         mind, frame = self._last or (Mind(), None)
         pictures = self._pictures.items()
+        rest = self._narrative.rest(mind.time, mind.frame_index)
         if frame is not None and frame.index != self._last_pictured:
             pictures += (self._picture(mind, frame, (), ENDS_WEIGHT),)
         return RunData(
@@ -174,7 +177,7 @@ class Collector:
             frames=self._frames,
             duration=mind.time,
             tasks=mind.tasks,
-            events=(*self._events, *events),
+            events=(*self._events, *rest, *events),
             events_left_out=self._left_out,
             alerts=tuple(a for _, a in sorted(self._alerts.items())),
             objects=tuple(s for _, s in sorted(self._subjects.items())),

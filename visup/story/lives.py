@@ -116,7 +116,6 @@ class LifeLog:
 
     Attributes:
         alive: Lives that are not over, by object id.
-        ended: How many lives are over.
         together: Pair of ids -> seconds in which both were near each other; the busiest ones.
         gaps: Pair of ids -> the least gap between their outlines, pixels.
         most_at_once: The most objects in view at one time.
@@ -124,14 +123,19 @@ class LifeLog:
     """
 
     alive: dict[int, ObjectLife] = field(default_factory=dict)
-    ended: int = 0
     together: dict[tuple[int, int], float] = field(default_factory=dict)
     gaps: dict[tuple[int, int], float] = field(default_factory=dict)
     most_at_once: int = 0
     longest: ObjectLife | None = None
+    _ids: set[int] = field(default_factory=set)
     _looked: dict[int, float] = field(default_factory=dict)
     _begun: float | None = None
     _now: float = 0.0
+
+    @property
+    def count(self) -> int:
+        """How many objects have lived; who came back is one."""
+        return len(self._ids)
 
     def add(self, step: Step, frame: Frame | None) -> list[ObjectLife]:
         """Take in one step.
@@ -211,6 +215,6 @@ class LifeLog:
     def _close(self, life: ObjectLife) -> None:
         del self.alive[life.id]
         self._looked.pop(life.id, None)
-        self.ended += 1
+        self._ids.add(life.id)
         if self.longest is None or life.seconds > self.longest.seconds:
             self.longest = life

@@ -86,18 +86,20 @@ class Narrative:
         self._waiting += [x for x in ended if _counts(x)]
         return [*told, *self._lives(step)]
 
-    def rest(self, step: Step) -> list[Event]:
+    def rest(self, time: float, frame_index: int) -> list[Event]:
         """What is left to be told when the run is over: the lives that wait, and those that go on.
 
         Args:
-            step: The last one.
+            time: Of the last step, seconds.
+            frame_index: Of its frame.
         """
         lives = [*self._waiting, *(x for x in self.log.finish() if _counts(x))]
         self._waiting = []
         if self.detail is Detail.ALL:
             return []
         groups = sorted(_by_course(lives), key=len, reverse=True)
-        return [_event(lives_sentence(g), g, step) for g in groups[: self.budget.at_once]]
+        told = groups[: self.budget.at_once]
+        return [_event(lives_sentence(g), g, time, frame_index) for g in told]
 
     def _worth_telling(self, event: Event, mind: Mind) -> bool:
         if event.kind not in ABOUT_OBJECTS and event.kind in EVENT_KINDS:
@@ -130,12 +132,12 @@ class Narrative:
         while self._waiting and self.budget.take(step.time):
             group = max(_by_course(self._waiting), key=lambda g: (len(g), max(x.area for x in g)))
             self._waiting = [x for x in self._waiting if x not in group]
-            yield _event(lives_sentence(group), group, step)
+            yield _event(lives_sentence(group), group, step.time, step.frame_index)
         for life in self.log.alive.values():
             long = step.time - life.since >= STAYS_S and life.name is None and _counts(life)
             if long and life.id not in self._staying and self.budget.take(step.time):
                 self._staying.add(life.id)
-                yield _event(stay_sentence(life), [life], step)
+                yield _event(stay_sentence(life), [life], step.time, step.frame_index)
 
 
 def _actors(mind: Mind) -> set[int | None]:
@@ -155,5 +157,5 @@ def _by_course(lives: Sequence[ObjectLife]) -> list[list[ObjectLife]]:
     return list(groups.values())
 
 
-def _event(text: str, lives: Sequence[ObjectLife], step: Step) -> Event:
-    return Event("life", step.time, step.frame_index, text, tuple(x.id for x in lives))
+def _event(text: str, lives: Sequence[ObjectLife], time: float, frame_index: int) -> Event:
+    return Event("life", time, frame_index, text, tuple(x.id for x in lives))

@@ -14,11 +14,11 @@ def summary_lines(log: LifeLog) -> Iterator[str]:
     Args:
         log: Of the run.
     """
-    if not log.ended:
+    if not log.count:
         yield "Seen: no object that moved."
         return
-    objects = "1 object" if log.ended == 1 else f"{log.ended} objects"
-    at_once = f", at most {log.most_at_once} at a time" if log.ended > 1 else ""
+    objects = "1 object" if log.count == 1 else f"{log.count} objects"
+    at_once = f", at most {log.most_at_once} at a time" if log.count > 1 else ""
     yield f"Seen: {objects}{at_once}."
     if log.longest is not None:
         yield (

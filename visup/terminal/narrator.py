@@ -60,7 +60,7 @@ class Narrator:
         """Print what is left to be told when the run is over, and how many objects there were."""
         if self.last is None or self.as_json:
             return
-        for event in self.narrative.rest(self.last):
+        for event in self.narrative.rest(self.last.time, self.last.frame_index):
             self.print_event(event)
         for text in summary_lines(self.narrative.log):
             self.console.print(text, soft_wrap=True, markup=False)

@@ -1,0 +1,58 @@
+"""Which stages have begun: a stage whose turn has come waits until something of it is seen."""
+
+from __future__ import annotations
+
+from visup.agent import StageBelief, Status
+from visup.agent.model.fast_replace import replace
+from visup.rules.formula.truth import YES
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.predicates.vocabulary import PREDICATES
+from visup.tasks.automaton.derivatives import leaves
+from visup.tasks.supervision.hypotheses import TaskHypotheses
+from visup.tasks.supervision.snapshot import TaskSnapshot
+
+
+def with_begun(
+    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], *, stirs: bool
+) -> tuple[StageBelief, ...]:
+    """Stages, each with whether it has begun.
+
+    Args:
+        before: The stages as they were believed last, in the same order.
+        stages: As they are believed now.
+        stirs: Whether one who plays in what is under way moves: with that a task begins.
+    """
+    stirs = stirs and is_first(before)
+    pairs = zip(before, stages, strict=True)
+    return tuple([replace(s, begun=True) if _begun(b, s, stirs) else s for b, s in pairs])
+
+
+def is_first(stages: tuple[StageBelief, ...]) -> bool:
+    """Whether no stage has begun."""
+    return not any(s.begun for s in stages)
+
+
+def _begun(before: StageBelief, now: StageBelief, stirs: bool) -> bool:
+    if now.status is Status.PENDING:
+        return False
+    anew = before.status is Status.DONE and now.status is Status.ACTIVE
+    return stirs or (before.begun and not anew) or now.status not in (Status.ACTIVE, Status.UNKNOWN)
+
+
+CAME_LATER_S = 0.3
+"""Who comes into view so long after others has come, or begun to move: either is a beginning."""
+
+
+def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
+    """Whether one who plays in the steps that are most likely under way moves, or has just come."""
+    if posterior is None or posterior.likeliest.finished is not None:
+        return False
+    actors = {a for leaf in leaves(posterior.likeliest.state) for a in leaf.step.actors}
+    ids, mind = snapshot.objects(tuple(actors)), snapshot.mind
+    came = [mind.objects[i].first_seen for i in ids if i in mind.objects]
+    start = min((b.first_seen for b in mind.objects.values()), default=0.0)
+    if came and max(came) - start > CAME_LATER_S:
+        return True
+    facts = Snapshot(mind)
+    moves = PREDICATES["moving"].look(facts)
+    return any(i in facts.row and moves[facts.row[i]] == YES for i in ids)

@@ -1,0 +1,48 @@
+"""What `visup --help` shows: the commands by what one wants, a short line each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from typer.core import TyperGroup
+
+PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "Watch": {
+            "watch": "watch a video and say whether the work goes well",
+            "demo": "the same with the shipped clip: a capture that fails",
+            "check": "say beforehand whether a run could come to anything",
+            "presets": "what --preset traffic, cell, orbit, bench choose",
+        },
+        "Prepare": {
+            "teach": "show things once, to have them known from then on",
+            "models": "build, extend, list and query model databases",
+            "task": "check, show, simulate and learn task files",
+            "rules": "check, list and explain safety rules",
+        },
+        "Look into a run": {
+            "step": "step through it, forth and back, and ask why",
+            "replay": "reason again, with other tasks or rules",
+            "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",
+        },
+        "Extend and measure": {
+            "behaviours": "list, check and begin plug-ins",
+            "render": "render a scene with masks and truth",
+            "eval": "compute figures against ground truth",
+            "debug": "pictures of the workings, for those who improve them",
+            "doctor": "what is installed, what is missing, how fast it is",
+        },
+    }
+)
+
+
+class Overview(TyperGroup):
+    """The top of the command line; its help shows commands by their purpose."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands."""
+        for purpose, commands in PURPOSES.items():
+            with formatter.section(purpose):
+                formatter.write_dl(list(commands.items()))
