@@ -115,7 +115,8 @@ def _held(
     """From or until when a step that is done was what it should be."""
     was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
     if not meaning.lasts and monitor.held_s > 0.0:
-        return f"{have} been {meaning.text} since {max(0.0, now - monitor.held_s):.1f} s"
+        since = max(0.0, now - monitor.held_s, monitor.helped_since or 0.0)
+        return f"{have} been {meaning.text} since {since:.1f} s"
     over = now if monitor.helped_at is None else monitor.helped_at
     if not meaning.lasts and monitor.broken_since is not None:
         over = monitor.broken_since
