@@ -150,7 +150,7 @@ def find_repair(
         A change after which all makes sense, else there is no syntax error left, else only later ones.
     """
     at, length = place_of(text, error)
-    trial = _Trial(text, at, length, error_of, is_sound)
+    trial = _RepairTrial(text, at, length, error_of, is_sound)
     usual = trial.best(_candidates(text, at, length))
     if usual is not None and trial.moved > MUCH_FURTHER:
         return usual
@@ -159,7 +159,7 @@ def find_repair(
 
 
 @dataclass
-class _Trial:
+class _RepairTrial:
     """Changes of a text that cannot be read, tried one by one.
 
     Attributes:

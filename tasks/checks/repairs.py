@@ -183,7 +183,7 @@ def with_tried_hints(
         faults: Its faults.
         check: The faults of a text.
     """
-    trial, found = _Trial(text, faults, check), []
+    trial, found = _HintTrial(text, faults, check), []
     for number, fault in enumerate(faults):
         hint = None
         if number < MOST_HINTS and trial.left > 0 and not trial.helps(fault):
@@ -197,7 +197,7 @@ NOTHING, IN_PART, WHOLLY = range(3)
 
 
 @dataclass
-class _Trial:
+class _HintTrial:
     """Changes of a text, tried while there is patience.
 
     Attributes:
