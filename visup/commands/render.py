@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from visup.terminal.console import make_console
+
+if TYPE_CHECKING:
+    from visup.render.scenario.scenario import Scenario
 
 SIZE_FORM = "WIDTHxHEIGHT, such as 320x240"
 
@@ -25,7 +28,8 @@ def render(
     random: Annotated[
         str | None,
         typer.Option(
-            metavar="KIND", help="In place of a scenario: a random world of a kind, such as pick."
+            metavar="KIND",
+            help="In place of a scenario: a random world of a kind, such as pick or orbit.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of a random world.")] = 0,
@@ -53,9 +57,13 @@ def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: s
 
     from rich.progress import Progress
 
+    from visup.render.orbits.random_orbit import ORBIT
     from visup.render.worlds.kinds.catalogue import random_world
     from visup.render.worlds.writer import write_world
 
+    if kind == ORBIT:
+        _render_orbit(seed, outcome, out, size)
+        return
     world = random_world(kind, seed, outcome)
     if size is not None:
         world = replace(world, size=parse_size(size))
@@ -66,15 +74,25 @@ def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: s
     make_console().print(told, highlight=False)
 
 
-def _render_scenario(scenario: str, out: Path, container: str, size: str | None) -> None:
-    from rich.progress import Progress
+def _render_orbit(seed: int, outcome: str | None, out: Path, size: str | None) -> None:
+    from visup.render.orbits.random_orbit import random_orbit
 
-    from visup.render.output.writer import write_mission
+    found = random_orbit(seed, outcome)
+    _write(found if size is None else found.resized(parse_size(size)), out, "mp4")
+
+
+def _render_scenario(scenario: str, out: Path, container: str, size: str | None) -> None:
     from visup.render.scenario.library import find_scenario
 
     found = find_scenario(scenario)
-    if size is not None:
-        found = found.resized(parse_size(size))
+    _write(found if size is None else found.resized(parse_size(size)), out, container)
+
+
+def _write(found: Scenario, out: Path, container: str) -> None:
+    from rich.progress import Progress
+
+    from visup.render.output.writer import write_mission
+
     with Progress(transient=True) as bar:
         task = bar.add_task("frames", total=found.frame_count)
         write_mission(

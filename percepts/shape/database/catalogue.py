@@ -64,6 +64,10 @@ class Views(Sequence[ModelView]):
     def __iter__(self) -> Iterator[ModelView]:
         return (self._view(k) for k in range(len(self)))
 
+    def name_of(self, number: int) -> str:
+        """Name of the model that a view is of, by the view's number in the file."""
+        return self.names[int(self.records[number]["model"])]
+
     def _view(self, number: int) -> ModelView:
         row = self.records[number]
         direction = None if np.isnan(row["direction"][0]) else _direction(row["direction"])

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from visup.percepts.shape.database.catalogue import Shapes, Views
 from visup.percepts.shape.index.view_index import ViewIndex, ViewSummaries
 from visup.percepts.shape.index.view_records import ModelView
+from visup.percepts.shape.matching.cut_outlines import compare_cut_outlines
 from visup.percepts.shape.matching.graph_matching import (
     GraphMatch,
     MatchWeights,
@@ -25,17 +26,25 @@ from visup.percepts.shape.matching.graph_matching import (
     match_nodes,
 )
 from visup.percepts.shape.matching.shape_similarity import (
-    GRAPH_SHARE,
+    AREA_POWER,
     Likeness,
+    OutlineAreaSimilarities,
     Shape,
     compare_outlines_and_areas,
 )
-from visup.percepts.shape.matching.truncated_views import CutIndex, CutLine, cut_outline, query_map
+from visup.percepts.shape.matching.truncated_views import CutIndex, CutLine, query_map
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
-from visup.percepts.shape.silhouette.area_overlap import AreaOverlaps
 
 CUT_SHARE = 0.95
 """What a likeness counts for which a whole view had to be cut: where to cut is free to fit."""
+
+CUT_SHARES = (0.05, 0.8, 0.15)
+"""Shares of graph, outline and area in that likeness: what a line takes away changes a skeleton most, and the
+area has had its say in where to cut."""
+
+CUT_BREADTH = 6
+"""Times as many views as of whole silhouettes whose outlines are compared: with the border to begin at, that
+is as quick, and a part looks like more things than a whole."""
 
 CUT_VIEWS = 1000
 """Whole views that are cut for one silhouette at most; of more, those whose areas lie best on it."""
@@ -128,9 +137,18 @@ class SearchLimits:
                 kept.append(m)
         return kept[: self.top]
 
-    def least(self, found: Sequence[ViewMatch]) -> float:
-        """What a further match must reach to change the result."""
-        return found[-1].similarity if len(found) >= self.top else self.threshold
+    def least(self, found: Sequence[ViewMatch], name: str) -> float:
+        """What a further match of a model must reach to change the result.
+
+        Args:
+            found: The best matches so far, best first.
+            name: Of the model.
+        """
+        least = found[-1].similarity if len(found) >= self.top else self.threshold
+        if self.per_name is None:
+            return least
+        own = [m.similarity for m in found if m.view.name == name]
+        return max(least, own[-1]) if len(own) >= self.per_name else least
 
 
 class ViewSearch:
@@ -176,16 +194,21 @@ class ViewSearch:
         """
         likely = self.index.candidates(query, among, wanted.most, favoured)
         shapes = [self._shapes[k] for k in likely.numbers]
-        looks = compare_outlines_and_areas(query, shapes, likely.overlaps, mirror=wanted.mirror)
-        ceilings = GRAPH_SHARE * likely.bounds + looks.worth
+        rigid = ~np.isnan(self._views.records["direction"][likely.numbers, 0])
+        looks = compare_outlines_and_areas(
+            query, shapes, likely.overlaps, mirror=wanted.mirror, rigid=rigid
+        )
+        share, worth = looks.shares[:, 0], looks.worth
+        ceilings = share * likely.bounds + worth
         found: list[ViewMatch] = []
         for n in np.argsort(-ceilings, kind="stable"):
-            if ceilings[n] < wanted.least(found):
-                break
             number = int(likely.numbers[n])
+            least = wanted.least(found, self._views.name_of(number))
+            if ceilings[n] < least:
+                continue
             graph, root = self._shapes[number].graph, self.index.weights.root
             ceiling = match_ceiling(query.graph, graph, likely.similar[n], root)
-            if GRAPH_SHARE * ceiling + looks.worth[n] < wanted.least(found):
+            if share[n] * ceiling + worth[n] < least:
                 continue
             likeness = looks.joined(int(n), self._match(query, number, likely.similar[n]))
             found = wanted.best([*found, ViewMatch(self._views[number], likeness)])
@@ -213,21 +236,38 @@ class ViewSearch:
         if len(among) > CUT_VIEWS:
             among = self.index.best_covered(query, among, CUT_VIEWS)
         own = query_map(query.contour, border)
-        likely = self._cut_index.likeliest(own, among, wanted.most, mirror=wanted.mirror)
-        left = [_left_of(self._shapes[number], cut) for number, cut in likely]
-        looks = compare_outlines_and_areas(query, left, _covered([c for _, c in likely], border))
+        breadth = CUT_BREADTH * wanted.most
+        likely = self._cut_index.likeliest(own, among, breadth, mirror=wanted.mirror)
+        looks = self._cut_looks(query.contour, border, likely)
+        worth = looks.worth
         found: list[ViewMatch] = []
-        for n in np.argsort(-looks.worth, kind="stable"):
-            if CUT_SHARE * (GRAPH_SHARE + float(looks.worth[n])) < wanted.least(found):
-                break
+        for n in np.argsort(-worth, kind="stable"):
             number, cut = likely[n]
-            graphs = self._part(
-                query, number, cut, wanted.least(found) / CUT_SHARE - looks.worth[n]
-            )
+            least = wanted.least(found, self._views.name_of(number))
+            if CUT_SHARE * (CUT_SHARES[0] + float(worth[n])) < least:
+                continue
+            graphs = self._part(query, number, cut, least / CUT_SHARE - worth[n])
             likeness = looks.joined(int(n), graphs)
             lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
             found = wanted.best([*found, ViewMatch(self._views[number], lowered, cut)])
         return Ranking(tuple(found), len(likely))
+
+    def _cut_looks(
+        self, contour: NDArray[np.floating], border: float, likely: Sequence[tuple[int, CutLine]]
+    ) -> OutlineAreaSimilarities:
+        """How a cut silhouette's outline and area are like those of views, each cut by its line."""
+        views = [self._shapes[number].contour for number, _ in likely]
+        lines = np.array([(c.bearing, c.offset, c.mirrored) for _, c in likely]).reshape(-1, 3)
+        mirrored = lines[:, 2] > 0
+        # The border tells the rotation.
+        turned = np.where(mirrored, border + lines[:, 0] - np.pi, border - lines[:, 0])
+        return OutlineAreaSimilarities(
+            compare_cut_outlines(contour, border, views, lines),
+            np.array([c.similarity for _, c in likely]) ** AREA_POWER,
+            mirrored,
+            np.angle(np.exp(1j * turned)),
+            np.broadcast_to(CUT_SHARES, (len(likely), 3)),
+        )
 
     def _part(self, query: Shape, number: int, cut: CutLine, least: float) -> GraphMatch:
         """The query's graph as a part of a view's, in the view's unit of length.
@@ -236,26 +276,9 @@ class ViewSearch:
         """
         graph = _scaled(query.graph, (1.0 - cut.share) ** 0.5)
         bounds, similar = self._part_index.bounds(graph, np.array([number]), part=True)
-        if GRAPH_SHARE * bounds[0] < least:
+        if CUT_SHARES[0] * bounds[0] < least:
             return GraphMatch(0.0, ())
         return match_nodes(graph, self._shapes[number].graph, similar[0], 0.0, part=True)
-
-
-def _left_of(whole: Shape, cut: CutLine) -> Shape:
-    """What a cut leaves of a shape; its graph stays that of the whole."""
-    return replace(whole, contour=cut_outline(whole.contour, cut), cut=True)
-
-
-def _covered(cuts: Sequence[CutLine], border: float) -> AreaOverlaps:
-    """How what cuts leave lies on the silhouette: the border tells the rotation."""
-    mirrored = np.array([c.mirrored for c in cuts], dtype=bool)
-    alike = np.array([c.similarity for c in cuts])
-    bearings = np.array([c.bearing for c in cuts])
-    straight = np.angle(np.exp(1j * (border - bearings)))
-    turned = np.angle(np.exp(1j * (border + bearings - np.pi)))
-    # A cut is found for one side only: the other counts nothing.
-    similarity = np.stack([np.where(mirrored, 0.0, alike), np.where(mirrored, alike, 0.0)], axis=1)
-    return AreaOverlaps(similarity, np.stack([straight, turned], axis=1))
 
 
 def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:

@@ -23,13 +23,17 @@ from visup.percepts.shape.silhouette.height_functions import outline_distances, 
 from visup.percepts.shape.silhouette.silhouette import Silhouette
 
 GRAPH_SHARE = 0.25
-"""Share of the similarity that the shock graph gives."""
+"""Share of the similarity that the shock graph gives when kinds of things are compared."""
 
 AREA_SHARE = 0.2
-"""Share that the areas give; the outlines give the rest."""
+"""Share that the areas give then."""
 
-OUTLINE_SHARE = 1.0 - GRAPH_SHARE - AREA_SHARE
-"""Share that the outlines give."""
+KIND_SHARES = (GRAPH_SHARE, 1.0 - GRAPH_SHARE - AREA_SHARE, AREA_SHARE)
+"""Shares of graph, outline and area when kinds of things are compared: their limbs bend, and differ."""
+
+RIGID_SHARES = (0.1, 0.4, 0.5)
+"""The same when a shape is compared with a rigid thing seen from a known direction: its area lies where it
+lay, which a rough outline hardly changes; outlines and skeletons suffer more."""
 
 AREA_POWER = 8
 """Overlaps of unlike shapes are high already; to this power they differ as the other terms do."""
@@ -95,21 +99,23 @@ class OutlineAreaSimilarities:
         of_areas: (B,) in [0, 1].
         mirrored: (B,) bool.
         rotation: (B,) radians, as in `Likeness`.
+        shares: (B, 3) what graph, outline and area give to the similarity.
     """
 
     of_outlines: NDArray[np.float64]
     of_areas: NDArray[np.float64]
     mirrored: NDArray[np.bool_]
     rotation: NDArray[np.float64]
+    shares: NDArray[np.float64]
 
     @property
     def worth(self) -> NDArray[np.float64]:
-        """(B,) what they give to the similarity, at most 1 - `GRAPH_SHARE`."""
-        return OUTLINE_SHARE * self.of_outlines + AREA_SHARE * self.of_areas
+        """(B,) what outlines and areas give to the similarity; the graph gives the rest."""
+        return self.shares[:, 1] * self.of_outlines + self.shares[:, 2] * self.of_areas
 
     def joined(self, number: int, graphs: GraphMatch) -> Likeness:
         """The likeness of one of the others, once its graph is matched."""
-        similarity = GRAPH_SHARE * graphs.similarity + float(self.worth[number])
+        similarity = float(self.shares[number, 0] * graphs.similarity + self.worth[number])
         # Features are of single precision: further digits mean nothing, and equal shapes give exactly 1.
         return Likeness(
             min(1.0, round(similarity, 5)),
@@ -128,7 +134,7 @@ def shape_of(silhouette: Silhouette) -> Shape:
     return Shape(silhouette.contour, graph, silhouette.areas, silhouette.cut, silhouette.border)
 
 
-def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True) -> Likeness:
+def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True, rigid: bool = False) -> Likeness:
     """Compare two shapes; the similarity is the same whichever comes first.
 
     Args:
@@ -136,6 +142,7 @@ def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True) -> Likeness:
         b: The second shape.
         mirror: Whether a shape is also like its mirror image; the shock graph by itself does not tell
             the two apart.
+        rigid: Whether one is a view of a rigid thing (`RIGID_SHARES`); else kinds are compared.
 
     Example:
         >>> from visup.percepts.shape.silhouette.silhouette import normalise
@@ -146,13 +153,17 @@ def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True) -> Likeness:
         (1.0, True)
     """
     overlaps = area_overlaps(a.areas, b.areas[None])
-    return compare_outlines_and_areas(a, [b], overlaps, mirror=mirror).joined(
-        0, match_graphs(a.graph, b.graph)
-    )
+    looks = compare_outlines_and_areas(a, [b], overlaps, mirror=mirror, rigid=np.array([rigid]))
+    return looks.joined(0, match_graphs(a.graph, b.graph))
 
 
 def compare_outlines_and_areas(
-    query: Shape, others: Sequence[Shape], overlaps: AreaOverlaps, *, mirror: bool = True
+    query: Shape,
+    others: Sequence[Shape],
+    overlaps: AreaOverlaps,
+    *,
+    mirror: bool = True,
+    rigid: NDArray[np.bool_] | None = None,
 ) -> OutlineAreaSimilarities:
     """Compare one shape's outline and area with many.
 
@@ -161,13 +172,16 @@ def compare_outlines_and_areas(
         others: B shapes.
         overlaps: How its area lies on theirs.
         mirror: Whether mirror images count.
+        rigid: (B,) which of the others are views of a rigid thing (`RIGID_SHARES`); none when None.
     """
     outlines, areas = _outline_similarities(query, others), overlaps.similarity**AREA_POWER
-    worth = OUTLINE_SHARE * outlines + AREA_SHARE * areas
+    is_rigid = np.zeros(len(others), dtype=bool) if rigid is None else rigid
+    shares = np.where(is_rigid[:, None], RIGID_SHARES, KIND_SHARES)
+    worth = shares[:, 1:2] * outlines + shares[:, 2:] * areas
     mirrored = (worth[:, 1] > worth[:, 0]) & mirror
     each, side = np.arange(len(others)), mirrored.astype(np.intp)
     return OutlineAreaSimilarities(
-        outlines[each, side], areas[each, side], mirrored, overlaps.rotation[each, side]
+        outlines[each, side], areas[each, side], mirrored, overlaps.rotation[each, side], shares
     )
 
 

@@ -137,6 +137,7 @@ def test_figures_of_plain_solids(tmp_path: Path) -> None:
     assert total["clean"]["top5"] == 1.0
     assert set(total["baseline"]) == {"zernike", "fourier"}
     assert total["ms_query"] > 0
+    assert total["clean"]["known_told"] > total["clean"]["stranger_told"]
     assert 0 < total["compared"] <= 1.0
     assert total["build_views_per_s"] > 0
     assert figures["items"]["ball"]["clean"]["angle_deg"] < 90

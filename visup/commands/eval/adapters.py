@@ -125,6 +125,24 @@ def random_closing(figures: Figures) -> Iterator[str]:
             yield f"{who}: {total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
 
+def random_orbits(progress: Progress, **settings: Any) -> Figures:
+    """Random missions in orbit."""
+    from visup.commands.render import needs_renderer
+    from visup.evaluation.missions.random_orbits import evaluate_orbits
+
+    needs_renderer()
+    return evaluate_orbits(progress=progress, **settings)
+
+
+def orbits_closing(figures: Figures) -> Iterator[str]:
+    """The missions whose verdict is wrong, and how many are right."""
+    for name, mission in figures["items"].items():
+        if not mission["verdicts_right"]:
+            yield f"{name}: {mission['verdict']}, not {mission['verdict_true']}"
+    total = figures["total"]
+    yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
+
+
 def reasoning(
     folder: Path, *, merge: bool, long: int, progress: Progress, **settings: int
 ) -> Figures:

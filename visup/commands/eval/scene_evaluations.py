@@ -77,6 +77,29 @@ SCENE_EVALUATIONS = (
         adapters.machines_closing,
     ),
     EvaluationCommand(
+        "orbits",
+        "Missions in orbit drawn from a seed: rendered, supervised, scored, thrown away.",
+        f"{_ADAPTERS}:random_orbits",
+        "supervising",
+        (
+            "identity",
+            "event_f1",
+            "stage",
+            "false_alerts",
+            "verdicts_right",
+            "view_deg",
+            "spin_error",
+        ),
+        (
+            count("count", 20, "How many missions."),
+            _SEED,
+            count("width", 480, "Of the image, pixels.", 64),
+            count("workers", None, "Processes; as many as there are cores by default."),
+            LIMIT,
+        ),
+        closing=adapters.orbits_closing,
+    ),
+    EvaluationCommand(
         "random",
         """Worlds drawn from a seed: rendered, taught, watched, scored like machines, thrown away.
 
@@ -197,6 +220,7 @@ SCENE_EVALUATIONS = (
         (),
         (
             count("views", 32, "Views of each mesh in the database."),
+            flag("machines", "Add thirteen machines that are made by code."),
             count("queries", 12, "Silhouettes asked for of each mesh."),
             count("seed", 0, "Of the queries.", 0),
             count("limit", None, "Meshes, for a quick look."),

@@ -64,13 +64,16 @@ def views_table(total: Mapping[str, Any]) -> Table:
 
     baseline = total["baseline"]
     table = Table(title="views", title_justify="left")
-    for heading in ("", "top1", "top5", "angle", *(f"{name} top1" for name in baseline)):
+    own = ("top1", "top5", "angle", "known told", "strangers told", "ms")
+    for heading in ("", *own, *(f"{name} top1" for name in baseline)):
         table.add_column(heading, justify="right" if heading else "left")
     for condition in CONDITIONS:
         row = total[condition]
         angle = "" if row["angle_deg"] is None else f"{row['angle_deg']:.1f}°"
         others = (f"{baseline[name][condition]:.3f}" for name in baseline)
-        table.add_row(condition, f"{row['top1']:.3f}", f"{row['top5']:.3f}", angle, *others)
+        told = (f"{row[key]:.3f}" for key in ("known_told", "stranger_told"))
+        best = (f"{row[key]:.3f}" for key in ("top1", "top5"))
+        table.add_row(condition, *best, angle, *told, f"{row['ms']:.1f}", *others)
     return table
 
 

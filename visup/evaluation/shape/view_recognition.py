@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,10 @@ from visup.evaluation.shape.view_queries import CONDITIONS, Query, draw_queries
 from visup.percepts.shape.building.database_builder import build_database
 from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
+from visup.rules.identity.votes import VoteSettings
+
+STRANGER = VoteSettings().stranger
+"""Similarity above which a name gets more votes than that the object is none of the models."""
 
 TOP = 5
 """Different objects that are looked at for `top5`."""
@@ -43,43 +47,62 @@ class _QueryResult:
     angle: float | None
     seconds: float
     compared: float
+    own: float
+    other: float
+
+
+class DrawnQueries(TypedDict, total=False):
+    """Silhouettes that are asked for.
+
+    Attributes:
+        queries: How many of each mesh; 12 unless told.
+        seed: Of their directions, rolls, sizes and damage; 0 unless told.
+    """
+
+    queries: int
+    seed: int
 
 
 def evaluate_views(
     folder: Path,
     *,
     views: int = 32,
-    queries: int = 12,
-    seed: int = 0,
     limit: int | None = None,
+    machines: bool = False,
     progress: Progress = silent,
+    **drawn: Unpack[DrawnQueries],
 ) -> dict[str, Any]:
     """Figures of recognising meshes from unseen directions.
 
     Args:
         folder: Folder of mesh files.
         views: Views of each mesh in the database.
-        queries: Silhouettes of each mesh that are asked for.
-        seed: Of the queries' directions, rolls, sizes and damage.
-        limit: Meshes, for a quick look; all by default.
+        limit: Meshes of the folder, for a quick look; all by default.
+        machines: Whether the machines that are made by code (`render/meshes/machines.py`) are added.
         progress: Shows what is being done.
+        drawn: What is asked for.
 
     Returns:
         {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
         and `top5` (shares of queries whose object is the first of all, or among the five best) and
-        `angle_deg` (median angle between the best view of the right object and the true direction);
-        `ms_query` from mask to ranking, `compared` as a share of all views, `build_views_per_s`; under
-        `baseline`, `top1` of other descriptors on the same views and queries.
+        `angle_deg` (median angle between the best view of the right object and the true direction),
+        `known_told` and `stranger_told` (shares of queries in which the right object, or without it in
+        the database the best other one, is as similar as counts for more than nothing known does) and
+        `ms` (median); `ms_query` from mask to ranking, the mean of the four conditions, `compared` as a
+        share of all views, `build_views_per_s`; under `baseline`, `top1` of other descriptors on the same
+        views and queries.
 
     Raises:
         SettingsError: There are no meshes, or a number is out of range.
         ExtraMissingError: What renders meshes, or the baselines, are not installed.
     """
+    queries, seed = drawn.get("queries", 12), drawn.get("seed", 0)
     if views < 1 or queries < 1:
         raise SettingsError("views and queries are counted from 1", expected="at least 1 of each")
     meshes = _listed(folder, limit)
     others = descriptors()
     with tempfile.TemporaryDirectory() as scratch:
+        meshes += _machines(Path(scratch)) if machines else []
         progress(f"views of {len(meshes)} meshes")
         begin = time.perf_counter()
         database = build_database(
@@ -104,6 +127,14 @@ def _listed(folder: Path, limit: int | None) -> list[Path]:
             expected=f"mesh files ({', '.join(MESHES)})",
         )
     return found
+
+
+def _machines(folder: Path) -> list[Path]:
+    """The machines that are made by code, as mesh files in a folder."""
+    from visup.render.meshes.machines import MACHINES
+    from visup.render.meshes.spacecraft import write_meshes
+
+    return write_meshes(MACHINES, folder)
 
 
 def _asked(
@@ -136,6 +167,8 @@ def _answers(
             _angle(own, query, alike),
             seconds,
             ranking.compared / len(database.views),
+            own[0].similarity if own else 0.0,
+            max((m.similarity for m in ranking.matches if m.view.name != query.name), default=0.0),
         )
 
 
@@ -154,8 +187,11 @@ def _figures(answers: Sequence[_QueryResult]) -> dict[str, Any]:
             "top1": float(np.mean([a.rank == 0 for a in own])),
             "top5": float(np.mean([a.rank is not None for a in own])),
             "angle_deg": float(np.median(angles)) if angles else None,
+            "known_told": float(np.mean([a.own >= STRANGER for a in own])),
+            "stranger_told": float(np.mean([a.other >= STRANGER for a in own])),
+            "ms": 1e3 * float(np.median([a.seconds for a in own])),
         }
-    figures["ms_query"] = 1e3 * float(np.median([a.seconds for a in answers]))
+    figures["ms_query"] = float(np.mean([figures[c]["ms"] for c in CONDITIONS]))
     figures["compared"] = float(np.mean([a.compared for a in answers]))
     return figures
 

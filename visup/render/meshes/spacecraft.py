@@ -5,12 +5,13 @@ Sizes are in metres. SPARTAN-201 measures 1.8 x 2.3 x 3.1 m and carries an instr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
 from visup.agent.model.errors import SettingsError
 from visup.render.meshes import distractors as things
+from visup.render.meshes.machines import MACHINES
 from visup.render.meshes.solids import GREY, Colour, Solid, ball, box, cone, from_trimesh, join
 
 WHITE: Colour = (0.80, 0.80, 0.78)
@@ -93,6 +94,7 @@ MESHES: dict[str, Callable[[], Solid]] = {
     "sill": sill,
     "slab": slab,
     **things.THINGS,
+    **MACHINES,
 }
 """Every mesh built in code that stands still in itself; the arm is in `arm.py`."""
 
@@ -118,6 +120,26 @@ def mesh(name: str) -> Solid:
             expected=f"arm, {', '.join(sorted(MESHES))}, or a mesh file",
         )
     return read_mesh(Path(name))
+
+
+def write_meshes(names: Iterable[str], folder: Path) -> list[Path]:
+    """Write meshes that are built in code as PLY files.
+
+    Args:
+        names: Of `MESHES`.
+        folder: Where; it must exist.
+
+    Returns:
+        The files, named as their meshes.
+    """
+    import trimesh
+
+    files = []
+    for name in names:
+        solid = mesh(name)
+        files.append(folder / f"{name}.ply")
+        trimesh.Trimesh(solid.vertices, solid.faces, process=False).export(files[-1])
+    return files
 
 
 def read_mesh(path: Path) -> Solid:

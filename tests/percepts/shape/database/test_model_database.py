@@ -76,7 +76,8 @@ def test_a_query_answers_the_same_as_trying_everything(stored: Path) -> None:
 
     database = ModelDatabase.open(stored)
     query = shape(limbs((0.5, 2.5, 4.1)))
-    expected = sorted((compare_shapes(query, s).similarity for s in database.shapes), reverse=True)
+    every = (compare_shapes(query, s, rigid=True).similarity for s in database.shapes)
+    expected = sorted(every, reverse=True)
     found = [m.similarity for m in database.query(query, top=3).matches]
     assert found == pytest.approx(expected[:3], abs=2e-5)
 

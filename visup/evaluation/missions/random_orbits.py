@@ -1,0 +1,147 @@
+"""`visup eval orbits`: missions in orbit are drawn from a seed, rendered, supervised, scored and thrown away.
+
+The models are all meshes made by code but those of `HIDDEN`: what comes by of these is nothing known, and
+is rightly named when it is told to be unknown. The arm is known by silhouettes from missions that are not
+scored.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.evaluation.figures import Progress, silent
+from visup.evaluation.missions.runner import evaluate_missions, mission_total
+
+SEEDS_APART = 10_000
+"""Seeds of missions that one seed of an evaluation has to itself."""
+
+SCENERY = ("sill", "slab", "payload_bay")
+"""Meshes that nobody looks for."""
+
+_ARM_SEEDS = range(9_000_000, 9_000_024)
+_ARM_EVERY = 25
+_ARM_EXEMPLARS = 32
+
+
+def evaluate_orbits(
+    *,
+    count: int = 20,
+    seed: int = 0,
+    width: int = 480,
+    limit: int | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Figures of `evaluate_missions` on random missions in orbit.
+
+    Args:
+        count: How many missions.
+        seed: Of all of them.
+        width: Of the image, pixels; it is three quarters as high.
+        limit: Frames of each mission, for a quick look.
+        workers: Processes that share the work; as many as there are cores when None.
+        progress: Shows what is being done.
+
+    Returns:
+        {"total": {...}, "items": {mission: {...}}}, the keys of `evaluate_missions` and the true verdict.
+
+    Raises:
+        ExtraMissingError: What renders is not installed.
+    """
+    seeds = [seed * SEEDS_APART + k for k in range(count)]
+    items: dict[str, dict[str, Any]] = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        progress("building a database")
+        models = orbit_models(Path(scratch))
+        for name, scores in _scored(seeds, models, (width, limit), workers):
+            items[name] = scores
+            progress(f"{len(items)} of {count} missions")
+    ordered = dict(sorted(items.items()))
+    return {"total": mission_total(list(ordered.values())), "items": ordered}
+
+
+def orbit_models(folder: Path, jobs: int = 1) -> Path:
+    """Build the database that random missions are supervised with.
+
+    Args:
+        folder: Where it is written, and what it is built from besides.
+        jobs: Processes.
+    """
+    from visup.percepts.shape.building.database_builder import build_database
+    from visup.render.meshes.spacecraft import MESHES, write_meshes
+    from visup.render.orbits.strangers import HIDDEN
+
+    files = write_meshes(sorted(set(MESHES) - {*HIDDEN, *SCENERY}), folder)
+    path = folder / "orbit.models"
+    build_database(path, files, {"arm": _arm_masks()}, clusters=_ARM_EXEMPLARS, jobs=jobs)
+    return path
+
+
+def _arm_masks() -> list[NDArray[np.bool_]]:
+    """Silhouettes of the arm in missions of other seeds, (H, W) bool each."""
+    from visup.render.imaging.renderer import Renderer
+    from visup.render.orbits.random_orbit import ARM, random_orbit
+
+    masks = []
+    for seed in _ARM_SEEDS:
+        renderer = Renderer(random_orbit(seed, "ok", (320, 240)))
+        every = range(0, renderer.scenario.frame_count, _ARM_EVERY)
+        masks += [renderer.mask(k) == ARM for k in every]
+    return masks
+
+
+def _scored(
+    seeds: Sequence[int], models: Path, how: tuple[int, int | None], workers: int | None
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Names and figures of missions as they come."""
+    many = min(workers or os.cpu_count() or 1, len(seeds))
+    if many <= 1:
+        yield from (score(seed, models, *how) for seed in seeds)
+        return
+    # Fresh processes: a fork would share the state of OpenCV's threads.
+    with ProcessPoolExecutor(many, get_context("spawn"), _alone) as pool:
+        waiting = [pool.submit(score, seed, models, *how) for seed in seeds]
+        for done in as_completed(waiting):
+            yield done.result()
+
+
+def _alone() -> None:
+    """One thread for each process: the processes share the cores already."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+def score(
+    seed: int, models: Path, width: int = 480, limit: int | None = None
+) -> tuple[str, dict[str, Any]]:
+    """Render one mission, supervise it, throw it away.
+
+    Args:
+        seed: Of the mission.
+        models: Model database.
+        width: Of the image, pixels.
+        limit: Frames that are watched; all when None.
+
+    Returns:
+        Its name, and what `evaluate_missions` says of it with `verdict_true`.
+    """
+    from visup.render.orbits.random_orbit import random_orbit
+    from visup.render.output.writer import write_mission
+
+    scenario = random_orbit(seed, size=(width, width * 3 // 4))
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / scenario.name
+        write_mission(scenario, folder)
+        figures = evaluate_missions(folder, models=models, limit=limit)
+    told: dict[str, Any] = figures["items"][scenario.name]
+    return scenario.name, told | {"verdict_true": scenario.truth.verdict}
