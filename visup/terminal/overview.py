@@ -31,6 +31,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "behaviours": "list, check and begin plug-ins",
             "render": "render a scene with masks and truth",
             "eval": "compute figures against ground truth",
+            "train": "learn from labelled sequences what moves by itself",
             "debug": "pictures of the workings, for those who improve them",
             "doctor": "what is installed, what is missing, how fast it is",
         },
