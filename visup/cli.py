@@ -14,6 +14,7 @@ from visup.commands.check import check
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
+from visup.commands.eval.train import app as train_app
 from visup.commands.export import export
 from visup.commands.models import app as models_app
 from visup.commands.presets import presets
@@ -63,6 +64,7 @@ app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
 app.add_typer(behaviours_app, name="behaviours", help="List, check and begin behaviours.")
 app.add_typer(eval_app(), name="eval", help="Compute figures against ground truth.")
+app.add_typer(train_app, name="train", help="Make the files of what was learnt from labelled data.")
 app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")
 
 

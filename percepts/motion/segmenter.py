@@ -16,6 +16,7 @@ import numpy as np
 
 from visup.agent import Directive, Frame, Region
 from visup.agent.contract.saving import saved_attributes
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.motion_constraints import (
     Constraints,
     Points,
@@ -26,6 +27,17 @@ from visup.percepts.motion.features.motion_constraints import (
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import Superpixels, superpixels
 from visup.percepts.motion.features.work_image import Floats, ImageHistory, WorkImage, prepare_image
+from visup.percepts.motion.foreground.following import (
+    TrackPosterior,
+    follow_foreground,
+    no_foreground,
+)
+from visup.percepts.motion.foreground.objects import Admission
+from visup.percepts.motion.foreground.perceptron import (
+    ForegroundModel,
+    read_model,
+    shipped_model,
+)
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 from visup.percepts.motion.layers.background_motion import (
@@ -46,9 +58,11 @@ from visup.percepts.motion.output.region_report import (
     apply_ignore,
     looked_at,
     motion_evidence,
+    report_objects,
     report_regions,
     select_regions,
 )
+from visup.percepts.motion.output.trace import SegmentationTrace
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.lifecycle import confirm, delete, initiate, update
@@ -57,12 +71,12 @@ from visup.percepts.motion.tracks.measurements import (
     FrameMeasurements,
     background_weights,
     claimable_cells,
+    min_region_area,
     point_likelihoods,
     predicted_positions,
 )
 from visup.percepts.motion.tracks.merge_split import assign_unknown, merge_tracks, split_occluded
 from visup.percepts.motion.tracks.salience import stationary_cells, update_salience
-from visup.percepts.motion.tracks.trace import SegmentationTrace
 from visup.percepts.motion.tracks.track import Tracks
 from visup.percepts.motion.tracks.track_fitting import fit_tracks
 from visup.percepts.motion.tracks.track_prediction import label_priors, predict_tracks
@@ -88,6 +102,7 @@ class MotionSegmenter:
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
+        self._model = _model(self.settings)
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -101,6 +116,7 @@ class MotionSegmenter:
         self._camera_fixed_until: float | None = None
         self._static = StaticCameraSegmenter()
         self._shadows = CastShadowFilter()
+        self._foreground = no_foreground()
         self._count = self._last_key = 0
 
     @property
@@ -110,7 +126,7 @@ class MotionSegmenter:
 
     def save(self) -> dict[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return saved_attributes(self, "settings", "trace", "_beside", "_engine")
+        return saved_attributes(self, "settings", "trace", "_beside", "_engine", "_model")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a segmenter of the same settings remembered."""
@@ -150,12 +166,37 @@ class MotionSegmenter:
         tracks = self._updated(tracks, scene, evidence, labelling)
         wanted = looked_at(directives, tracks, scene)
         tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, wanted)
-        self.trace = SegmentationTrace(scene, tracks, keys, labelling.posterior)
-        regions = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        self._follow_foreground(scene, TrackPosterior(tracks, keys, labelling.posterior))
+        regions = self._reported(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
         regions = self._shadows.step(frame, scene, regions, static=self._static.active)
         return select_regions(regions, directives)
+
+    def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
+        """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
+        if self._model is None:
+            self.trace = SegmentationTrace(scene, tracked.tracks, tracked.keys, tracked.posterior)
+            return
+        admission = Admission(min_region_area(scene, self.settings), self._ids)
+        old = self._history.back(1)
+        cues, self._foreground = follow_foreground(
+            self._foreground, self._model, scene, old, tracked, admission
+        )
+        known = self._foreground.objects
+        tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
+        share = self._foreground.belief.share
+        self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior, cues, share)
+
+    def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
+        """Regions of the objects of the foreground; of the tracks while the ground hardly moves."""
+        if self._model is not None and not (self._static.active or self._foreground.calm):
+            return report_objects(
+                self._foreground, tracks, scene, self._size, self.settings, self._beside
+            )
+        found = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        known = self._foreground.objects
+        return tuple(replace(r, id=known.id_of_track(r.id)) for r in found)
 
     def _begin(self, image: WorkImage) -> None:
         """Take in the first frame of a size: there is nothing to compare it with."""
@@ -222,12 +263,12 @@ class MotionSegmenter:
         first = self._track_one_frame(points, flow, old, image)
         cells, tracks, prior = carried.result()
         owner = prior.argmax(axis=1)
-        scene = FrameMeasurements(image, points, cells, owner, seconds, ())
+        scene = FrameMeasurements(image, points, cells, owner, seconds, flow, ())
         later = [self._begin_tracking(scene, tracks, lag) for lag in self._long_lags(image)]
         measured = [self._baseline(scene, first)]
         measured += [self._baseline(scene, c.result()) for c in later]
         return (
-            FrameMeasurements(image, points, cells, owner, seconds, tuple(measured)),
+            FrameMeasurements(image, points, cells, owner, seconds, flow, tuple(measured)),
             tracks,
             prior,
         )
@@ -304,3 +345,10 @@ class MotionSegmenter:
         nearest = min(fresh, key=lambda r: abs(np.log(r.span_s / span)))
         bend = None if nearest.bend is None else nearest.bend * span
         return Affine(nearest.matrix * span, bend=bend)
+
+
+def _model(settings: MotionSettings) -> ForegroundModel | None:
+    """What was learnt of moving foreground, where that is wanted."""
+    if settings.foreground is not None:
+        return read_model(settings.foreground)
+    return shipped_model() if settings.learnt else None

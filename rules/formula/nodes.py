@@ -17,6 +17,9 @@ from visup.rules.formula.terms import (
 )
 from visup.rules.formula.units import NOWHERE, Number, Span, Unit
 
+SIGNAL_WORDS = frozenset({"signal", "signal_on", "signal_is", "signal_known"})
+"""Words about signals, which are of no object: what they are given is no variable and no actor."""
+
 ZERO = Number(0.0, Unit.S)
 
 

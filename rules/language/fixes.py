@@ -52,9 +52,10 @@ def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None
     rest = "\n".join([where.text[where.column - 1 :], *text.split("\n")[where.line :]])
     if m := _IN_PLACE.search(hint):
         pattern = r"\s+".join(map(re.escape, m[2].split()))
+        pattern = rf"\b{pattern}\b" if m[2].isidentifier() else pattern
         if old := re.match(rf"\s*{pattern}", rest):
             return _replacing(where, old, m[1])
-        return _on_line(where, pattern, m[1])
+        return _on_line(where, pattern, m[1]) or _further(where, pattern, rest, m[1])
     if m := _PUT.search(hint):
         spaced = m[1] if m[1] in ",:)]" else f" {m[1]} "
         return TextFix(where.line, where.column, 0, spaced)
@@ -78,6 +79,12 @@ def _on_line(where: SourceLocation, pattern: str, new: str) -> TextFix | None:
         return None
     nearest = min(found, key=lambda m: abs(m.start() - where.column + 1))
     return TextFix(where.line, nearest.start() + 1, nearest.end() - nearest.start(), new)
+
+
+def _further(where: SourceLocation, pattern: str, rest: str, new: str) -> TextFix | None:
+    """Something replaced that stands on a later line, such as the sentence of a rule."""
+    found = re.search(pattern, rest)
+    return None if found is None else _replacing(where, found, new)
 
 
 def _replacing(where: SourceLocation, old: re.Match[str], new: str) -> TextFix:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +13,7 @@ from visup.agent.model.errors import RuleError
 from visup.agent.storage.text_file import read_text_file
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.diagnostics import Diagnostic, raise_all
-from visup.rules.language.reading import Patience, read_repaired
+from visup.rules.language.reading import Patience, read_repaired, weight, with_tried_edits
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
 
@@ -47,7 +48,8 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
     patience = Patience()
     for block in _blocks(text):
         found = read_repaired(block, "start", file, RULES, patience)
-        errors += found.told(text)
+        told = found.told(text)
+        errors += with_tried_edits(block, told, partial(weight, patience=patience))
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)
     raise_all(sorted(errors, key=_position)[:MOST_FAULTS], RuleError)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
@@ -13,16 +13,18 @@ from lark import Lark, UnexpectedInput
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SourceLocation
 from visup.rules.language.diagnostics import Diagnostic, Source, either
+from visup.rules.language.edits import Repair, edits, hint_of
+from visup.rules.language.fixes import fix_of
 from visup.rules.language.repair import (
     MOST_REPAIRS,
-    Repair,
+    WORDS,
     end_before,
     find_repair,
     place_of,
 )
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
-from visup.rules.predicates.vocabulary import Vocabulary
+from visup.rules.predicates.vocabulary import RULES, Vocabulary
 
 _WANTED = {
     "LPAR": "'('",
@@ -197,6 +199,54 @@ def _before_repairs(at: int, repairs: Sequence[Repair]) -> int:
 def _line_of(text: str, at: int) -> tuple[int, int]:
     """Line and column of an offset, counted from 1."""
     return text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
+
+
+Weight = tuple[int, int]
+"""How bad a text is: 1 and how much of it is left unread, or 0 and how many faults of meaning it has."""
+
+
+def weight(text: str, patience: Patience) -> Weight:
+    """How bad the text of a rule is; of one that cannot be tried any more as bad as can be."""
+    patience.left -= len(text)
+    if patience.left < 0:
+        return 2, 0
+    fault = _syntax_fault(text, "start")
+    if fault is not None:
+        return 1, len(text) - place_of(text, fault)[0]
+    return 0, len(_semantic(text, "start", "", RULES)[1])
+
+
+def with_tried_edits(
+    block: str, faults: Sequence[Diagnostic], weigh: Callable[[str], Weight]
+) -> list[Diagnostic]:
+    """The faults of a rule; one whose hint is no change gets a small edit that helps, where one does.
+
+    Args:
+        block: The rule, its lines numbered as in the file.
+        faults: What is wrong with it.
+        weigh: How bad a text is.
+    """
+    before = weigh(block)
+    return [_with_edit(block, f, before, weigh) for f in faults]
+
+
+def _with_edit(
+    block: str, fault: Diagnostic, before: Weight, weigh: Callable[[str], Weight]
+) -> Diagnostic:
+    place = fault.place
+    own = fix_of(block, place, fault.hint)
+    if own is not None and weigh(own.applied(block)) <= before:
+        return fault
+    for repair in edits(place.text, place.column - 1, place.length, EDIT_WORDS):
+        hint = hint_of(place.text, repair)
+        fix = None if hint is None else fix_of(block, place, hint)
+        if fix is not None and weigh(fix.applied(block)) < before:
+            said = hint if fault.hint is None else f"{fault.hint}; {hint}"
+            return replace(fault, hint=said)
+    return fault
+
+
+EDIT_WORDS = (*RULES.quantities, *RULES.words, *WORDS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,42 +7,18 @@ is wrong in the same rule is told as well.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import inf
 
 from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.model.did_you_mean import closest
+from visup.rules.language.edits import Repair, edits
 
 MOST_REPAIRS = 12
-
-
-@dataclass(frozen=True, slots=True)
-class Repair:
-    """A change of a text.
-
-    Attributes:
-        begin: Offset of what is replaced.
-        end: Offset of its end; the same where something is put in.
-        new: What stands there instead.
-        old: What stood there.
-    """
-
-    begin: int
-    end: int
-    new: str
-    old: str = ""
-
-    def applied(self, text: str) -> str:
-        """The text with the change."""
-        return text[: self.begin] + self.new + text[self.end :]
-
-    def hint(self, text: str) -> str:
-        """What to do, in words."""
-        old, new = " ".join(text[self.begin : self.end].split()), " ".join(self.new.split())
-        if not old:
-            return f"put `{new}` here"
-        return f"write `{new}` in place of `{old}`" if new else f"leave `{old}` out"
+MUCH_FURTHER = 8
+"""Where a usual slip lets so many more characters be read, it is what was meant, whatever else is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +38,14 @@ def _slip(pattern: str, new: str | Callable[[re.Match[str]], str]) -> Slip:
     return Slip(re.compile(pattern), new)
 
 
+WORDS_OF_PAIRS = (
+    "touching",
+    "converging",
+    "diverging",
+    "coupled",
+    "moving_together",
+    "overlapping",
+)
 _CALL = r"\w+\([^()]*\)"
 _AMOUNT = r"-?[\d.]+ ?(?:px/s2|px/s|px|%|ms|min|s|h|deg/s|deg|/s)?"
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -80,13 +64,27 @@ SLIPS = (
     _slip(r"\b(?:milliseconds?|msecs?)\b", "ms"),
     _slip(r"\b(?:minutes?|mins|m)\b", "min"),
     _slip(r"\b(?:hours?|hrs?)\b", "h"),
-    _slip(r"\b(?:pixels?|pix)\b", "px"),
+    _slip(r"\b(?:pixels?|pix|met(?:er|re)s?|cm|mm)\b", "px"),
     _slip(r"\b(?:degrees?|°)\b", "deg"),
     _slip(r"\bpercent\b", "%"),
     _slip(rf"({_CALL})\s+between\s+({_AMOUNT})\s+and\s+({_AMOUNT})", r"\1 >= \2 and \1 <= \3"),
     _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})", r"\1 \2 \3 and \3 \4 \5"),
     _slip(r"\b(?:for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+ago\b", r"within \1 to \1 ago"),
     _slip(r"\b(?:for|within)\s+-\s*(\d)", r"for \1"),
+    _slip(rf"\b(for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s*,?\s+({_CALL})", r"\3 \1 \2"),
+    _slip(
+        r"\b([a-z])[ ]+(?:is[ ]+)?([a-z_]{3,})[ ]+(?:to[ ]+|with[ ]+)?([a-z])\b",
+        lambda m: f"{closest(m[2], WORDS_OF_PAIRS) or m[2]}({m[1]}, {m[3]})",
+    ),
+    _slip(r"\b(?:under|below)\b", "<"),
+    _slip(r"\b(?:over|above|exceeds)\b", ">"),
+    _slip(r"(\d),(\d)", r"\1.\2"),
+    _slip(r"\b(?:is\s+)?(?:less|smaller|lower|nearer|closer)\s+than\b|\bis\s+below\b", "<"),
+    _slip(r"\b(?:is\s+)?(?:more|greater|larger|higher)\s+than\b|\bis\s+above\b", ">"),
+    _slip(r"\b(?:is|equals)\b(?=\s*\d)", "=="),
+    _slip(rf"(\[{_AMOUNT})\s*(?:to|,|:|-)\s*({_AMOUNT}\])", r"\1 .. \2"),
+    _slip(rf"\bif\s+({_CALL})\s*,?\s*then\s+({_CALL})", r"\1 implies \2"),
+    _slip(r"\b([a-z_]{3,})[ ]+([a-z])\b(?!\s*[:(,])", r"\1(\2)"),
     _slip(r"\b(in\s+\d+\s+of\s+\d+)\b(?! *\w)", r"\1 samples"),
     _slip(r"\b(?:historically|globally)\b", "always"),
     _slip(r"\b(?:previously|prev|last)\b(?!\s*\()", "previous"),
@@ -152,22 +150,55 @@ def find_repair(
         A change after which all makes sense, else there is no syntax error left, else only later ones.
     """
     at, length = place_of(text, error)
-    further: Repair | None = None
-    readable: Repair | None = None
-    for repair in _candidates(text, at, length):
-        repair = replace(repair, old=text[repair.begin : repair.end])
-        if repair.old == repair.new:
-            continue
-        left = error_of(repair.applied(text))
-        if left is None:
-            if is_sound(repair.applied(text)):
-                return repair
-            readable = readable or repair
-            continue
-        moved = place_of(repair.applied(text), left)[0] - len(repair.new)
-        if further is None and moved > repair.end + 1 and moved > at + length:
-            further = repair
-    return readable or further
+    trial = _RepairTrial(text, at, length, error_of, is_sound)
+    usual = trial.best(_candidates(text, at, length))
+    if usual is not None and trial.moved > MUCH_FURTHER:
+        return usual
+    places = dict.fromkeys((at, max(0, end_before(text, at) - 1)))
+    return trial.best(r for place in places for r in _edited(text, place)) or usual
+
+
+@dataclass
+class _RepairTrial:
+    """Changes of a text that cannot be read, tried one by one.
+
+    Attributes:
+        text: It cannot be read.
+        at: Where it cannot.
+        length: How long that is.
+        error_of: Reads a text.
+        is_sound: Whether a text without syntax errors makes sense, too.
+        moved: By how many characters the last that was chosen lets the text be read further.
+    """
+
+    text: str
+    at: int
+    length: int
+    error_of: Parses
+    is_sound: Callable[[str], bool]
+    moved: float = 0.0
+
+    def best(self, repairs: Iterable[Repair]) -> Repair | None:
+        """The first that makes sense, else that can be read, else that can be read further."""
+        further: Repair | None = None
+        readable: Repair | None = None
+        for tried in repairs:
+            repair = replace(tried, old=self.text[tried.begin : tried.end])
+            if repair.old == repair.new:
+                continue
+            changed = repair.applied(self.text)
+            left = self.error_of(changed)
+            if left is None:
+                self.moved = inf
+                if self.is_sound(changed):
+                    return repair
+                readable = readable or repair
+                continue
+            moved = place_of(changed, left)[0] - len(repair.new)
+            if further is None and moved > repair.end + 1 and moved > self.at + self.length:
+                further, self.moved = repair, moved - self.at
+        self.moved = self.moved if readable is None else inf
+        return readable or further
 
 
 def place_of(text: str, error: UnexpectedInput) -> tuple[int, int]:
@@ -219,6 +250,16 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
     previous = _word_before(text, before)
     if previous:
         yield Repair(before - len(previous), before, "")
+
+
+def _edited(text: str, at: int) -> Iterator[Repair]:
+    """Small edits of the line that holds a place."""
+    begin, end = text.rfind("\n", 0, at) + 1, text.find("\n", at)
+    line = text[begin : end if end >= 0 else len(text)]
+    if line.lstrip().startswith("rule"):
+        return  # without its variables nothing else of a rule makes sense
+    for edit in edits(line, at - begin, 1, WORDS):
+        yield Repair(begin + edit.begin, begin + edit.end, edit.new)
 
 
 def _word_before(text: str, end: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.nodes import (
     ZERO,
     Comparison,
@@ -29,6 +29,7 @@ from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variabl
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.dimensions import check_constant, check_dimensions
 from visup.rules.language.transform import Fault
+from visup.rules.predicates.qualitative_words import ALLEN_RELATIONS, TPCC_RELATIONS
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import PERCEPT_KINDS, RULES, Vocabulary
 from visup.rules.wording.sentences import mentions
@@ -129,7 +130,9 @@ class TypeChecker:
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
                 what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
-                yield rule.span, what, _listed((*rule.variables, "is")), None
+                other = rule.variables[0] if rule.variables else None
+                hint = None if other is None else f"write `{{{other}}}` in place of `{{{word}}}`"
+                yield rule.span, what, _listed((*rule.variables, "is")), hint
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:
         together = variables_of(rule)
@@ -194,7 +197,7 @@ class _FormulaChecker:
         yield from found
         if name not in self.used and not found:
             what = f"the variable '{name}' of '{node.kind}' is not used"
-            yield node.span, what, None, "leave it out"
+            yield node.span, what, None, f"leave `{node.kind} {name}:` out"
         self.used.discard(name)
         self.scope = outer
 
@@ -239,16 +242,24 @@ class _FormulaChecker:
             "object": self.scope,
             "relation": RELATION_NAMES,
             "kind": (*PERCEPT_KINDS, word),
+            "allen": ALLEN_RELATIONS,
+            "tpcc": TPCC_RELATIONS,
         }.get(wanted, (word,))
         if word not in known:
             what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
-            yield call.span, what, _listed(known), did_you_mean(word, known)
+            near = closest(word, known) or next((k for k in known if k not in call.words), None)
+            hint = None if near is None else f"write `{near}` in place of `{word}`"
+            yield call.span, what, _listed(known), hint
         elif wanted != "object" and word in self.scope:
             what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
-            yield call.span, what, None, "rename the variable"
+            hint = (
+                f"write `{EXAMPLES[wanted]}` in place of `{word}`" if wanted in EXAMPLES else None
+            )
+            yield call.span, what, None, hint or "rename the variable"
 
 
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
+EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
 
 
 def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:

@@ -73,9 +73,11 @@ class Monitor:
         """
         then, before = self.state
         now = later(time, then)
-        after, found = list(before), list[Interval]()
+        after: list[Any] = [*before]
+        found: list[Interval] = []
+        take = found.append
         for run in self._runs:
-            found.append(run(found, before, after, now, values))
+            take(run(found, before, after, now, values))
         self.state = now, tuple(after)
         return found[self._at]
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from visup.agent import Mind
+from visup.rules.formula.nodes import SIGNAL_WORDS
 
 REMEMBERED = frozenset({"expected", "engaged", "unexpected", "actor", "named", "identified"})
 """Words about beliefs that outlive what they came from."""
@@ -19,6 +20,7 @@ _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
         **dict.fromkeys(REMEMBERED, frozenset()),
         "stale": frozenset(),  # it tells of this very thing
         "healthy": frozenset({"health"}),
+        **dict.fromkeys(SIGNAL_WORDS, frozenset({"signal"})),
         "depth_difference": frozenset({"region", "depth"}),
         "spin": frozenset({"region", "hypothesis"}),
     }

@@ -16,8 +16,10 @@ from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
+from visup.rules.predicates import signals as signal_words
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
+from visup.rules.predicates.qualitative_words import along, three_points
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
     SIGMAS,
@@ -55,7 +57,8 @@ class PredicateDefinition:
     """A word of the rule language that stands for something true, false or unknown.
 
     Attributes:
-        takes: What its arguments are: 'object', 'relation', 'kind', 'name' or 'zone'.
+        takes: What its arguments are: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
+            'word', 'allen' or 'tpcc' (relations of these calculi).
         look: Its meaning: codes of all objects, one dimension for each argument 'object', in their
             order; the other arguments come as words.
         meaning: One clause for people.
@@ -313,6 +316,24 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
             ("kind",), stale, "percepts of that kind could not be observed"
         ),
         "healthy": PredicateDefinition((), healthy, "the image is sound"),
+        **{
+            name: PredicateDefinition(
+                ("allen", *_TWO), along(axis), f"Allen's relation of boxes, {way}"
+            )
+            for name, axis, way in (("along_x", 0, "to the right"), ("along_y", 1, "downwards"))
+        },
+        "tpcc": PredicateDefinition(
+            ("tpcc", *_TWO, "object"), three_points, "where the third is, for one from a to b"
+        ),
+        "signal_on": PredicateDefinition(
+            ("signal",), signal_words.is_on, "the signal is true, or a number other than 0"
+        ),
+        "signal_is": PredicateDefinition(
+            ("signal", "word"), signal_words.is_word, "the signal is that word"
+        ),
+        "signal_known": PredicateDefinition(
+            ("signal",), signal_words.is_known, "the signal is known"
+        ),
     }
 )
 """Every relation and fact that a rule may name."""
@@ -355,6 +376,9 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
         ),
         "objects": QuantityDefinition(
             (), SHARE, image.number_of_objects, "how many are in sight", plain=True
+        ),
+        "signal": QuantityDefinition(
+            ("signal",), SHARE, signal_words.number, "a signal that is a number", plain=True
         ),
         "objects_named": QuantityDefinition(
             ("name",), SHARE, image.number_of_kind, "how many of a name are", plain=True

@@ -16,8 +16,8 @@ from types import MappingProxyType
 from visup.agent.model.errors import TaskError
 
 GROUP = "visup.actions"
-ALL_PERCEPTS = frozenset({"region", "hypothesis", "depth", "health"})
-"""Kinds of percept that visup's own behaviours give."""
+ALL_PERCEPTS = frozenset({"region", "hypothesis", "depth", "health", "signal"})
+"""Kinds of percept that visup's own behaviours give; signals where somebody tells them."""
 
 
 @dataclass(frozen=True, slots=True)

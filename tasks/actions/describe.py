@@ -6,6 +6,7 @@ from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.grammar.units import UNITS
 
 NAMES = {"object": ("a", "b", "c"), "zone": ("zone", "zone", "zone")}
+NAMES |= {"signal": ("battery", "battery", "battery"), "word": ("mode", "auto", "auto")}
 
 
 def written(meaning: ActionDefinition) -> str:

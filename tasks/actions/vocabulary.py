@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from visup.agent import Truth
+from visup.rules.formula.nodes import SIGNAL_WORDS
 from visup.rules.formula.truth import NEGATION, TRUTH_OF, truth_if
 from visup.rules.formula.units import Number
 from visup.rules.predicates.inputs_missing import inputs_missing
@@ -57,6 +58,7 @@ def rule_actions() -> Iterator[ActionDefinition]:
                 hold_s=0.5,
                 text=text,
                 takes=word.takes,
+                needs=_needs(name),
                 about=word.meaning,
             )
     for name, quantity in QUANTITIES.items():
@@ -68,12 +70,21 @@ def rule_actions() -> Iterator[ActionDefinition]:
                 hold_s=0.5,
                 takes=quantity.takes,
                 measures=MEASURES[quantity.dimension],
-                needs=DEPTHS if "depth" in name else frozenset({"region"}),
+                needs=_needs(name),
                 about=quantity.meaning,
             )
 
 
+def _needs(name: str) -> frozenset[str]:
+    """Kinds of percept without which a word or quantity is never observed."""
+    if name in SIGNAL_WORDS:
+        return frozenset({"signal"})
+    return DEPTHS if "depth" in name and name in QUANTITIES else frozenset({"region"})
+
+
 def _fits(name: str, takes: tuple[str, ...]) -> bool:
+    if name in SIGNAL_WORDS:
+        return True
     known = name not in OF_TASKS and name not in RESERVED
     return known and bool(takes) and takes[0] == "object" and set(takes) <= {"object", "zone"}
 
@@ -107,10 +118,14 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         text = actions[name].text
         if isinstance(fact, Comparison):
             amounts = [task.amount(a) for a in bounds_of(fact)]
-            measured = _measure(task, name, amounts[0])
+            measured = _measure(task, fact, amounts[0])
             looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
             said = " and ".join(map(str, amounts))
             text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
+            text = f"as `{fact}` says" if name in SIGNAL_WORDS else text
+        elif name in SIGNAL_WORDS:
+            looks[key] = _word(name, tuple(map(str, fact.words)))
+            text = f"as `{fact}` says"
         else:
             zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
@@ -145,12 +160,14 @@ def _facts(task: Task) -> Iterator[Fact]:
         yield from facts_of(invariant.condition)
 
 
-def _word(name: str) -> FactEvaluator:
+def _word(name: str, words: tuple[str, ...] = ()) -> FactEvaluator:
+    """Whether a word of rules holds; `words` are what it is given besides objects."""
+
     def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        return TRUTH_OF[int(PREDICATES[name].look(facts)[rows])]
+        return TRUTH_OF[int(PREDICATES[name].look(facts, *words)[rows])]
 
     return look
 
@@ -173,8 +190,10 @@ def _outside(within: FactEvaluator) -> FactEvaluator:
     return lambda facts, ids: NEGATION[within(facts, ids)]
 
 
-def _measure(task: Task, name: str, amount: Number) -> Measured:
+def _measure(task: Task, fact: Comparison, amount: Number) -> Measured:
     """How a quantity is measured: a gap in metres on the floor, all else as rules do."""
+    name = action_of(fact).name
+    words = tuple(map(str, action_of(fact).words)) if name in SIGNAL_WORDS else ()
     if name == "gap" and dimension(amount) == SIZE:
         distance = floor_distance(task.ground)
 
@@ -185,7 +204,7 @@ def _measure(task: Task, name: str, amount: Number) -> Measured:
         return on_floor
 
     def plain(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
-        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts, *words))
         return low, high
 
     return plain

@@ -9,8 +9,8 @@ from functools import cached_property
 from math import isinf
 
 from visup.agent.model.did_you_mean import did_you_mean
-from visup.rules.formula.nodes import Comparison
-from visup.rules.formula.units import Number, Span
+from visup.rules.formula.nodes import SIGNAL_WORDS, Comparison
+from visup.rules.formula.units import Number, Span, Unit
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
@@ -108,7 +108,9 @@ class NameCheck:
             wanted = meaning.measures if meaning else ""
             for amount in bounds_of(comparison):
                 on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
-                yield amount, SIZE if on_floor else wanted
+                of_signal = action_of(comparison).name in SIGNAL_WORDS
+                # A signal has the unit of whoever tells it, or none.
+                yield amount, SIZE if on_floor else ANY if of_signal else wanted
 
     def measured(self, amount: Amount) -> str:
         """What an amount, or its parameter, measures."""
@@ -138,6 +140,8 @@ class NameCheck:
 
     def amount(self, amount: Number, wanted: str) -> Iterator[Diagnostic]:
         """What is wrong with one amount that is not a parameter."""
+        if wanted == ANY and amount.unit == Unit.NONE:
+            return
         if amount.unit not in UNITS:
             meant = MEANT.get(amount.unit.casefold())
             hint = f"did you mean `{meant}`?" if meant else None
@@ -271,6 +275,7 @@ class NameCheck:
                 yield self.source.fault("E231", what, span, hint=hint)
 
 
+ANY = "any"
 MANY = 500  # so many names are not compared with one another
 WORDS = {
     "angular_speed": "speed of turning",

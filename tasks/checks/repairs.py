@@ -7,14 +7,18 @@ fewer mistakes after it.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from visup.agent.model.did_you_mean import closest
 from visup.rules.language.diagnostics import Diagnostic
+from visup.rules.language.edits import edits, hint_of
 from visup.rules.language.fixes import fix_of
+from visup.tasks.actions.actions import ACTIONS
+from visup.tasks.grammar.statement import RESERVED_WORDS
+from visup.tasks.grammar.units import UNITS
 
-CHARACTERS_TRIED = 30_000
+CHARACTERS_TRIED = 60_000
 """Of changes of one file: of a long file with many mistakes only the first have a tried hint."""
 MOST_HINTS = 12
 
@@ -49,6 +53,7 @@ SYNONYMS = {
     "leaving": "diverging", "retreating": "diverging", "contact": "touching", "visible": "present",
     "left": "gone", "away": "gone", "in": "inside", "separate": "apart", "moving_apart": "diverging",
 }  # fmt: skip
+WORDS = (*RESERVED_WORDS, *ACTIONS, "leftmost", "rightmost", "ignored")
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
              "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
 KEYWORD = r"(?:for|within|at|least|most|times?|begins|ends|fails|progresses|when|any|order|already|each|of)"
@@ -68,12 +73,14 @@ def _listed(word: str, stages: str) -> str:
 USUAL = (
     _usual("E101 E103 E119", rf"\b({KEYWORD})\b", lambda m: m[1].lower()),
     _usual("E101 E103 E119", rf"(?i)\b({KEYWORD})\b", lambda m: m[1].lower()),
+    _usual("E101 E219 E103", rf"\(\s*({NAME})\s*;\s*({NAME})\s*\)", r"(\1, \2)"),
+    _usual("E238", r"between\s+([\d.]+\s*\S+)\s+and\s+([\d.]+\s*\S+)", r"between \2 and \1"),
     _usual("E103", rf"\bnot\s+({NAME})(?=\s*\()", lambda m: OPPOSITES.get(m[1], m[1])),
     _usual("E103 E127", rf"\b(?:historically|always|once|eventually|globally|finally|next)\s+(?={CALL})", ""),
     _usual("E103", rf"\b({NAME})(?=\s+(?:{CALL}|<))", lambda m: closest(m[1], PREFIXES) or m[1]),
     _usual("E103", rf"^\s*({NAME})(?=\s*::=)", r"<\1>"),
     _usual("E103", rf"(?<![<\w])({NAME})(?![\w>(])", r"<\1>"),
-    _usual("E102", r"(?<=>)\s*(?::=|=|->|→|:|=>|:==|<-)\s*", " ::= "),
+    _usual("E102 E202", r"(?<=>)\s*(?:::\s*=|: :=|:=|=|->|→|::|:|=>|:==|<-)\s*", " ::= "),
     _usual("E101", rf"<({NAME})>\s*\(([^()]*)\)", r"<\1(\2)>"),
     _usual("E101 E134", r"\b(any\s+\d+\s+of)\s+((?:<[^>]*>\s*){2,})", lambda m: _listed(m[1], m[2])),
     _usual("E101", r"\b(any)\s+(one|two|three)\s+(?=of)", lambda m: f"any {NUMBERS[m[2]]} "),
@@ -101,6 +108,8 @@ USUAL = (
     _usual("E116", r"\b((?:for|within)\s+[\d.]+)\b(?!\s*\w)", r"\1 s"),
     _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 px"),
     _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 s"),
+    _usual("E116", r"\bsignal\(\s*(\w+)\s*,[^()]*\)", r"signal(\1)"),
+    _usual("E228 E223", rf"<\s*({NAME})\s*$", r"<\1>"),
     _usual("E116", r"(\d)(?!\s*[\w%.])", r"\1 px"),
     _usual("E115", r"\b(for|within)\s+-\s*([\d.]+)", r"\1 \2"),
     _usual("E218 E226", r"(\d)\s*m\b", r"\1 min"),
@@ -174,34 +183,64 @@ def with_tried_hints(
         faults: Its faults.
         check: The faults of a text.
     """
-    left, found = CHARACTERS_TRIED, []
+    trial, found = _HintTrial(text, faults, check), []
     for number, fault in enumerate(faults):
-        if number < MOST_HINTS and left > 0 and not _helps(text, fault, faults, check):
-            for hint in _hints(text, fault):
-                left -= len(text)
-                tried = replace(fault, hint=hint)
-                if left < 0 or _helps(text, tried, faults, check):
-                    fault = replace(fault, hint=_joined(fault.hint, hint)) if left >= 0 else fault
-                    break
-        found.append(fault)
+        hint = None
+        if number < MOST_HINTS and trial.left > 0 and not trial.helps(fault):
+            hint = trial.best(fault, _hints(text, fault)) or trial.best(fault, _edits(fault))
+        found.append(fault if hint is None else replace(fault, hint=_joined(fault.hint, hint)))
     return tuple(found)
+
+
+NOTHING, IN_PART, WHOLLY = range(3)
+"""How much a change helps: not, by what could not be read only, or by a fault and to no new one."""
+
+
+@dataclass
+class _HintTrial:
+    """Changes of a text, tried while there is patience.
+
+    Attributes:
+        text: The file.
+        faults: Its faults.
+        check: The faults of a text.
+        left: Characters that may still be read.
+    """
+
+    text: str
+    faults: Sequence[Diagnostic]
+    check: Check
+    left: int = CHARACTERS_TRIED
+
+    def best(self, fault: Diagnostic, hints: Iterable[str]) -> str | None:
+        """The first hint that helps wholly, else the first that helps in part."""
+        partly: str | None = None
+        for hint in hints:
+            self.left -= len(self.text)
+            if self.left < 0:
+                break
+            helps = self.helps(replace(fault, hint=hint))
+            if helps == WHOLLY:
+                return hint
+            partly = partly or (hint if helps else None)
+        return partly
+
+    def helps(self, fault: Diagnostic) -> int:
+        """How much the change helps that a hint speaks of."""
+        fix = fix_of(self.text, fault.place, fault.hint)
+        if fix is None:
+            return NOTHING
+        after = self.check(fix.applied(self.text))
+        known = {(f.code, f.message) for f in self.faults}
+        if len(after) < len(self.faults) and all((f.code, f.message) in known for f in after):
+            return WHOLLY
+        # What could not be read hid what comes to light now.
+        unread = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
+        return IN_PART if fault.code < "E2" and unread[0] < unread[1] else NOTHING
 
 
 def _joined(said: str | None, hint: str) -> str:
     return hint if said is None else f"{said}; {hint}"
-
-
-def _helps(text: str, fault: Diagnostic, faults: Sequence[Diagnostic], check: Check) -> bool:
-    """Whether the change that a hint speaks of leaves fewer faults."""
-    fix = fix_of(text, fault.place, fault.hint)
-    if fix is None:
-        return False
-    after = check(fix.applied(text))
-    if len(after) < len(faults):
-        return True
-    # What could not be read hid what comes to light now.
-    unread = [sum(f.code < "E2" for f in found) for found in (after, faults)]
-    return fault.code < "E2" and unread[0] < unread[1]
 
 
 def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
@@ -214,6 +253,31 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
             new = match.expand(usual.new) if isinstance(usual.new, str) else usual.new(match)
             if new != match[0]:
                 yield _hint(line, match, new, fault.place.column - 1)
+    yield from _as_expected(fault)
+
+
+def _as_expected(fault: Diagnostic) -> Iterator[str]:
+    """What is expected, where that is the same in other signs, or another unit."""
+    at = fault.place.column - 1
+    said = fault.place.text[at : at + fault.place.length].strip()
+    shown = re.findall(r"`([^`]+)`", fault.expected or "")
+    if len(shown) != 1 or not said:
+        return
+    amount = re.match(r"-?[\d.]+(?=\s*\S)", said)
+    if amount and shown[0] in UNITS:
+        yield f"write `{amount[0]} {shown[0]}` in place of `{said}`"
+    elif set(re.findall(r"\w+", shown[0])) == set(re.findall(r"\w+", said)):
+        yield f"write `{shown[0]}` in place of `{said}`"
+
+
+def _edits(fault: Diagnostic) -> Iterator[str]:
+    """Where nothing usual is meant: small edits next to the fault."""
+    place = fault.place
+    unread = fault.code < "E2"
+    for repair in edits(place.text, place.column - 1, place.length, WORDS, unread=unread):
+        hint = hint_of(place.text, repair)
+        if hint is not None:
+            yield hint
 
 
 def _away(match: re.Match[str], at: int) -> int:

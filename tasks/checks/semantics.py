@@ -215,6 +215,7 @@ class _Semantics:
         found: dict[str, Reference] = {}
         references = [c for _, c in self.courses if isinstance(c, Reference)]
         references += [r for i in self.parsed.task.invariants for r in i.during]
+        references += self.parsed.task.recovered
         for r in references:
             if r.stage not in known and not self.parsed.lacking:
                 found.setdefault(r.stage, r)

@@ -246,6 +246,7 @@ class Task:
         grounds: Where points of the image are on the floor; more than one is a mistake.
         file: Name of the file, for messages.
         root: The rule that is the task when the file has several; empty for its first one.
+        recovered: Stages of which the file says what may be done when they fail.
     """
 
     stages: tuple[Stage, ...]
@@ -258,6 +259,7 @@ class Task:
     root: str = ""
     grounds: tuple[Ground, ...] = ()
     bystanders: tuple[Actor, ...] = ()
+    recovered: tuple[Reference, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def ground(self) -> Ground | None:

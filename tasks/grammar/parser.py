@@ -12,7 +12,7 @@ from lark import Lark, Token, Transformer
 
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
-from visup.rules.formula.units import Span
+from visup.rules.formula.units import Span, Unit
 from visup.tasks.grammar.conditions import Condition, PartName, Range
 from visup.tasks.grammar.criteria import (
     Another,
@@ -130,6 +130,7 @@ def collect(statements: Several[object], file: str) -> Task:
         file=file,
         grounds=of(Ground),
         bystanders=tuple(a for a in of(Actor) if a.bystander),
+        recovered=tuple(r.stage for r in of(Recovery)),
     )
 
 
@@ -158,7 +159,7 @@ class _TaskBuilder(Transformer[Token, Any]):
     def stage(self, items: list[Any]) -> Stage:
         marked = items[0].type == "TASK"
         head, *rest = items[1:] if marked else items
-        text = _unquoted(rest[0]) if isinstance(rest[0], Token) else ""
+        text = str(rest[0])[1:-1] if isinstance(rest[0], Token) else ""
         return Stage(_bare(head), rest[-1], text, marked, _of(head))
 
     def actors(self, items: list[Token]) -> Actors:
@@ -241,7 +242,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Parameter(str(items[0]), items[1], _of(items[0]))
 
     def include(self, items: list[Token]) -> Include:
-        return Include(_unquoted(items[0]), _of(items[0]))
+        return Include(str(items[0])[1:-1], _of(items[0]))
 
     def invariant(self, items: list[Any]) -> Invariant:
         when = cast('Literal["never", "always"]', str(items[0]))
@@ -324,6 +325,11 @@ class _TaskBuilder(Transformer[Token, Any]):
         words = tuple(a if isinstance(a, Name) else Name(str(a), _of(a)) for a in actors)
         return Action(str(name), words, _of(name).to(_of(last)))
 
+    signal = action
+
+    def bare(self, items: list[Token]) -> Number:
+        return Number(float(items[0]), Unit.NONE, _of(items[0]))
+
     def part_of(self, items: list[Token]) -> Name:
         part, machine = items
         return PartName(str(part), Name(str(machine), _of(machine)), _of(part).to(_of(machine)))
@@ -358,12 +364,8 @@ def _names(tokens: list[Token]) -> tuple[Name, ...]:
     return tuple([Name(str(t), _of(t)) for t in tokens])
 
 
-def _unquoted(token: Token) -> str:
-    return str(token)[1:-1]
-
-
 def _bare(token: Token) -> str:
-    """The name between the angle brackets of a head or a reference."""
+    """The name between the angle brackets."""
     return canonical(str(token)[1 : str(token).index(">")])
 
 

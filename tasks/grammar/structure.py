@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
 
-from visup.rules.formula.nodes import Comparison
+from visup.rules.formula.nodes import SIGNAL_WORDS, Comparison
 from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
@@ -113,6 +113,14 @@ def needs_ground(task: Task) -> bool:
     return any(z.floor for z in task.zones) or any(dimension(task.amount(a)) == SIZE for a in ends)
 
 
+def signals_named(task: Task) -> tuple[str, ...]:
+    """The signals that a task asks for, each once."""
+    facts = [f for s in task.stages for f in _facts(s)]
+    facts += [f for i in task.invariants for f in facts_of(i.condition)]
+    asked = (action_of(f) for f in facts if action_of(f).name in SIGNAL_WORDS)
+    return tuple(dict.fromkeys(str(a.words[0]) for a in asked if a.name != "signal_known"))
+
+
 def _facts(stage: Stage) -> Iterator[Fact]:
     if isinstance(stage.body, Actors):
         return
@@ -174,9 +182,11 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     """The key of a fact of a task, and the actors of whom it speaks.
 
     A plain action is its own key; in that of a comparison stand its sign and amount, in that of an
-    action on a zone the zone.
+    action on a zone the zone, of a signal its name.
     """
     action, zones = action_of(fact), {z.name for z in task.zones}
+    if action.name in SIGNAL_WORDS:
+        zones = set(map(str, action.words))
     actors = tuple(str(a) for a in action.words if a not in zones)
     key = " ".join([action.name, *(a for a in action.words if a in zones)])
     if isinstance(fact, Comparison):
@@ -200,7 +210,9 @@ def _names(task: Task, node: Course) -> tuple[str, ...]:
 
 
 def _asks(task: Task, stage: Stage) -> bool:
-    return not isinstance(stage.body, Actors) and any(_names(task, n) for n in walk(stage.body))
+    return not isinstance(stage.body, Actors) and any(
+        isinstance(n, Action | Comparison) or _names(task, n) for n in walk(stage.body)
+    )
 
 
 def _reached(task: Task, stage: Stage) -> list[Stage]:

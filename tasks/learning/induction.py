@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import ceil, inf
+from functools import partial
+from math import ceil, floor, inf
 
 from visup.agent import Status, Verdict
 from visup.agent.model.errors import TaskError
@@ -19,6 +20,7 @@ from visup.tasks.learning.judging import JudgedRun, judged
 from visup.tasks.learning.order import (
     Free,
     Item,
+    Joint,
     Loop,
     Occurrence,
     Plan,
@@ -26,11 +28,11 @@ from visup.tasks.learning.order import (
     Times,
     leaves_of,
     plan_of,
-    relevant,
     shared,
     with_loops,
     without,
 )
+from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.traces import RunTrace, Symbol
 
 STAGE_NAMES = {
@@ -39,10 +41,14 @@ STAGE_NAMES = {
     "touching": "contact",
     "decoupled": "release",
     "diverging": "retreat",
+    "apart": "part",
 }
-MARGIN = 2.0
+MARGIN = 3.0
 """A stage may take so many times as long as it ever took in a good run."""
-LEAST_DEADLINE_S = 5.0
+LEAST_DEADLINE_S = 10.0
+HELD_SHARE = 0.5
+LONGEST_HOLD_S = 6.0
+"""What a run ends with must hold for that share of the least time for which it did, or of this."""
 SHARE = 0.8
 """What is in so many of the good runs is part of the course."""
 FORBIDDEN = ("touching", "coupled")
@@ -75,16 +81,20 @@ class _Draft:
         plan: Its course.
         times: Of each loop.
         runs: Good runs.
+        rows: What each is made of.
         declared: Actors as the runs' own tasks declare them.
         forbidden: Symbols that must never be.
+        holding: Whether what runs end with must hold for a while.
     """
 
     name: str
     plan: Plan
     times: Times
     runs: Sequence[RunTrace]
+    rows: Sequence[Sequence[CourseEvent]]
     declared: Mapping[str, Actor]
     forbidden: list[Symbol] = field(default_factory=list)
+    holding: bool = True
 
     def text(self) -> str:
         """The task file."""
@@ -110,15 +120,29 @@ class _Draft:
         spans = self._spans(occurrence)
         seen = f"in {len(spans)} of {_runs(len(self.runs))}"
         if not spans or self._last(occurrence):
-            return f"<{name}> ::= {_action(item)}  # {seen}"
+            held = self._held(occurrence) if self._last(occurrence) else 0.0
+            clause = f" for {held:g} s" if held else ""
+            course = f"({_action(item)})" if held and isinstance(item, Joint) else _action(item)
+            return f"<{name}> ::= {course}{clause}  # {seen}"
         took = f"{min(spans):.1f} to {max(spans):.1f} s"
-        return f"<{name}> ::= {_action(item)} within {deadline(spans)} s  # {seen}, {took}"
+        course = f"({_action(item)})" if isinstance(item, Joint) else _action(item)
+        return f"<{name}> ::= {course} within {deadline(spans)} s  # {seen}, {took}"
 
     def _last(self, occurrence: Occurrence) -> bool:
         plan = self.plan
         while isinstance(plan, Series):
             plan = plan.parts[-1]
         return occurrence in leaves_of(plan)
+
+    def _held(self, occurrence: Occurrence) -> float:
+        """How long what a run ends with must hold, seconds; 0 where it does not last to the end."""
+        if not self.holding:
+            return 0.0
+        found = [event_of(row, occurrence) for row in self.rows]
+        if not all(e is not None and e.lasts for e in found):
+            return 0.0
+        shortest = min(e.happening.end - e.happening.begin for e in found if e is not None)
+        return max(0.0, floor(2 * HELD_SHARE * min(shortest, LONGEST_HOLD_S)) / 2)
 
     def _spans(self, occurrence: Occurrence) -> list[float]:
         """How long a stage took at most in each run: from what came before it to what came after.
@@ -128,8 +152,8 @@ class _Draft:
         """
         course = leaves_of(self.plan)
         found = []
-        for run in self.runs:
-            begins = {o: t for o in course if (t := begin_of(run, o)) is not None}
+        for run, row in zip(self.runs, self.rows, strict=True):
+            begins = {o: t for o in course if (t := begin_of(row, o)) is not None}
             mine = begins.pop(occurrence, None)
             if mine is None:
                 continue
@@ -159,7 +183,8 @@ def learn_task(
     Raises:
         TaskError: Nothing happens in the good runs that they have in common.
     """
-    words = [tuple(h.symbol for h in row) for row in relevant(good)]
+    rows = joined(relevant(good))
+    words = [tuple(e.item for e in row) for row in rows]
     folded, times = with_loops(words)
     core = shared(folded, SHARE)
     if not core:
@@ -170,7 +195,8 @@ def learn_task(
         )
     seen = {o for w in folded for o in shared([w], 1.0)}
     dropped = [f"{_said(o)}: in some runs only" for o in sorted(seen - set(core), key=repr)]
-    draft = _Draft(name, plan_of(folded, core), times, good, declared or {})
+    plan = plan_of(folded, core, partial(_at_once, rows))
+    draft = _Draft(name, plan, times, good, rows, declared or {})
     results = _tried(draft, dropped)
     told = {r.name: _judge(draft, r) for r in bad}
     for run in bad:
@@ -188,6 +214,9 @@ def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
         task = parse_task(draft.text())
         found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
         refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
+        if refused and draft.holding:
+            draft.holding = False
+            continue
         blamed = _blamed(draft, refused[0]) if refused else None
         if blamed is None:
             return {name: j.verdict for name, j in found.items()}
@@ -236,14 +265,33 @@ def stage_names(plan: Plan) -> dict[Occurrence, str]:
     return found
 
 
-def begin_of(run: RunTrace, occurrence: Occurrence) -> float | None:
-    """When something happened in a run for the n-th time, or None."""
+def event_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> CourseEvent | None:
+    """Something that happened for the n-th time in a run, or None."""
     item, number = occurrence
     first = item
     while isinstance(first, Loop):
         first = first.body[0]
-    begins = [h.begin for h in run.happenings if h.symbol == first]
-    return begins[number] if number < len(begins) else None
+    found = [e for e in row if e.item == first]
+    return found[number] if number < len(found) else None
+
+
+def begin_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> float | None:
+    """When something happened in a run for the n-th time, or None."""
+    found = event_of(row, occurrence)
+    return None if found is None else found.happening.begin
+
+
+def _at_once(rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence) -> bool:
+    """Whether two things come so close in some run that their order may be chance."""
+    both = [(event_of(row, a), event_of(row, b)) for row in rows]
+    pairs = [(x, y) for x, y in both if x is not None and y is not None]
+    if any(_pairs(x.item) & _pairs(y.item) for x, y in pairs):
+        return False
+    return any(abs(x.at - y.at) < AT_ONCE_S for x, y in pairs)
+
+
+def _pairs(item: Item) -> set[tuple[str, ...]]:
+    return {actors for _, actors in _symbols(item)}
 
 
 def deadline(spans: Sequence[float]) -> int:
@@ -261,18 +309,25 @@ def _course(plan: Plan, names: Mapping[Occurrence, str]) -> str:
 
 
 def _symbols(item: Item) -> list[Symbol]:
+    if isinstance(item, Joint):
+        return list(item.parts)
     return [s for i in item.body for s in _symbols(i)] if isinstance(item, Loop) else [item]
 
 
 def _action(symbol: Item) -> str:
     if isinstance(symbol, Loop):
         return " ".join(map(_action, symbol.body))
+    if isinstance(symbol, Joint):
+        return " & ".join(map(_action, symbol.parts))
     action, actors = symbol
     return f"{action}({', '.join(actors)})"
 
 
 def _plain(item: Item) -> str:
-    return "repeat" if isinstance(item, Loop) else STAGE_NAMES.get(item[0], item[0])
+    if isinstance(item, Loop):
+        return "repeat"
+    words = [STAGE_NAMES.get(action, action) for action, _ in _symbols(item)]
+    return "_and_".join(dict.fromkeys(words))
 
 
 def _who(item: Item) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 from statistics import mean
 
-from visup.tasks.learning.traces import Happening, RunTrace, Symbol
+from visup.tasks.learning.traces import Symbol
 
 LONGEST_LOOP = 6
 MOST_FREE = 6
@@ -24,7 +24,14 @@ class Loop:
     body: tuple[Item, ...]
 
 
-Item = Symbol | Loop
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """What begins about the same time and then goes on together: each asked for beside the others."""
+
+    parts: tuple[Symbol, ...]
+
+
+Item = Symbol | Loop | Joint
 Word = tuple[Item, ...]
 
 
@@ -45,70 +52,6 @@ class Free:
 Occurrence = tuple[Item, int]
 """The n-th time of a symbol or loop in a run, from 0."""
 Plan = Occurrence | Series | Free
-
-
-LET_GO_S = 0.6
-"""What is carried meets others no longer than so long after it was let go."""
-CLOSE_S = 2.0
-"""A retreat begins so soon after the contact that it ends; relations are judged with delays."""
-
-
-def relevant(runs: Sequence[RunTrace]) -> list[list[Happening]]:
-    """What each run is made of, without what only comes along with something else.
-
-    A touch that becomes a coupling is that coupling; what is coupled to the same thing moves and meets
-    as that does; an approach counts when it leads to a meeting, a retreat when it ends one. Where
-    nobody ever meets all counts.
-    """
-    meetings = [[h for h in r.happenings if h.symbol[0] in MEETINGS] for r in runs]
-    if not any(meetings):
-        return [list(r.happenings) for r in runs]
-    return [_relevant(r, met) for r, met in zip(runs, meetings, strict=True)]
-
-
-MEETINGS = ("touching", "coupled")
-
-
-def _relevant(run: RunTrace, meetings: list[Happening]) -> list[Happening]:
-    real = [m for m in meetings if not _carried(m, meetings)]
-    kept = []
-    for h in run.happenings:
-        action, pair = h.symbol
-        of_pair = [m for m in real if m.symbol[1] == pair]
-        if action in MEETINGS:
-            keep = h in real and not any(_becomes(h, c) for c in of_pair)
-        elif action == "decoupled":
-            keep = any(m.end == h.begin for m in of_pair)
-        elif action == "converging":
-            keep = any(h.begin <= m.begin <= h.end + CLOSE_S for m in of_pair)
-        else:
-            keep = any(m.begin < h.begin <= m.end + CLOSE_S for m in of_pair)
-        kept += [h] if keep else []
-    return kept
-
-
-def _carried(meeting: Happening, meetings: list[Happening]) -> bool:
-    """Whether two meet only through a third thing, which one holds and which meets the other.
-
-    It then ends as soon as that is let go.
-    """
-    overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
-    for held in overlap:
-        if held.symbol[0] != "coupled" or meeting.end > held.end + LET_GO_S:
-            continue
-        for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
-            if a not in held.symbol[1] or b in held.symbol[1]:
-                continue
-            (x,) = set(held.symbol[1]) - {a}
-            if any({x, b} == set(m.symbol[1]) and m.end > meeting.end - CLOSE_S for m in overlap):
-                return True
-    return False
-
-
-def _becomes(touch: Happening, coupling: Happening) -> bool:
-    if (touch.symbol[0], coupling.symbol[0]) != ("touching", "coupled"):
-        return False
-    return touch.begin <= coupling.end and coupling.begin <= touch.end
 
 
 def with_loops(words: Sequence[Word]) -> tuple[list[Word], dict[Loop, tuple[int, int]]]:
@@ -190,13 +133,23 @@ def shared(words: Sequence[Word], share: float) -> list[Occurrence]:
     return sorted(core, key=lambda o: (mean(places[o]), repr(o)))
 
 
-def plan_of(words: Sequence[Word], core: Sequence[Occurrence]) -> Plan:
-    """The course that all words share: in sequence what all order alike, else free."""
+def plan_of(
+    words: Sequence[Word],
+    core: Sequence[Occurrence],
+    at_once: Callable[[Occurrence, Occurrence], bool] = lambda a, b: False,
+) -> Plan:
+    """The course that all words share: in sequence what all order alike, else free.
+
+    Args:
+        words: The runs.
+        core: What is in them all.
+        at_once: Whether two things come so close that their order may be chance.
+    """
     ranks = [{o: k for k, o in enumerate(numbered(w))} for w in words]
 
     def before(a: Occurrence, b: Occurrence) -> bool:
         both = [r for r in ranks if a in r and b in r]
-        return bool(both) and all(r[a] < r[b] for r in both)
+        return bool(both) and all(r[a] < r[b] for r in both) and not at_once(a, b)
 
     return _plan(list(core), before)
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 
 from visup.agent import Mind, Presence, Truth
+from visup.rules.formula.truth import YES
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.predicates.vocabulary import moving
 from visup.rules.wording.sentences import believed_name
 from visup.tasks.verification.observe import RelationLookup
 
@@ -46,6 +49,7 @@ class RunTrace:
         end: Seconds of its last.
         minds: What was believed, moment by moment.
         always: Actors that were in the scene from their first sight to the end.
+        moved_s: For how long each moved, seconds.
     """
 
     name: str
@@ -54,6 +58,7 @@ class RunTrace:
     end: float
     minds: tuple[Mind, ...] = field(repr=False, default=())
     always: frozenset[str] = frozenset()
+    moved_s: Mapping[str, float] = field(default_factory=dict)
 
 
 def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
@@ -67,8 +72,13 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
     spells: dict[Symbol, list[list[float]]] = {}
     gone: set[str] = set()
     named: set[str] = set()
+    moved: dict[str, float] = {}
+    before = kept[0].time if kept else 0.0
     for mind in kept:
         names = names_of(mind)
+        for name in _movers(mind, names):
+            moved[name] = moved.get(name, 0.0) + mind.time - before
+        before = mind.time
         named |= set(names.values())
         gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
         for symbol, truth in _held(mind, names):
@@ -83,7 +93,14 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         end,
         kept,
         frozenset(named - gone),
+        moved,
     )
+
+
+def _movers(mind: Mind, names: dict[int, str]) -> Iterator[str]:
+    facts = Snapshot(mind)
+    codes = moving(facts)
+    return (names[i] for i, row in facts.row.items() if i in names and codes[row] == YES)
 
 
 def names_of(mind: Mind) -> dict[int, str]:

@@ -11,9 +11,11 @@ from visup.tasks.verification.step_monitor import StepMonitor
 
 
 def names(words: Sequence[str]) -> str:
-    """Names as they are said: `the arm and the satellite`."""
+    """Names as they are said: `the arm and the satellite`; of nobody, a signal is meant."""
     the = [f"the {w.replace('_', ' ')}" for w in words]
-    return the[0] if len(the) == 1 else f"{', '.join(the[:-1])} and {the[-1]}"
+    if len(the) < 2:
+        return the[0] if the else "the signal"
+    return f"{', '.join(the[:-1])} and {the[-1]}"
 
 
 def evidence(
@@ -28,7 +30,7 @@ def evidence(
         now: Seconds.
         actions: All actions, for their words.
     """
-    who, alone = names(step.actors), len(step.actors) == 1
+    who, alone = names(step.actors), len(step.actors) < 2
     have, them = ("has", "it") if alone else ("have", "them")
     match monitor.status:
         case Status.FAILING | Status.FAILED if monitor.early:
@@ -83,7 +85,7 @@ def outcome(
         DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
         it was seen not to hold; UNKNOWN when it could not be seen, or may have been before.
     """
-    who, was = names(step.actors), "was" if len(step.actors) == 1 else "were"
+    who, was = names(step.actors), "was" if len(step.actors) < 2 else "were"
     if monitor.late:
         due = next(d for d in step.deadlines if now > d.at)
         return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"

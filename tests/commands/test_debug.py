@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,8 +16,8 @@ from tests.clips import moving_disc, write_clip
 from visup.agent import Frame, Region
 from visup.cli import main
 from visup.commands.debug import video_of
+from visup.percepts.motion.output.trace import SegmentationTrace
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.tracks.trace import SegmentationTrace
 from visup.report.motion_debug.marks import flow_colours
 from visup.report.motion_debug.panels import (
     draw_motion,
@@ -118,7 +119,7 @@ def test_mixed_superpixels_are_uncertain(seen: Seen) -> None:
     sure[:, 0] = 1
     even = np.full((count, labels), 1 / labels, np.float32)
     for posterior, unsure in ((sure, False), (even, True)):
-        known = SegmentationTrace(trace.scene, trace.tracks, trace.keys, posterior)
+        known = replace(trace, posterior=posterior)
         colours, uncertain = label_colours(known)
         assert (uncertain == unsure).all()
         assert (colours.max() > 0) == unsure

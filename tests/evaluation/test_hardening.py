@@ -32,6 +32,13 @@ def test_journals_whose_content_is_odd_are_read_or_refused() -> None:
     assert figures["failures"] == []
 
 
+def test_damaged_moving_pictures_are_read_or_refused() -> None:
+    kinds = ["signals", "video containers", "MJPEG streams"]
+    figures = evaluate_hardening(count=10, seed=13, races=0, kind=kinds)
+    assert figures["failures"] == []
+    assert all(figures["items"][k]["read"] > 0 for k in kinds)  # damage is not all that is seen
+
+
 def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(SettingsError, match="one of: tasks"):
         evaluate_hardening(count=1, kind=["spoons"])

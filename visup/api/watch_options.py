@@ -33,6 +33,7 @@ class WatchOptions(TypedDict, total=False):
     fps: float | None
     fov_vertical_deg: float | None
     zones: str | os.PathLike[str] | None
+    signals: Sequence[str | os.PathLike[str]]
     patience_s: float
     detections: str | os.PathLike[str] | None
     motion: bool

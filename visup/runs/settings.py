@@ -156,6 +156,15 @@ class WatchSettings:
         Path | None,
         Option("File with zones that rules can name (see docs/formats.md).", metavar="FILE"),
     ] = None
+    signals: Annotated[
+        tuple[Path | str, ...],
+        Option(
+            "Signals that are not from the image: a table (CSV with a column `time`), or "
+            "mqtt:HOST/TOPIC of a broker.",
+            "--signal",
+            "FILE",
+        ),
+    ] = ()
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
     detections: Annotated[

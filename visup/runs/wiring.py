@@ -32,6 +32,7 @@ from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import ReasonerSettings, default_reasoners
 from visup.runs.inputs.plugins import user_behaviours
 from visup.runs.inputs.presets import preset_named
+from visup.runs.inputs.signals import check_signals, signal_behaviours
 from visup.runs.inputs.zones import load_ground, load_zones
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
@@ -106,9 +107,11 @@ def build_agent(
     behaviours = [
         *_behaviours(settings, database, boxes, declared_sizes(tasks, actors), _places(tasks)),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
+        *(told := signal_behaviours(settings.signals)),
         *also,
     ]
     contracts = [b.contract for b in behaviours]
+    check_signals(contracts, told, _rules(settings), tasks)
     return Agent(
         behaviours=behaviours,
         reasoners=_reasoners(settings, tasks, contracts),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from visup.agent.model.errors import SettingsError
 
@@ -27,6 +28,8 @@ class MotionSettings:
         max_regions: Most regions that are followed at once.
         least_blob: Least area of a silhouette where the camera rests, share of the image.
         missed_s: How long such a silhouette is missed before it is given up, seconds.
+        learnt: Whether a learnt belief, in place of the tracks' own, says what moves while the camera does.
+        foreground: The file of `visup train motion` that says so; what ships when None and `learnt`.
     """
 
     work_size: int = 512
@@ -44,6 +47,8 @@ class MotionSettings:
     max_regions: int = 32
     least_blob: float = 0.0003
     missed_s: float = 3.0
+    learnt: bool = False
+    foreground: Path | None = None
 
     def __post_init__(self) -> None:
         if self.work_size < 64:

@@ -36,11 +36,11 @@ def tone_likelihood(cells: Superpixels, prior: Floats, least: float = 12.0) -> F
             out[:, k] = even
             continue
         histogram = np.bincount(code, weights=prior[:, k], minlength=BINS**3)
-        out[:, k] = _smooth(histogram)[code] / size + 0.002
+        out[:, k] = smoothed_histogram(histogram)[code] / size + 0.002
     return np.asarray(out / out.sum(axis=1, keepdims=True), dtype=np.float32)
 
 
-def _smooth(histogram: NDArray[Any]) -> NDArray[Any]:
+def smoothed_histogram(histogram: NDArray[Any]) -> NDArray[Any]:
     """A flat histogram after a Gaussian along each of its three axes."""
     out = histogram
     for _ in range(3):

@@ -13,6 +13,8 @@ from visup.agent import Directive, Region
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground.following import ForegroundState
+from visup.percepts.motion.foreground.objects import MovingObject, object_share, object_velocity
 from visup.percepts.motion.layers.dense_labelling import CLIP, PointEvidence
 from visup.percepts.motion.outlines.outline_refinement import CONTEXT, refine_outline
 from visup.percepts.motion.outlines.region_outline import RegionOutline, region_outline
@@ -112,7 +114,7 @@ def report_regions(
     told = [t for t in tracks if t.id > 0]
 
     def drawn(t: Track) -> RegionOutline | None:
-        return _track_outline(t, [o.share for o in told if o is not t], scene, size, least)
+        return _share_outline(t.share, [o.share for o in told if o is not t], scene, size, least)
 
     told_now = [t for t in told if t.last_seen == scene.time]
     later = [beside.submit(drawn, t) for t in told_now[1::2]]
@@ -123,20 +125,76 @@ def report_regions(
     return tuple(sorted(out, key=lambda r: r.id))
 
 
-def _track_outline(
-    t: Track,
+def report_objects(
+    state: ForegroundState,
+    tracks: Sequence[Track],
+    scene: FrameMeasurements,
+    size: tuple[int, int],
+    settings: MotionSettings,
+    beside: Executor,
+) -> tuple[Region, ...]:
+    """Regions of the objects of the foreground that are in view.
+
+    Args:
+        state: The foreground after the frame.
+        tracks: All tracks: an object that one follows has its velocity.
+        scene: The frame.
+        size: (width, height) of the frame.
+        settings: Gives the least area.
+        beside: Draws every other outline meanwhile.
+
+    Returns:
+        Regions by id.
+    """
+    least = min_region_area(scene, settings) / scene.image.scale**2
+    by_id = {t.id: t for t in tracks if t.id > 0}
+    told = state.objects.reported(scene.time)
+
+    def drawn(o: MovingObject) -> RegionOutline | None:
+        share = object_share(state.objects, o.key, state.belief.share)
+        return _share_outline(share, [], scene, size, least)
+
+    later = [beside.submit(drawn, o) for o in told[1::2]]
+    shapes: list[RegionOutline | None] = [None] * len(told)
+    shapes[::2] = [drawn(o) for o in told[::2]]
+    shapes[1::2] = [shape.result() for shape in later]
+    return tuple(
+        _object_region(o, shape, by_id.get(o.track), state, scene)
+        for o, shape in zip(told, shapes, strict=True)
+        if shape is not None
+    )
+
+
+def _object_region(
+    o: MovingObject,
+    shape: RegionOutline,
+    t: Track | None,
+    state: ForegroundState,
+    scene: FrameMeasurements,
+) -> Region:
+    """The region of an object: as its track moves, or else as its cells do."""
+    scale = scene.image.scale
+    if t is not None:
+        return replace(_region(t, shape, scale), id=o.id)
+    vx, vy, sigma = object_velocity(state.objects, o.key, scene.flow, scene.cells, scene.seconds)
+    sure = float(np.mean(state.belief.share[state.objects.owner == o.key]))
+    return shape.region(o.id, (vx / scale, vy / scale), sigma / scale, sure)
+
+
+def _share_outline(
+    share_of_cells: Floats,
     others: Sequence[Floats],
     scene: FrameMeasurements,
     size: tuple[int, int],
     least: float,
 ) -> RegionOutline | None:
-    x, y, w, h = scene.cells.box(t.share > 0.5)
+    x, y, w, h = scene.cells.box(share_of_cells > 0.5)
     if not w:
         return None
     left, top = max(x - CONTEXT, 0), max(y - CONTEXT, 0)
     part = np.s_[top : y + h + CONTEXT, left : x + w + CONTEXT]
     labels = scene.cells.labels[part]
-    share = t.share[labels]
+    share = share_of_cells[labels]
     drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]))
     if others:
         # What another object shows is not taken from it.

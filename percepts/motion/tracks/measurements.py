@@ -44,6 +44,7 @@ class FrameMeasurements:
         cells: Superpixels.
         owner: (count,) label that each superpixel is expected to have; 0 is background.
         seconds: Since the frame before.
+        flow: (h, w, 2) float32, dense flow from the newest image back to the one before, pixels.
         measured: Motions, the shortest baseline first.
     """
 
@@ -52,6 +53,7 @@ class FrameMeasurements:
     cells: Superpixels
     owner: Indices
     seconds: float
+    flow: Floats
     measured: tuple[BaselineMotion, ...]
 
     @property

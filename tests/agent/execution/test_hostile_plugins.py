@@ -19,7 +19,10 @@ from visup.agent.execution.sandbox import isolating
 from visup.agent.model.errors import BehaviourError, SettingsError
 from visup.agent.plugins.isolated import IsolatedBehaviour
 
-LIMITS = Limits(hang_s=2.0, start_s=20.0)
+HANG_S = 2.0
+LIMITS = Limits(hang_s=HANG_S, start_s=20.0)
+PATIENT = Limits(hang_s=60.0, start_s=60.0)
+"""For what a plug-in does rather than leaves undone: it has to come to it beside others that work."""
 
 HEAD = """
 import os, sys, signal, socket, struct, time
@@ -59,8 +62,8 @@ def plug(folder: Path, body: str, top: str = "") -> IsolatedBehaviour:
     return IsolatedBehaviour(contract, str(path))
 
 
-def reports(behaviour: IsolatedBehaviour, count: int = 2) -> list[Report]:
-    agent = Agent([behaviour], limits=LIMITS)
+def reports(behaviour: IsolatedBehaviour, count: int = 2, limits: Limits = LIMITS) -> list[Report]:
+    agent = Agent([behaviour], limits=limits)
     try:
         return [agent.step(f).reports[0] for f in frames(count)]
     finally:
@@ -127,10 +130,13 @@ def test_what_it_reports_is_data(tmp_path: Path) -> None:
         ("os.write(connection(), b'abc'); time.sleep(60)", "no answer within"),
         ("os.write(connection(), struct.pack('<Q', 50) + b'{'); time.sleep(60)", "no answer"),
         ("os.write(connection(), struct.pack('<Q', 2**62)); time.sleep(60)", "more than 256 MB"),
-        ("os.write(connection(), struct.pack('<Q', 4) + b'nope'); time.sleep(9)", "cannot be read"),
-        ("os.write(connection(), struct.pack('<Q', 2) + b'[]'); time.sleep(9)", "no message"),
         (
-            "os.write(connection(), struct.pack('<Q', 9_000_002) + b'[' * 9_000_002); time.sleep(9)",
+            "os.write(connection(), struct.pack('<Q', 4) + b'nope'); time.sleep(90)",
+            "cannot be read",
+        ),
+        ("os.write(connection(), struct.pack('<Q', 2) + b'[]'); time.sleep(90)", "no message"),
+        (
+            "os.write(connection(), struct.pack('<Q', 9_000_002) + b'[' * 9_000_002); time.sleep(90)",
             "more than 4000000 values",
         ),
         ("print('x' * 2**20, flush=True)\nwhile True: print('x' * 2**20)", "16 MB to its output"),
@@ -144,8 +150,8 @@ def test_nonsense_on_the_wire_is_its_failure_and_holds_nobody_up(
 ) -> None:
     behaviour = plug(tmp_path, body)
     begin = time.monotonic()
-    told = reports(behaviour)
-    assert time.monotonic() - begin < 10.0
+    told = reports(behaviour, limits=LIMITS if "no answer" in said else PATIENT)
+    assert time.monotonic() - begin < LIMITS.start_s + 5 * HANG_S
     assert told[0].state in (ReportState.FAILED, ReportState.LATE)
     assert said in told[0].error
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from tests.percepts.motion.clips import clip, texture
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.commands.eval.catalogue import eval_app
-from visup.evaluation.motion.fold_runner import FoldPlan, evaluate_folds, tried_settings
+from visup.evaluation.cross_validation.runner import FoldPlan, evaluate_folds, tried_changes
 from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_and_spread
 from visup.evaluation.motion.mask_scores import region_similarity
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
@@ -114,14 +114,12 @@ def test_mirrored_twice_is_as_it_was() -> None:
 @pytest.mark.parametrize("text", ["speed=3", "evidence=much", "evidence", "lags_s=1"])
 def test_settings_that_cannot_be_tried_are_refused(text: str) -> None:
     with pytest.raises(SettingsError) as caught:
-        tried_settings(text)
+        tried_changes(text)
     assert caught.value.where == "--try"
 
 
 def test_tried_settings_change_only_what_they_name() -> None:
-    tried = tried_settings("evidence=0.8, cell=6")
-    assert (tried.evidence, tried.cell) == (0.8, 6)
-    assert tried.noise == tried_settings("cell=8").noise
+    assert tried_changes("evidence=0.8, cell=6") == {"evidence": 0.8, "cell": 6}
 
 
 def sequences(folder: Path) -> None:

@@ -9,20 +9,19 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from tests.clips import moving_disc, write_clip
+from tests.oracles.hardening.media import media
 from tests.oracles.hardening.mutations import mutated
 from visup.agent.model.errors import VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.signals import read_signals
 from visup.percepts.taught.view import taught_view
-from visup.percepts.video import open_source
 from visup.rules.language.parser import load_rules
 from visup.runs.checkpoints import CHECKPOINT, read_checkpoint
 from visup.runs.inputs.zones import load_ground, load_zones
@@ -63,8 +62,6 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         "tasks": ("a.task", sorted((ROOT / "tasks" / "shipped").glob("*.task")), _tasks),
         "rules": ("a.rules", [ROOT / "rules" / "safety" / "safety.rules"], _rules),
     }
-    # Told apart by what is in them, whatever they are called.
-    pictures = [cv2.imencode(kind, moving_disc(1)[0])[1].tobytes() for kind in (".png", ".jpg")]
     kinds = {
         kind: Subject(_damaging(name, [f.read_bytes() for f in files]), read)
         for kind, (name, files, read) in texts.items()
@@ -80,8 +77,8 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         "journals of other content": Subject(lambda f, rng: _rewritten(f, rng, journal), _journal),
         "resumed journals": Subject(_resumable(journal, state), _resumed),
         "states": Subject(_damaging(CHECKPOINT, [state]), _state),
-        "videos": Subject(_damaging("a.avi", [clip.read_bytes()]), lambda f: _video(f / "a.avi")),
-        "pictures": Subject(_damaging("0.png", pictures), _video),
+        "signals": Subject(_damaging("signals.csv", [SIGNALS]), _signals),
+        **{name: Subject(make, read) for name, (make, read) in media(clip).items()},
     }
 
 
@@ -93,6 +90,7 @@ depth = [1.0, 2.0]
 image = [[0, 0], [90, 0], [90, 70], [0, 70]]
 floor = [[0, 0], [1, 0], [1, 1], [0, 1]]
 """
+SIGNALS = b"time,battery,door_open,mode\n0,87.5,no,auto\n0.5,,yes,\n12.25,1e-3,no,manual\n"
 SETTINGS = b'[behaviours.lamp]\ncontrast = 3\ncolours = ["red", "blue"]\nat = 2020-01-01\n'
 
 
@@ -243,6 +241,10 @@ def _lsp(folder: Path) -> None:
         formatted(text)
 
 
+def _signals(folder: Path) -> None:
+    read_signals(folder / "signals.csv").at(1.0)
+
+
 def _models(folder: Path) -> None:
     database = ModelDatabase.open(folder / "a.models")
     list(database.taught)
@@ -270,12 +272,6 @@ def _resumed(folder: Path) -> None:
 
 def _state(folder: Path) -> None:
     read_checkpoint(folder)
-
-
-def _video(path: Path) -> None:
-    with open_source(str(path)) as video:
-        for _ in islice(video, 20):
-            pass
 
 
 REFUSED = VisupError

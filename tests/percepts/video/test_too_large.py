@@ -42,13 +42,13 @@ def test_a_picture_of_many_pixels_is_refused_at_once(
     for n in range(2):
         (tmp_path / f"{n}.png").write_bytes(bomb(width, height) if width <= 30_000 else bomb(9, 9)
             .replace(struct.pack(">II", 9, 9), struct.pack(">II", width, height)))  # fmt: skip
-    begin = time.monotonic()
+    begin = time.process_time()
     with pytest.raises(SourceError) as told, open_source(str(tmp_path)) as video:
         list(video)
     assert "million" in str(told.value) or "decoded" in str(told.value)
     with pytest.raises(DatabaseError):
         read_silhouette(tmp_path / "0.png")
-    assert time.monotonic() - begin < 2.0
+    assert time.process_time() - begin < 2.0
 
 
 def test_the_size_of_a_picture_is_that_of_its_header() -> None:

@@ -46,10 +46,10 @@ def beside(count: int, form: str) -> str:
     ],
 )
 def test_what_cannot_be_followed_is_refused_at_once(text: str, said: str) -> None:
-    begin = time.monotonic()
+    begin = time.process_time()
     with pytest.raises(VisupError, match=said) as told:
         parse_task(text)
-    assert time.monotonic() - begin < 5.0
+    assert time.process_time() - begin < 5.0
     assert len(str(told.value)) < 100_000
 
 
@@ -75,13 +75,13 @@ def test_many_mistakes_are_told_in_a_bounded_text() -> None:
 )
 def test_what_is_accepted_is_watched_drawn_and_written(text: str) -> None:
     task = parse_task(text)
-    begin = time.monotonic()
+    begin = time.process_time()
     reason, mind = task_reasoner([task]), Mind()
     for n in range(3):
         mind = reason(mind, Observation(n, n / 10, (64, 48))).mind
     assert outline(task).inside
     assert parse_task(str(task)) == task
-    assert time.monotonic() - begin < 10.0
+    assert time.process_time() - begin < 10.0
 
 
 def test_include_stays_in_the_folder_of_the_task(tmp_path: Path) -> None:
@@ -131,10 +131,10 @@ def test_a_mark_of_the_byte_order_is_accepted_in_both(tmp_path: Path) -> None:
     ],
 )
 def test_rules_that_are_too_much_are_refused_at_once(text: str) -> None:
-    begin = time.monotonic()
+    begin = time.process_time()
     with pytest.raises(VisupError) as told:
         parse_rules(text)
-    assert time.monotonic() - begin < 10.0
+    assert time.process_time() - begin < 10.0
     assert len(str(told.value)) < 100_000
 
 

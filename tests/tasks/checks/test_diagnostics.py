@@ -144,9 +144,9 @@ def test_any_text_at_all_is_read_or_told(text: str) -> None:
 
 @pytest.mark.parametrize(("name", "text"), list(long_files(2000)))
 def test_long_files_are_read_in_good_time(name: str, text: str) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     _, faults = diagnose(text)
-    assert time.perf_counter() - start < 5.0  # the bar is 2.5 s for 10,000; others may work beside
+    assert time.process_time() - start < 2.5  # the bar for 10,000
     assert len(faults) == {"mistaken": MOST_FAULTS, "chain": 1}.get(name, 0)  # too deep a chain
 
 
@@ -156,9 +156,9 @@ def test_a_usual_file_is_read_at_once() -> None:
 
 def test_many_stages_that_double_each_other_are_no_trap() -> None:
     doubled = [f"<s{i}> ::= (<s{i + 1}> | gone(x)) <s{i + 1}>" for i in range(60)]
-    start = time.perf_counter()
+    start = time.process_time()
     assert diagnose("\n".join([*doubled, "<s60> ::= seen(a)"]))[1] == []
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 def test_the_grammar_is_read_from_its_file() -> None:

@@ -91,6 +91,30 @@ def random_worlds(kind: list[str] | None, progress: Progress, **settings: Any) -
     return evaluate_random(kinds=kind or (), progress=progress, **settings)
 
 
+def learning(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
+    """Tasks learned from runs."""
+    from visup.commands.render import needs_renderer
+    from visup.evaluation.learning.runner import evaluate_learning
+
+    needs_renderer()
+    return evaluate_learning(kinds=kind or (), progress=progress, **settings)
+
+
+def learning_closing(figures: Figures) -> Iterator[str]:
+    """The runs that are judged wrong, and in how many missions the bar is held."""
+    for kind, found in figures["items"].items():
+        if found["wrong"]:
+            yield f"{kind}: judged wrong: {', '.join(found['wrong'])}"
+        if "failed" in found:
+            yield f"{kind}: {found['failed']}"
+    yield "{held} of {missions} missions hold the bar".format(**figures["total"])
+
+
+def learning_failed(figures: Figures) -> bool:
+    """Whether a mission misses its bar."""
+    return bool(figures["total"]["held"] < figures["total"]["missions"])
+
+
 def random_closing(figures: Figures) -> Iterator[str]:
     """The worlds whose verdict is wrong, and how many are right."""
     for name, world in figures["worlds"].items():
@@ -223,6 +247,17 @@ def resume_failed(figures: Figures) -> bool:
     """Whether a resumed run differed from the unbroken one, or lost anything."""
     total = figures["total"]
     return bool(total["equal"] < total["kills"] or total["lost"] > 0)
+
+
+def soak(frames: int, traffic: float, progress: Progress) -> Figures:
+    """A run of hours; with `traffic` so many of three lanes of cars."""
+    if traffic:
+        from visup.evaluation.runtime.traffic import evaluate_traffic
+
+        return evaluate_traffic(traffic, progress=progress)
+    from visup.evaluation.runtime.soak import evaluate_soak
+
+    return evaluate_soak(frames, progress=progress)
 
 
 def totals_closing(figures: Figures) -> Iterator[str]:

@@ -21,18 +21,15 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
         SettingsError: An option stands without the folds that it belongs to.
     """
     if folds is not None:
-        from visup.evaluation.motion.fold_runner import FoldPlan, evaluate_folds
+        from visup.evaluation.cross_validation.runner import FoldPlan, evaluate_folds
 
-        options["tries"] = options["tries"] or ()
+        options |= {name: options[name] or () for name in ("tries", "also")}
         return evaluate_folds(folder, FoldPlan(folds, **options), progress)
     from visup.agent.model.errors import SettingsError
     from visup.evaluation.motion.runner import evaluate_motion
 
-    for option, name in (
-        ("--try", "tries"),
-        ("--stability", "stability"),
-        ("--against", "against"),
-    ):
+    alone = {"--try": "tries", "--stability": "stability", "--against": "against"}
+    for option, name in (alone | {"--train": "train", "--also": "also"}).items():
         if options[name]:
             raise SettingsError(
                 f"{option} says nothing without folds", expected="--folds N beside it"
@@ -42,7 +39,11 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
 
 def motion_settings(given: dict[str, Any]) -> dict[str, Any]:
     """The options of `visup eval motion` that its figures follow from."""
-    by_folds = ("folds", "tries", "stability") if given["folds"] is not None else ()
+    by_folds = (
+        ("folds", "tries", "stability", "train", "also", "seed")
+        if given["folds"] is not None
+        else ()
+    )
     return {k: given[k] for k in ("limit", *by_folds)}
 
 
@@ -97,6 +98,11 @@ MOTION = EvaluationCommand(
             "Show variants as well: mirrored, half the frames, smaller, compressed.",
         ),
         Setting("against", Path | None, None, Option("Figures of an earlier run to compare with.")),
+        flag("train", "Learn what moves anew for each fold, from all others."),
+        Setting(
+            "also", list[Path] | None, None, Option("Folder to learn from besides, for each fold.")
+        ),
+        count("seed", 0, "Of what is learnt.", 0),
         Setting("cache", Path, Path("runs/folds"), Option("Folder for what folds measured.")),
     ),
     FOLDER,

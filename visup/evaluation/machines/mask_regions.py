@@ -6,8 +6,9 @@ object that nothing shows of has none. Image motion is taken from the masks, too
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -34,12 +35,12 @@ class MaskRegions:
     """A behaviour that reports what the masks of a world show.
 
     Attributes:
-        folder: With `masks/`.
+        mask: (H, W) uint8 of a frame, by its number.
         labels: Role -> value in the masks.
         fps: Frames per second.
     """
 
-    folder: Path
+    mask: Callable[[int], NDArray[np.uint8]]
     labels: Mapping[str, int]
     fps: float
     contract: Contract = field(default=Contract("masks", gives=("region", "health")), init=False)
@@ -50,7 +51,7 @@ class MaskRegions:
     ) -> Iterable[Percept]:
         """Report one frame; see `Behaviour`."""
         yield Percept("health", Health(HealthStatus.OK), frame.time, "masks")
-        picture = self._read(frame)
+        picture = self.mask(frame.index)
         here = {n: m for n, v in self.labels.items() if (m := true_mask(picture == v)) is not None}
         lag = max(1, round(LAG_S * self.fps))
         self._past = [*self._past[-lag:], here]
@@ -67,13 +68,6 @@ class MaskRegions:
             )
             yield Percept("region", region, frame.time, "masks", region.confidence)
 
-    def _read(self, frame: Frame) -> NDArray[np.uint8]:
-        path = self.folder / "masks" / f"{frame.index:05d}.png"
-        picture = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
-        if picture is None:
-            raise SettingsError("a mask is missing or cannot be read", where=str(path))
-        return np.asarray(picture, dtype=np.uint8)
-
 
 def has_masks(folder: Path) -> bool:
     """Whether a clip has masks to see by."""
@@ -89,10 +83,28 @@ def mask_behaviours(folder: Path) -> list[Behaviour]:
     truth = read_json(folder / "truth.json")
     roles: Mapping[str, str] = truth.get("roles") or {n: n for n in truth["labels"]}
     labels = {role: int(truth["labels"][name]) for role, name in roles.items()}
-    names = dict(enumerate(sorted(labels), start=1))
-    regions = MaskRegions(folder, labels, float(truth["fps"]))
+    return role_behaviours(partial(read_mask, folder), labels, float(truth["fps"]))
 
-    return [regions, RoleNames(names)]
+
+def role_behaviours(
+    mask: Callable[[int], NDArray[np.uint8]], labels: Mapping[str, int], fps: float
+) -> list[Behaviour]:
+    """What sees by masks: each role's region by its name; arguments as of `MaskRegions`."""
+    names = dict(enumerate(sorted(labels), start=1))
+    return [MaskRegions(mask, labels, fps), RoleNames(names)]
+
+
+def read_mask(folder: Path, index: int) -> NDArray[np.uint8]:
+    """(H, W) labels of a frame of a clip.
+
+    Raises:
+        SettingsError: There is no such mask, or it cannot be read.
+    """
+    path = folder / "masks" / f"{index:05d}.png"
+    picture = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
+    if picture is None:
+        raise SettingsError("a mask is missing or cannot be read", where=str(path))
+    return np.asarray(picture, dtype=np.uint8)
 
 
 @dataclass(slots=True)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from visup.agent.model.errors import SettingsError
-from visup.evaluation.figures import Progress, silent
+from visup.evaluation.figures import Progress, each_in_processes, silent
 from visup.evaluation.machines.runner import evaluate_machines
 from visup.evaluation.machines.scores import machine_total
 
@@ -70,11 +67,13 @@ def evaluate_random(
     """
     trials = planned(kinds, count, seed, RandomTrial("", 0, eyes, baseline, limit))
     worlds: dict[str, dict[str, Any]] = {}
-    for name, scores in _scored(trials, workers or os.cpu_count() or 1):
+    shares = workers or os.cpu_count() or 1
+    for _, (name, scores) in each_in_processes(score, trials, shares):
         worlds[name] = scores
         progress(f"{len(worlds)} of {count} worlds")
     ordered = dict(sorted(worlds.items()))
-    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in _known(kinds)}
+    watched = dict.fromkeys(t.kind for t in trials)
+    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in watched}
     items = {kind: machine_total(found) for kind, found in by_kind.items() if found}
     figures = {"total": machine_total(list(ordered.values())), "items": items, "worlds": ordered}
     rivals = [w["baseline"] for w in ordered.values() if "baseline" in w]
@@ -92,7 +91,9 @@ def planned(
         seed: Of all of them.
         like: How they are watched.
     """
-    known = _known(kinds)
+    from visup.render.worlds.kinds.catalogue import known_kinds
+
+    known = known_kinds(kinds)
     return tuple(
         RandomTrial(
             known[number % len(known)],
@@ -103,33 +104,6 @@ def planned(
         )
         for number in range(count)
     )
-
-
-def _known(kinds: Sequence[str]) -> tuple[str, ...]:
-    from visup.render.worlds.kinds.catalogue import KINDS
-
-    for kind in kinds:
-        if kind not in KINDS:
-            raise SettingsError(f"there is no kind of world {kind!r}", expected=", ".join(KINDS))
-    return tuple(kinds) or tuple(KINDS)
-
-
-def _scored(trials: Sequence[RandomTrial], workers: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Names and figures of worlds as they come."""
-    if min(workers, len(trials)) <= 1:
-        yield from (score(trial) for trial in trials)
-        return
-    # Fresh processes: a fork would share the state of OpenCV's threads.
-    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
-        for done in as_completed([pool.submit(score, trial) for trial in trials]):
-            yield done.result()
-
-
-def _alone() -> None:
-    """One thread for each process: the processes share the cores already."""
-    import cv2
-
-    cv2.setNumThreads(1)
 
 
 def score(trial: RandomTrial) -> tuple[str, dict[str, Any]]:

@@ -1,7 +1,7 @@
 """Figures on what was left out: families of sequences, folds of families, choice by the rest, spreads.
 
 Two sequences of one family (the same scene, camera or film) never stand on both sides of a fold. All
-functions are pure; `fold_runner` measures what they judge.
+functions are pure; `visup.evaluation.cross_validation` measures what they judge.
 """
 
 from __future__ import annotations

@@ -161,6 +161,25 @@ def find_sequences(folder: Path) -> list[LabelledSequence]:
     return out
 
 
+def labelled_frames(
+    sequence: LabelledSequence, variant: Variant, limit: int | None = None
+) -> Iterator[tuple[Frame, NDArray[np.uint8] | None]]:
+    """The frames of a sequence as a variant shows them, each with its mask, or None where it has none.
+
+    Args:
+        sequence: Frames and masks.
+        variant: How it is shown.
+        limit: Most frames, before the variant leaves out some, or None for all.
+    """
+    limit = None if limit is None else max(1, limit // variant.every)
+    for frame, _ in _frames(sequence, variant.every, limit):
+        mask = sequence.masks.get(frame.index)
+        yield (
+            variant.shown(frame),
+            None if mask is None else variant.labels(_labels(mask, frame.size)),
+        )
+
+
 def _run(
     sequence: LabelledSequence,
     frames: Iterable[tuple[Frame, bool]],

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.render.imaging.raycast import Hits
 from visup.render.imaging.renderer import RenderedFrame
 from visup.render.imaging.sensor import expose
 from visup.render.scenario.optics import Sensor
@@ -53,6 +54,19 @@ class WorldRenderer:
         for name, label in self.world.labels.items():
             amodal[name] = self._amodal(plate, label, index)
         return RenderedFrame(index, self._exposed(light, index), mask, amodal, {})
+
+    def mask(self, index: int) -> NDArray[np.uint8]:
+        """(H, W) labels of a frame, as of `picture`, without its light: some ten times as fast."""
+        plate = self.plate.warped(self.camera.to_plate(index), self.world.size)
+        if not self.movers:
+            return plate.labels.copy()
+        scene = PlacedThings(self.movers, index)
+        width = self.world.size[0]
+        places = np.flatnonzero(self._window(self.movers, index))
+        far = np.linalg.norm(plate.points.reshape(-1, 3)[places] - self._eye, axis=1)
+        at = np.column_stack([places % width, places // width]).astype(float)
+        _, _, body = self._met(scene, at, far, index)
+        return self._labelled(plate, scene, places, body)
 
     def _exposed(self, light: Floats, index: int) -> NDArray[np.uint8]:
         """(H, W, 3) uint8, BGR, as the camera stores it."""
@@ -115,21 +129,38 @@ class WorldRenderer:
         flat[places] = colour
         bodies = np.full(width * height, -1, np.int16)
         bodies[places] = body
+        self._smooth(scene, flat, rests, bodies, plate, index)
+        return self._labelled(plate, scene, places, body)
+
+    def _labelled(
+        self,
+        plate: Plate,
+        scene: PlacedThings,
+        places: NDArray[np.intp],
+        body: NDArray[np.int32],
+    ) -> NDArray[np.uint8]:
+        """(H, W) labels of what rests, with those of what moves where it shows."""
+        width, height = self.world.size
         mask = plate.labels.ravel().copy()
         mask[places[body >= 0]] = scene.labels[body[body >= 0]]
-        self._smooth(scene, flat, rests, bodies, plate, index)
         return mask.reshape(height, width)
+
+    def _met(
+        self, scene: PlacedThings, at: NDArray[np.float64], far: Floats, index: int
+    ) -> tuple[Floats, Hits, NDArray[np.int32]]:
+        """Rays through points (N, 2) of the picture, what they hit, and which mover shows, -1 for none."""
+        directions = self._directions(at, index)
+        hits = scene.cast(self._eye, directions)
+        before = hits.distance * np.linalg.norm(directions, axis=1) < far * (1 - SURFACE)
+        return directions, hits, np.where(before, hits.body, -1).astype(np.int32)
 
     def _seen(
         self, scene: PlacedThings, at: NDArray[np.float64], far: Floats, behind: Floats, index: int
     ) -> tuple[Floats, NDArray[np.int32]]:
         """Colours (N, 3) through points (N, 2) of the picture, and which mover shows there, -1 for none."""
-        directions = self._directions(at, index)
-        hits = scene.cast(self._eye, directions)
-        before = hits.distance * np.linalg.norm(directions, axis=1) < far * (1 - SURFACE)
-        body = np.where(before, hits.body, -1).astype(np.int32)
+        directions, hits, body = self._met(scene, at, far, index)
         met = np.flatnonzero(body >= 0)
-        seen = type(hits)(hits.body[met], hits.face[met], hits.distance[met])
+        seen = Hits(hits.body[met], hits.face[met], hits.distance[met])
         points = (self._eye + directions[met] * seen.distance[:, None]).astype(np.float32)
         albedo, normals = scene.surface(seen, points, directions[met])
         sunny = direct(normals, self.world.light)

@@ -17,8 +17,8 @@ from visup.percepts.motion.features.motion_constraints import Constraints
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.layers.affine import distances
 from visup.percepts.motion.layers.layer_discovery import layer_slack
+from visup.percepts.motion.output.trace import SegmentationTrace
 from visup.percepts.motion.tracks.measurements import BaselineMotion
-from visup.percepts.motion.tracks.trace import SegmentationTrace
 from visup.percepts.motion.tracks.track import Track
 from visup.report.image_text import ink, shade, write
 from visup.report.motion_debug.marks import (

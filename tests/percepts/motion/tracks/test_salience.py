@@ -27,7 +27,8 @@ def scene(time: float = 0.0) -> FrameMeasurements:
     image = prepare_image(Frame(0, time, np.repeat(WIDE[..., None], 3, axis=2)), 512)
     cells = superpixels(image, 8, 8.0)
     owner = np.zeros(cells.count, np.int64)
-    return FrameMeasurements(image, find_points(image, 8, 1.0), cells, owner, 1 / FPS, ())
+    flow = np.zeros((*image.shape, 2), np.float32)
+    return FrameMeasurements(image, find_points(image, 8, 1.0), cells, owner, 1 / FPS, flow, ())
 
 
 def still(at: FrameMeasurements) -> BaselineMotion:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +41,18 @@ KINDS: Mapping[str, WorldKind] = {
 }
 
 
+def known_kinds(kinds: Sequence[str]) -> tuple[str, ...]:
+    """These kinds; all when empty.
+
+    Raises:
+        SettingsError: There is no kind of a name.
+    """
+    for kind in kinds:
+        if kind not in KINDS:
+            raise SettingsError(f"there is no kind of world {kind!r}", expected=", ".join(KINDS))
+    return tuple(kinds) or tuple(KINDS)
+
+
 def random_world(kind: str, seed: int, outcome: str | None = None) -> World:
     """A world of a kind, the same for the same kind, seed and outcome.
 
@@ -52,8 +64,7 @@ def random_world(kind: str, seed: int, outcome: str | None = None) -> World:
     Raises:
         SettingsError: There is no such kind, or it cannot go that way.
     """
-    if kind not in KINDS:
-        raise SettingsError(f"there is no kind of world {kind!r}", expected=", ".join(KINDS))
+    known_kinds((kind,))
     chosen = KINDS[kind]
     # Seeds are shared by kinds: the name keeps them from drawing the same numbers.
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground.cues import FrameCues
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
@@ -19,9 +20,15 @@ class SegmentationTrace:
         keys: Of the K tracks that superpixels were shared among; some may have ended since.
         posterior: (count, K + 2) float32, share of background, tracks and unknown motion in each
             superpixel.
+        cues: What the frame shows of each superpixel, by which foreground is believed; None when
+            that is not done.
+        belief: (count,) float32, probability that each superpixel shows something that moves by itself; or
+            None.
     """
 
     scene: FrameMeasurements
     tracks: tuple[Track, ...]
     keys: tuple[int, ...]
     posterior: Floats
+    cues: FrameCues | None = None
+    belief: Floats | None = None

@@ -9,20 +9,28 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields, replace
-from importlib import resources
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.evaluation.figures import Progress, mean_of, silent
+from visup.evaluation.motion.code_digest import code_digest, files_digest
 from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_and_spread
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences, score_sequence
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
+from visup.evaluation.training.closed_loop import train
+from visup.evaluation.training.runner import (
+    TrainingPlan,
+    found_below,
+    gathered,
+    known_or_error,
+)
 from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.foreground.perceptron import write_model
 
 WEAK = 0.25  # J below which a sequence counts as lost
 UNSTABLE = 0.05  # most by which J may move between variants
@@ -61,6 +69,9 @@ class FoldPlan:
         against: Figures of an earlier evaluation, written with `--json`, to be compared with.
         limit: Most frames of each sequence.
         workers: Processes that share the work; as many as there are cores when None.
+        train: Whether what moves is learnt anew for each fold, from all others.
+        also: Folders of sequences that are learnt from besides, for every fold.
+        seed: Of what is learnt.
     """
 
     folds: int
@@ -70,6 +81,9 @@ class FoldPlan:
     against: Path | None = None
     limit: int | None = None
     workers: int | None = None
+    train: bool = False
+    also: Sequence[Path] = ()
+    seed: int = 0
 
 
 def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) -> dict[str, Any]:
@@ -91,24 +105,31 @@ def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) ->
         SourceError: The figures to compare with cannot be read.
     """
     before = _figures(plan.against) if plan.against else None
-    settings = [MotionSettings(), *(tried_settings(text) for text in plan.tries)]
+    changes: list[dict[str, Any]] = [{}, *(tried_changes(text) for text in plan.tries)]
     sequences = {s.name: s for s in find_sequences(folder) if s.masks}
-    ways = [(s, PLAIN) for s in settings]
-    ways += [(settings[0], v) for v in VARIANTS if plan.stability and v != PLAIN]
+    fold = dealt(sequences, plan.folds)
+    models = _learnt(sequences, fold, plan, progress) if plan.train else {}
+    ways = [(c, PLAIN) for c in changes]
+    ways += [(changes[0], v) for v in VARIANTS if plan.stability and v != PLAIN]
     trials = {
-        (name, way): Trial(sequence, *ways[way], plan.limit, plan.cache)
-        for way in range(len(ways))
+        (name, way): Trial(
+            sequence,
+            replace(MotionSettings(foreground=models.get(fold[name])), **changed),
+            variant,
+            plan.limit,
+            plan.cache,
+        )
+        for way, (changed, variant) in enumerate(ways)
         for name, sequence in sequences.items()
     }
     measured = dict(_measured(trials, plan.workers or os.cpu_count() or 1, progress))
     names = [n for n in sequences if "J" in measured[n, 0]]
     if not names:
         raise SettingsError("no sequence has masks to be scored by", where=str(folder))
-    fold = dealt(names, plan.folds)
-    tried = [{n: measured[n, k]["J"] for n in names} for k in range(len(settings))]
-    choice = chosen(tried, fold)
+    tried = [{n: measured[n, k]["J"] for n in names} for k in range(len(changes))]
+    choice = chosen(tried, {n: fold[n] for n in names})
     items = {n: {**measured[n, choice[fold[n]]], "fold": fold[n]} for n in names}
-    if len(settings) > 1 or before is not None:
+    if len(changes) > 1 or before is not None:
         left_out = {n: item["J"] for n, item in items.items()}
         for n, gain in gains(left_out, tried[0] if before is None else before).items():
             items[n]["gain"] = gain
@@ -125,13 +146,34 @@ def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) ->
     }
 
 
-def tried_settings(text: str) -> MotionSettings:
-    """Settings from text such as 'confirm_s=0.3,evidence=0.8'; the others are the defaults.
+def _learnt(
+    sequences: Mapping[str, LabelledSequence],
+    fold: Mapping[str, int],
+    plan: FoldPlan,
+    progress: Progress,
+) -> dict[int, Path]:
+    """The models of the folds, each learnt from all other folds, and what is always learnt from, as files."""
+    how = TrainingPlan(plan.cache, plan.seed)
+    common = gathered(found_below(plan.also), how, progress)
+    found = gathered(sequences, how, progress)
+    out = {}
+    for number in sorted(set(fold.values())):
+        rest = {n: examples for n, examples in found.items() if fold[n] != number}
+        examples = known_or_error(common | rest)
+        progress(f"fold {number} of {plan.folds}")
+        model = train(examples, plan.seed, progress)
+        out[number] = plan.cache / f"fold-{number}-of-{plan.folds}-seed-{plan.seed}.json"
+        write_model(model, out[number], {"sequences": sorted(examples), "seed": plan.seed})
+    return out
+
+
+def tried_changes(text: str) -> dict[str, Any]:
+    """Settings to be changed, from text such as 'confirm_s=0.3,evidence=0.8'.
 
     Raises:
         SettingsError: A setting is unknown or its value is no number.
     """
-    known = {f.name: f.type for f in fields(MotionSettings) if f.type in ("int", "float")}
+    known = {f.name: f.type for f in fields(MotionSettings) if f.type in ("bool", "int", "float")}
     given: dict[str, Any] = {}
     for part in text.split(","):
         name, _, value = (p.strip() for p in part.partition("="))
@@ -142,12 +184,12 @@ def tried_settings(text: str) -> MotionSettings:
                 expected=f"name=value with one of {', '.join(known)}",
             )
         try:
-            given[name] = int(value) if known[name] == "int" else float(value)
+            given[name] = float(value) if known[name] == "float" else int(value)
         except ValueError:
             raise SettingsError(
                 f"{value!r} is no value for {name}", where="--try", expected="a number"
             ) from None
-    return replace(MotionSettings(), **given)
+    return given
 
 
 def _figures(path: Path) -> dict[str, float]:
@@ -232,25 +274,10 @@ def _score(trial: Trial) -> dict[str, Any]:
 
 def _digest(trial: Trial) -> str:
     """What the figures of a trial follow from."""
-    digest = hashlib.sha256(_code())
+    digest = hashlib.sha256(code_digest(ROOMS))
     says = (asdict(trial.settings), trial.variant, trial.limit, trial.sequence.name)
-    digest.update(json.dumps(says).encode())
-    for file in (*_files(trial.sequence.source), *trial.sequence.masks.values()):
-        state = file.stat()
-        digest.update(f"{file.name} {state.st_size} {state.st_mtime_ns}\n".encode())
+    digest.update(json.dumps(says, default=str).encode())
+    if trial.settings.foreground is not None:
+        digest.update(trial.settings.foreground.read_bytes())
+    digest.update(files_digest(trial.sequence))
     return digest.hexdigest()
-
-
-def _files(source: Path) -> Iterable[Path]:
-    return sorted(source.iterdir()) if source.is_dir() else [source]
-
-
-def _code() -> bytes:
-    """A digest of all code and data that figures depend on."""
-    digest = hashlib.sha256()
-    package = Path(str(resources.files("visup")))
-    for room in ROOMS:
-        for file in sorted((package / room).rglob("*")):
-            if file.is_file() and file.parent.name != "__pycache__":
-                digest.update(file.read_bytes())
-    return digest.digest()

@@ -1,0 +1,163 @@
+"""The belief that superpixels show something that moves by itself, carried from frame to frame.
+
+Each frame's cues are judged twice: alone, and then in context, beside what the neighbours' cues say, what was
+believed of the place that the superpixel comes from, and whether its tone is that of what was believed to
+move or of the rest. What context is worth is learnt in the loop: from beliefs that the model itself held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.features.tone_histograms import smoothed_histogram
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground._cues_jit import neighbour_means, settled
+from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
+from visup.percepts.motion.foreground.perceptron import ForegroundModel
+
+FADING = 0.92  # weight of the tones of all frames before
+FEW = 200.0  # pixels of what moves below which its tones tell nothing
+RARE = 2e-4  # share of a tone that is assumed of either side
+NEVER = 0.003  # share of the image that counts as nothing at all
+DOUBT = 0.02  # share by which a carried belief is never quite sure
+FIRST = 0.1  # belief where there was no frame before
+MOST_OF = 50  # the log odds of one cell in so many are above those called the most of the frame
+ALONE_NEAR, PAST = len(NAMES) + 1, len(NAMES) + 4  # columns of the cues in context
+TEXTURE = NAMES.index("texture")
+CALM = 8.0  # texture, grey levels a pixel, at which a flow is half trusted
+TRUST = 1.0  # weight of a value that is fully trusted, beside affinities
+SWEEPS = 8
+SURE = 12.0  # log odds beyond which nothing is told apart
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """What is believed after a frame.
+
+    Attributes:
+        share: (count,) float32, probability that each superpixel shows something that moves by itself.
+        alone: (count,) float32, the same by the cues of each superpixel alone.
+        moving: (BINS ** 3,) float64, tones of what moves; older frames fade.
+        rest: (BINS ** 3,) float64, tones of all else.
+    """
+
+    share: Floats
+    alone: Floats
+    moving: NDArray[np.float64]
+    rest: NDArray[np.float64]
+
+
+def unbiased() -> Belief:
+    """Before the first frame."""
+    none = np.zeros(BINS**3)
+    nowhere = np.zeros(0, np.float32)
+    return Belief(nowhere, nowhere, none, none)
+
+
+def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
+    """The belief after a frame.
+
+    Args:
+        belief: After the frame before, whose cells are those that `cues` come from.
+        cues: Of the frame.
+        model: What was learnt.
+    """
+    alone = model.alone.log_odds(cues.values)
+    context = context_cues(belief, cues, alone)
+    return believed(belief, cues, alone, model.context.log_odds(context))
+
+
+def believed(belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats) -> Belief:
+    """The belief when a frame's superpixels have these log odds alone and in context, (count,) each."""
+    share = _share(log_odds)
+    pixels = cues.area.astype(np.float64)
+    return Belief(
+        share.astype(np.float32),
+        _share(alone).astype(np.float32),
+        FADING * belief.moving + np.bincount(cues.tone, share * pixels, BINS**3),
+        FADING * belief.rest + np.bincount(cues.tone, (1 - share) * pixels, BINS**3),
+    )
+
+
+def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
+    """The cues of a frame with those that need more than one superpixel, (count, D + 14) float32.
+
+    Args:
+        belief: After the frame before.
+        cues: Of the frame.
+        alone: (count,) float32, log odds by the cues of each superpixel alone.
+    """
+    before, seen = _carried(belief, cues)
+    tones = _tone_odds(belief, cues.tone)
+    past = np.log((before + DOUBT) / (np.maximum(seen - before, 0) + DOUBT + 0.3 * (seen < 0.5)))
+    near = _near(cues, np.column_stack([alone, past, tones]))
+    even = _settled(cues, np.column_stack([alone, past]))
+    next_ = _near(cues, near[:, :1])
+    far = _near(cues, _near(cues, next_))
+    share = _share(alone)
+    most = np.partition(alone, -max(len(alone) // MOST_OF, 1))[-max(len(alone) // MOST_OF, 1)]
+    said = _extent(before, cues.area), _extent(share, cues.area), most
+    whole = [np.full(len(alone), value) for value in said]
+    columns = [
+        cues.values,
+        alone,
+        *(near[:, 0], next_[:, 0], far[:, 0]),
+        *(past, near[:, 1]),
+        *(tones, near[:, 2]),
+        *even.T,
+        *whole,
+        seen,
+    ]
+    return np.column_stack(columns).astype(np.float32)
+
+
+def _share(log_odds: Floats) -> NDArray[Any]:
+    return 1 / (1 + np.exp(-np.clip(log_odds, -SURE, SURE)))
+
+
+def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:
+    """The share believed of each cell by where it comes from, and how much of it was in view, (count,)."""
+    count = len(cues.area)
+    if not len(cues.here):
+        return np.full(count, FIRST, np.float32), np.zeros(count, np.float32)
+    known = np.column_stack([belief.share, np.ones_like(belief.share)])
+    before, seen = cues.carried(known).T
+    return before, seen
+
+
+def _tone_odds(belief: Belief, tone: NDArray[np.int64]) -> Floats:
+    """Log odds of each cell's tone to be of what moves, (count,) float32; 0 while little of it is known."""
+    moving, rest = belief.moving.sum(), belief.rest.sum()
+    if moving < FEW or rest < FEW:
+        return np.zeros(len(tone), np.float32)
+    ours = smoothed_histogram(belief.moving)[tone] / moving + RARE
+    other = smoothed_histogram(belief.rest)[tone] / rest + RARE
+    return np.asarray(np.log(ours / other), dtype=np.float32)
+
+
+def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
+    """Values (count, K) after superpixels without texture, whose flow is a guess, took on others'."""
+    texture = np.expm1(cues.values[:, TEXTURE : TEXTURE + 1])
+    trust = np.broadcast_to(TRUST * texture / (texture + CALM), values.shape)
+    return settled(
+        cues.ends,
+        cues.neighbours,
+        cues.affinity,
+        np.ascontiguousarray(values, dtype=np.float32),
+        np.ascontiguousarray(trust, dtype=np.float32),
+        SWEEPS,
+    )
+
+
+def _near(cues: FrameCues, values: Floats) -> Floats:
+    some = np.ascontiguousarray(values, dtype=np.float32)
+    return neighbour_means(cues.ends, cues.neighbours, cues.affinity, some)
+
+
+def _extent(share: NDArray[Any], area: Floats) -> float:
+    """Logarithm of the share of the image that is believed to move."""
+    return float(np.log(NEVER + float(share @ area) / float(area.sum())))

@@ -1,0 +1,235 @@
+"""Cues: what one frame shows of each superpixel that tells things that move by themselves from the rest.
+
+None decides anything. Each is a number for each superpixel, mostly in units of what the frame itself shows
+(its median residual, the residuals along its border), so that a calm view and a wild ride are told by the
+same numbers; what they mean together is learnt (`perceptron.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.features.superpixels import Superpixels
+from visup.percepts.motion.features.work_image import Floats, WorkImage
+from visup.percepts.motion.foreground._cues_jit import (
+    Labels,
+    carried,
+    flow_links,
+    flow_statistics,
+    inside_share,
+    warp_errors,
+)
+from visup.percepts.motion.layers.background_motion import BackgroundMotion
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
+
+NAMES = (
+    *("residual", "residual_by_ground", "residual_by_median", "residual_by_most"),
+    *("residual_by_border", "rank_in_border", "misfit_ground", "misfit_flow"),
+    *("texture", "flow_steepness", "inside", "way", "straightness", "border_distance"),
+    *("median_residual", "most_residual", "ground_speed", "ground_scale", "wide_motion"),
+    *("track", "candidate"),
+)
+"""What the columns of the cues are, in order."""
+
+FRAME = 1 / 12  # share of the height of the image that its border is taken to be wide
+REACH = 0.5  # distance to the border, share of the image, beyond which it tells no more
+LASTING = 0.8  # weight of the way that came to a cell in the frame before
+EDGES = (0.3, 0.5, 0.7)  # strengths of a step of the flow from which it is an edge
+BINS = 16  # of each tone channel, for appearance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameCues:
+    """What one frame shows of its superpixels.
+
+    Attributes:
+        values: (count, len(NAMES)) float32.
+        area: (count,) float32 pixels.
+        tone: (count,) int64, bin of the mean tone of each cell among BINS ** 3.
+        ends: CSR of neighbours: (count + 1,) int32,
+        neighbours: (M,) int32,
+        affinity: and (M,) float32.
+        here: (L,) int32, cells of this frame,
+        there: (L,) int32, and the cells of the frame before that they come from.
+        looked: (count,) float32, pixels of each cell of which it was asked where they come from.
+    """
+
+    values: Floats
+    area: Floats
+    tone: NDArray[np.int64]
+    ends: Labels
+    neighbours: Labels
+    affinity: Floats
+    here: Labels
+    there: Labels
+    looked: Floats
+
+    def carried(self, values: Floats) -> Floats:
+        """Values (count before, K) of the cells before, as they come to those of this frame."""
+        return carried(self.here, self.there, np.ascontiguousarray(values), self.looked)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CueMemory:
+    """What cues remember of the frame before.
+
+    Attributes:
+        labels: (h, w) int32, its cells.
+        way: (count, 3) float32: sum of residuals along x and y, and of their lengths, in medians; older ones
+            fade.
+    """
+
+    labels: Labels
+    way: Floats
+
+
+def track_shares(posterior: Floats, confirmed: NDArray[np.bool_]) -> Floats:
+    """How far each cell belongs to tracks that are reported, and to candidates, (count, 2) float32.
+
+    Args:
+        posterior: (count, K + 2), of background, K tracks and unknown motion.
+        confirmed: (K,) which tracks are reported.
+    """
+    tracks = posterior[:, 1:-1]
+    known = tracks[:, confirmed].sum(axis=1)
+    return np.stack([known, tracks.sum(axis=1) - known], axis=1).astype(np.float32)
+
+
+def frame_cues(
+    scene: FrameMeasurements,
+    flow: Floats,
+    old: WorkImage,
+    shares: Floats,
+    memory: CueMemory | None,
+) -> tuple[FrameCues, CueMemory]:
+    """The cues of a frame.
+
+    Args:
+        scene: The frame as measured.
+        flow: (h, w, 2) float32, from the newest image back to the one before.
+        old: The image before.
+        shares: (count, 2) float32, by `track_shares`.
+        memory: Of the frame before; None when there is none of the same size.
+
+    Returns:
+        The cues, and what is to be remembered.
+    """
+    cells, image = scene.cells, scene.image
+    labels = cells.labels
+    found = flow_statistics(labels, flow, image.gx, image.gy, cells.count)
+    background = scene.measured[0].background
+    ground, residual = _residuals(cells, found[:, :2], background)
+    misfit = warp_errors(labels, (image.grey, old.grey), (image.gx, image.gy), flow, ground)
+    before = labels if memory is None else memory.labels
+    here, there = flow_links(before, labels, flow)
+    looked = np.ascontiguousarray(found[:, 4])
+    length = np.hypot(residual[:, 0], residual[:, 1])
+    median = float(np.median(length)) + 0.1
+    step = np.column_stack([residual, length]) / np.float32(median)
+    if memory is not None:
+        step = step + LASTING * carried(here, there, memory.way, looked)
+    way = np.ascontiguousarray(step, dtype=np.float32)
+    inside = _inside(flow, labels, median, looked)
+    columns = [
+        *_residual_cues(cells, length, np.hypot(*ground.T), median),
+        *np.log(0.2 + misfit.T),
+        np.log1p(found[:, 3]),
+        np.log(0.05 + found[:, 2] / median),
+        inside,
+        np.log(0.5 + np.hypot(way[:, 0], way[:, 1])),
+        np.hypot(way[:, 0], way[:, 1]) / (way[:, 2] + 0.5),
+        _border_distance(cells),
+        *_frame_cues(length, np.hypot(*ground.T), median, background.scale),
+        *shares.T,
+    ]
+    values = np.column_stack(columns).astype(np.float32)
+    link = cells.link
+    cues = FrameCues(
+        values,
+        cells.area,
+        tone_bins(cells.tone),
+        link.indptr,
+        link.indices,
+        link.data,
+        here if memory is not None else here[:0],
+        there if memory is not None else there[:0],
+        looked,
+    )
+    return cues, CueMemory(labels, way)
+
+
+def tone_bins(tone: Floats) -> NDArray[np.int64]:
+    """Bins (count,) of mean tones (count, 3) from 0 to 255, each channel in BINS parts."""
+    part = np.minimum((tone / (256 / BINS)).astype(np.int64), BINS - 1)
+    return np.asarray((part[:, 0] * BINS + part[:, 1]) * BINS + part[:, 2])
+
+
+def _residuals(
+    cells: Superpixels, flow: Floats, background: BackgroundMotion
+) -> tuple[Floats, Floats]:
+    """Displacement of the nearest background motion at each cell, and what flow has beside it, (count, 2)."""
+    moved = np.stack([model.at(cells.centre) for model in background.models])
+    residual = -flow[None] - moved
+    nearest = np.hypot(residual[..., 0], residual[..., 1]).argmin(axis=0)
+    which = np.arange(cells.count)
+    return (
+        np.ascontiguousarray(moved[nearest, which], dtype=np.float32),
+        np.asarray(residual[nearest, which], dtype=np.float32),
+    )
+
+
+def _residual_cues(
+    cells: Superpixels, length: Floats, ground: Floats, median: float
+) -> tuple[NDArray[Any], ...]:
+    """Lengths of residuals beside the ground's motion, the frame's residuals, and those of its border."""
+    height, width = cells.labels.shape
+    wide = FRAME * height
+    x, y = cells.centre.T
+    at_border = (x < wide) | (y < wide) | (x > width - wide) | (y > height - wide)
+    border = np.sort(length[at_border]) if at_border.any() else length[:1]
+    most = float(np.percentile(length, 98))
+    return (
+        np.log(0.1 + length),
+        np.log(0.05 + length / (0.5 + ground)),
+        np.log(0.2 + length / median),
+        length / (most + 0.3),
+        np.log(0.2 + length / (float(np.median(border)) + 0.1)),
+        np.searchsorted(border, length) / len(border),
+    )
+
+
+def _frame_cues(length: Floats, ground: Floats, median: float, scale: float) -> tuple[Floats, ...]:
+    """What is said of the frame as a whole, the same in each cell: how calm it is, how well explained."""
+    most = float(np.percentile(length, 98))
+    wide = float(np.mean(length > 0.5 * most))
+    speed = float(np.median(ground))
+    said = np.log(median), np.log(most / median + 0.1), np.log(0.1 + speed), scale, wide
+    return tuple(np.full(len(length), value, dtype=np.float32) for value in said)
+
+
+def _border_distance(cells: Superpixels) -> Floats:
+    """Distance of each cell to the border of the image, as a share of its width or height, (count,)."""
+    height, width = cells.labels.shape
+    x, y = cells.centre[:, 0] / width, cells.centre[:, 1] / height
+    nearest = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
+    return np.asarray(np.minimum(nearest, REACH), dtype=np.float32)
+
+
+def _inside(flow: Floats, labels: Labels, median: float, looked: Floats) -> Floats:
+    """How far each cell is enclosed by steps of the flow, (count,) 0 to 1."""
+    coarse = flow[::4, ::4]
+    right, down = (
+        np.diff(coarse, axis=1, append=coarse[:, -1:]),
+        np.diff(coarse, axis=0, append=coarse[-1:]),
+    )
+    steep = np.sqrt((right**2 + down**2).sum(axis=-1)) / 4
+    strength = 1 - np.exp(-0.7 * steep / (0.5 * median + 0.02))
+    share = np.mean([inside_share(strength > least) for least in EDGES], axis=0)
+    some = labels[::2, ::2]
+    full = share.repeat(2, axis=0).repeat(2, axis=1)[: some.shape[0], : some.shape[1]]
+    total = np.bincount(some.ravel(), full.ravel(), len(looked))
+    return np.asarray(total / np.maximum(looked, 1), dtype=np.float32)

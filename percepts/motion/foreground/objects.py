@@ -1,0 +1,310 @@
+"""From the belief to objects: whose each superpixel is that is believed to move, under lasting ids.
+
+The belief says what moves, tracks say what moves apart. A cell goes to the track that has it, else to the
+object that had the place it comes from, else to the nearest object that it hangs together with; what hangs
+together with none is a candidate, and an object once it has lasted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.superpixels import Superpixels
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground.belief import Belief
+from visup.percepts.motion.foreground.cues import NAMES, FrameCues
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+
+Keys = NDArray[np.int64]
+MOVES = 0.5  # belief from which a cell is part of an object
+CAME = 0.4  # share of a cell that comes from an object for it to be that object's still
+OWNED = 0.5  # share of a new track that is an object's already: then it is a part of that one
+EXISTS = 0.7  # running mean of the belief in what is reported: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
+EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # the same for what no track follows: both beliefs
+LEAST_PX = 0.25  # beside the ground, from frame to frame: twice what sampling and compression leave
+RESIDUAL = NAMES.index("residual")
+FOLLOW = 0.4  # weight of the newest frame in it
+LASTS = 3  # frames for which a candidate is seen before it is an object
+NEAR = 12  # steps from cell to cell over which an object is hung together with
+MISSED_S = 0.5  # seconds after which an object that is not seen is forgotten
+
+
+@dataclass(frozen=True, slots=True)
+class MovingObject:
+    """One object of the foreground.
+
+    Attributes:
+        key: Its number here, from 1.
+        id: Public number; 0 for a candidate.
+        track: Public id of the track that follows it, seen or not; 0 when there is none.
+        frames: In how many frames it was seen.
+        last_seen: Seconds.
+        existence: Running mean of the belief in its superpixels.
+        borne_out: The same by the cues of superpixels alone.
+        followed: Whether a track ever followed it.
+    """
+
+    key: int
+    id: int
+    track: int
+    frames: int
+    last_seen: float
+    existence: float = 0.0
+    borne_out: float = 0.0
+    followed: bool = False
+
+    @property
+    def exists(self) -> bool:
+        """Whether it is to be reported: when a track bears it out, else when it is surely there.
+
+        Context may carry an object on, but not begin one: what looks like a mover and lies where one was
+        believed bears itself out for ever.
+        """
+        if self.followed:
+            return self.existence >= EXISTS
+        return self.existence >= EXISTS_ALONE and self.borne_out >= BORNE_OUT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForegroundObjects:
+    """The objects after a frame.
+
+    Attributes:
+        owner: (count,) int64, key of the object that has each superpixel, or 0.
+        known: The objects by key.
+        last_key: The greatest key given so far.
+    """
+
+    owner: Keys
+    known: Mapping[int, MovingObject]
+    last_key: int
+
+    def reported(self, now: float) -> list[MovingObject]:
+        """Those that have a public id, are believed in and seen at a time, seconds, by id."""
+        known = [o for o in self.known.values() if o.id and o.exists]
+        seen = [o for o in known if o.last_seen == now]
+        return sorted(seen, key=lambda o: o.id)
+
+    def id_of_track(self, track: int) -> int:
+        """The public id of the object that a track follows; the track's own where there is none."""
+        owners = (o.id for o in self.known.values() if track > 0 and o.track == track)
+        return next(owners, track)
+
+
+def no_objects() -> ForegroundObjects:
+    """Before the first frame."""
+    return ForegroundObjects(np.zeros(0, np.int64), MappingProxyType({}), 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackCells:
+    """The reported tracks, and which cells those have that are seen in a frame.
+
+    Attributes:
+        seen: Public ids of K of them.
+        alive: Public ids of all that live, hidden ones too.
+        winner: (count,) int64, place among those seen, from 1, of the track that has each cell, or 0.
+    """
+
+    seen: Sequence[int]
+    alive: Collection[int]
+    winner: Keys
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Admission:
+    """What is asked of an object.
+
+    Attributes:
+        least: Its least area, working pixels.
+        ids: Gives its public id.
+    """
+
+    least: float
+    ids: IdAllocator
+
+
+def follow_objects(
+    before: ForegroundObjects,
+    cues: FrameCues,
+    belief: Belief,
+    tracks: TrackCells,
+    now: float,
+    admission: Admission,
+) -> ForegroundObjects:
+    """The objects of a frame.
+
+    Args:
+        before: After the frame before, whose cells are those that `cues` come from.
+        cues: Of the frame.
+        belief: What is believed of its superpixels.
+        tracks: Those that are reported and seen.
+        now: Seconds.
+        admission: What an object must be, and who names it.
+    """
+    moves = belief.share > MOVES
+    came = _came_from(before, cues)
+    known, last_key = _with_tracks(before, tracks, came, cues.area)
+    key_of = {o.track: o.key for o in known.values() if o.track}
+    own = np.array([0, *(key_of[i] for i in tracks.seen)], dtype=np.int64)[tracks.winner]
+    owner = np.where(moves, np.where(own > 0, own, came), 0)
+    owner = _spread(owner, moves, cues)
+    owner, fresh = _candidates(owner, moves, cues, admission.least, last_key)
+    last_key += len(fresh)
+    known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
+    objects = ForegroundObjects(owner, known, last_key)
+    # What goes no further than sampling leaves from frame to frame does not bear itself out.
+    moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
+    belief = replace(belief, alone=belief.alone * moved)
+    return _seen(objects, belief, cues.area, now, admission)
+
+
+def object_share(objects: ForegroundObjects, key: int, share: Floats) -> Floats:
+    """(count,) float32: the belief where an object has the cells, less than a half elsewhere."""
+    mine = objects.owner == key
+    taken = (objects.owner > 0) & ~mine
+    return np.where(mine, share, np.where(taken, 0, np.minimum(share, 0.49))).astype(np.float32)
+
+
+def object_velocity(
+    objects: ForegroundObjects, key: int, flow: Floats, cells: Superpixels, seconds: float
+) -> tuple[float, float, float]:
+    """Median velocity of an object's cells and its standard error, (vx, vy, sigma), working pixels a second.
+
+    Args:
+        objects: After the frame.
+        key: Which of them.
+        flow: (h, w, 2) float32, from the newest image back to the one before.
+        cells: The superpixels.
+        seconds: Between the two.
+    """
+    x, y = cells.centre[objects.owner == key].astype(np.int64).T
+    moved = -flow[y, x] / max(seconds, 1e-6)
+    middle = np.median(moved, axis=0)
+    off = float(np.median(np.abs(moved - middle))) / np.sqrt(max(len(moved), 1))
+    return float(middle[0]), float(middle[1]), 1.5 * off + 0.1
+
+
+def _came_from(before: ForegroundObjects, cues: FrameCues) -> Keys:
+    """(count,) the object before that most of each cell comes from, or 0."""
+    keys = np.unique(before.owner[before.owner > 0])
+    count = len(cues.area)
+    if not len(keys) or not len(cues.here):
+        return np.zeros(count, np.int64)
+    shares = cues.carried((before.owner[:, None] == keys).astype(np.float32))
+    return np.where(shares.max(axis=1) > CAME, keys[shares.argmax(axis=1)], 0)
+
+
+def _with_tracks(
+    before: ForegroundObjects, tracks: TrackCells, came: Keys, area: Floats
+) -> tuple[dict[int, MovingObject], int]:
+    """The objects with those of new tracks: an object's that has no track, where it had most of the cells."""
+    known = {
+        k: o if o.track in tracks.alive else replace(o, track=0) for k, o in before.known.items()
+    }
+    last_key = before.last_key
+    followed = {o.track for o in known.values()}
+    for place, track in enumerate(tracks.seen, 1):
+        if track in followed:
+            continue
+        mine = tracks.winner == place
+        o = known.get(_host(came[mine], area[mine]))
+        if o is None or o.track:
+            last_key += 1
+            o = MovingObject(last_key, track, 0, 0, -math.inf)
+        known[o.key] = replace(o, id=o.id or track, track=track, followed=True)
+    return known, last_key
+
+
+def _host(came: Keys, area: Floats) -> int:
+    """The object that most of some cells were a part of, or 0."""
+    if not len(came):
+        return 0
+    sums = np.bincount(came, area)
+    most = int(sums[1:].argmax()) + 1 if len(sums) > 1 else 0
+    return most if most and sums[most] > OWNED * area.sum() else 0
+
+
+def _spread(owner: Keys, moves: NDArray[np.bool_], cues: FrameCues) -> Keys:
+    """Owners after cells that move and have none took that of the nearest that they hang together with."""
+    rows = np.repeat(np.arange(len(owner)), np.diff(cues.ends))
+    columns = cues.neighbours
+    inside = moves[rows] & moves[columns]
+    rows, columns, weight = rows[inside], columns[inside], cues.affinity[inside]
+    # The strongest link is written last, so that it stays.
+    order = np.argsort(weight, kind="stable")
+    rows, columns = rows[order], columns[order]
+    for _ in range(NEAR):
+        gives = (owner[rows] == 0) & (owner[columns] > 0)
+        if not gives.any():
+            break
+        owner = owner.copy()
+        owner[rows[gives]] = owner[columns[gives]]
+    return owner
+
+
+def _candidates(
+    owner: Keys,
+    moves: NDArray[np.bool_],
+    cues: FrameCues,
+    least: float,
+    last_key: int,
+) -> tuple[Keys, list[int]]:
+    """Owners with a new key for each large enough group of cells that move and have none, and those keys."""
+    free = np.flatnonzero(moves & (owner == 0))
+    if not len(free):
+        return owner, []
+    count = len(owner)
+    link = sparse.csr_matrix((cues.affinity, cues.neighbours, cues.ends), shape=(count, count))
+    groups, group = connected_components(link[free][:, free], directed=False)
+    area = np.bincount(group, cues.area[free], groups)
+    good = area >= least
+    keys = np.where(good, last_key + np.cumsum(good), 0)
+    out = owner.copy()
+    out[free] = keys[group]
+    return out, [int(k) for k in keys[good]]
+
+
+def _seen(
+    objects: ForegroundObjects,
+    belief: Belief,
+    area: Floats,
+    now: float,
+    admission: Admission,
+) -> ForegroundObjects:
+    """The objects with what is seen of them; candidates that lasted confirmed, what is gone forgotten."""
+    pixels = np.bincount(objects.owner, area, objects.last_key + 1)
+    beliefs, alone = (
+        np.bincount(objects.owner, area * share, objects.last_key + 1)
+        for share in (belief.share, belief.alone)
+    )
+    known = {}
+    for k, o in objects.known.items():
+        if pixels[k] < admission.least:
+            if o.track or now - o.last_seen <= (MISSED_S if o.id else 0):
+                known[k] = o
+            continue
+        weight = FOLLOW if o.frames else 1.0
+        o = replace(
+            o,
+            frames=o.frames + 1,
+            last_seen=now,
+            existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
+            borne_out=o.borne_out + weight * (float(alone[k] / pixels[k]) - o.borne_out),
+        )
+        known[k] = (
+            replace(o, id=admission.ids.new()) if not o.id and o.frames >= LASTS and o.exists else o
+        )
+    held = np.zeros(objects.last_key + 1, dtype=bool)
+    held[list(known)] = True
+    owner = np.where(held[objects.owner], objects.owner, 0)
+    return ForegroundObjects(owner, MappingProxyType(known), objects.last_key)

@@ -1,0 +1,128 @@
+"""A trained function from cues to log odds: a perceptron with one hidden layer."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import SourceError
+from visup.percepts.motion.features.work_image import Floats
+
+FORMAT = 1
+FAR = 4.0  # standard deviations beyond which a cue tells no more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Perceptron:
+    """Log odds from cues: w . tanh(W z + b) + c, with z the cues in standard deviations from their mean.
+
+    Attributes:
+        mean: (D,) float32 of each cue.
+        deviation: (D,) float32 of each cue, above 0.
+        hidden: (D, H) float32.
+        offset: (H,) float32.
+        out: (H,) float32.
+        bias: Log odds where all hidden units say nothing.
+    """
+
+    mean: Floats
+    deviation: Floats
+    hidden: Floats
+    offset: Floats
+    out: Floats
+    bias: float
+
+    def log_odds(self, cues: Floats) -> Floats:
+        """Of (N, D) cues, (N,) float32."""
+        z = np.clip((cues - self.mean) / self.deviation, -FAR, FAR)
+        return np.asarray(np.tanh(z @ self.hidden + self.offset) @ self.out + np.float32(self.bias))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForegroundModel:
+    """What was learnt.
+
+    Attributes:
+        alone: From the cues of a superpixel alone.
+        context: From the same and what its neighbours, the past and appearance say.
+    """
+
+    alone: Perceptron
+    context: Perceptron
+
+
+def write_model(model: ForegroundModel, path: Path, made: Mapping[str, Any]) -> None:
+    """Write a model, with what it was made of; the same model gives the same bytes."""
+    record = {
+        "format": FORMAT,
+        "made": made,
+        "alone": _told(model.alone),
+        "context": _told(model.context),
+    }
+    path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def read_model(path: Path) -> ForegroundModel:
+    """Read a model.
+
+    Raises:
+        SourceError: The file cannot be read, or is none.
+    """
+    try:
+        return _model(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, KeyError, TypeError) as fault:
+        raise SourceError(
+            "this is no model of moving foreground",
+            where=str(path),
+            expected="a file that 'visup train motion' wrote",
+        ) from fault
+
+
+@cache
+def shipped_model() -> ForegroundModel:
+    """The model that ships."""
+    file = resources.files("visup.percepts.motion.foreground") / "foreground.json"
+    return _model(file.read_text(encoding="utf-8"))
+
+
+def _model(text: str) -> ForegroundModel:
+    record = json.loads(text)
+    if record["format"] != FORMAT:
+        raise ValueError(record["format"])
+    return ForegroundModel(_perceptron(record["alone"]), _perceptron(record["context"]))
+
+
+def _told(p: Perceptron) -> dict[str, Any]:
+    """As JSON; five digits are more than training knows."""
+
+    def digits(values: NDArray[Any]) -> Any:
+        return np.vectorize(lambda v: float(f"{v:.5g}"))(np.asarray(values, dtype=float)).tolist()
+
+    return {
+        "mean": digits(p.mean),
+        "deviation": digits(p.deviation),
+        "hidden": digits(p.hidden),
+        "offset": digits(p.offset),
+        "out": digits(p.out),
+        "bias": float(f"{p.bias:.5g}"),
+    }
+
+
+def _perceptron(told: Mapping[str, Any]) -> Perceptron:
+    names = ("mean", "deviation", "hidden", "offset", "out")
+    mean, deviation, hidden, offset, out = (np.asarray(told[n], dtype=np.float32) for n in names)
+    if (
+        hidden.shape != (len(mean), len(out))
+        or len(offset) != len(out)
+        or not (deviation > 0).all()
+    ):
+        raise ValueError("shapes do not fit")
+    return Perceptron(mean, deviation, hidden, offset, out, float(told["bias"]))

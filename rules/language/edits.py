@@ -1,0 +1,148 @@
+"""What may be meant where no usual slip is known: small edits next to a fault, each to be tried.
+
+Nothing here knows a language: words are put in, replaced and left out, nearest to the fault first, and
+whoever asks tries each of them (local error repair after Burke and Fisher 1987).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+TOKEN = re.compile(r"::=|<[^<>\n]*>|\"[^\"\n]*\"|\w+(?:\.\d+)?|[<>=!]=|\S")
+NEAR = 3
+"""Words to either side of a fault that are looked at."""
+WITHIN = (", 2 s", ", 20 px", ", b")
+BEHIND_CALL = (" > 0", " < 5 px", " < 5 s", ")")
+BEHIND_WORD = ("()", ")")
+BETWEEN = (")", "(", ",", ">", "<", ":")
+UNITS = ("s", "px", "px/s", "%", "samples")
+ALIKE = 0.7
+JOINTS = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """A change of a text.
+
+    Attributes:
+        begin: Offset of what is replaced.
+        end: Offset of its end; the same where something is put in.
+        new: What stands there instead.
+        old: What stood there.
+    """
+
+    begin: int
+    end: int
+    new: str
+    old: str = ""
+
+    def applied(self, text: str) -> str:
+        """The text with the change."""
+        return text[: self.begin] + self.new + text[self.end :]
+
+    def hint(self, text: str) -> str:
+        """What to do, in words."""
+        old, new = " ".join(text[self.begin : self.end].split()), " ".join(self.new.split())
+        if not old:
+            return f"put `{new}` here"
+        return f"write `{new}` in place of `{old}`" if new else f"leave `{old}` out"
+
+
+def edits(
+    line: str, begin: int, length: int, words: Sequence[str], *, unread: bool = True
+) -> Iterator[Repair]:
+    """Edits of a line, those that keep most of it first.
+
+    Args:
+        line: The line of the fault.
+        begin: Where the fault begins in it.
+        length: How long it is.
+        words: What may be meant by a word that is not known.
+        unread: Whether the line cannot be read, so that a sign may be missing.
+    """
+    end = min(len(line), begin + max(1, length))
+    tokens = [(m.start(), m.end(), m[0]) for m in TOKEN.finditer(line)]
+    # Words are left out whole.
+    end = max([end, *(stop for start, stop, _ in tokens if start < end <= stop)])
+    yield from (Repair(at, at, new) for at, new in _put_in(line, begin, end))
+    tokens.sort(key=lambda t: _away(t, begin, end))
+    near = tokens[: 2 * NEAR + 1]
+    for _, stop, word in tokens:
+        if word[:1].isdigit() and begin <= stop <= end:
+            yield from (Repair(stop, stop, f" {unit}") for unit in UNITS)
+    for start, stop, word in near:
+        if word.isidentifier() and word not in words:
+            yield from (Repair(start, stop, meant) for meant in _ranked(word, words))
+    for start, _, _ in near if unread else ():
+        yield from (Repair(start, start, f"{new} ") for new in BETWEEN)
+    yield from (Repair(start, stop, "") for start, stop, _ in near)
+    yield from _left_out(line, begin, end, near)
+
+
+def _ranked(word: str, words: Sequence[str]) -> list[str]:
+    """What may be meant by a word: what is spelt alike."""
+    return get_close_matches(word, words, n=5, cutoff=ALIKE) if len(word) > 2 else []
+
+
+def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
+    if line[begin:end].endswith(")"):
+        yield from ((end - 1, new) for new in WITHIN)
+        yield from ((end, new) for new in BEHIND_CALL)
+    elif line[begin:end].isidentifier():
+        yield from ((end, new) for new in BEHIND_WORD)
+
+
+def _left_out(
+    line: str, begin: int, end: int, near: Iterable[tuple[int, int, str]]
+) -> Iterator[Repair]:
+    """The fault with what joins it to the rest, then all from a word near it to the end of the line."""
+    joints = "|".join(rf"\b{j}\b" if j.isalpha() else re.escape(j) for j in JOINTS)
+    before = re.search(rf"(?:{joints})\s*$", line[:begin])
+    after = re.compile(rf"\s*(?:{joints})\s*").match(line, end)
+    if before is not None:
+        yield Repair(before.start(), end, "")
+    if after is not None:
+        yield Repair(begin, after.end(), "")
+    yield Repair(begin, end, "")
+    yield from _clause(line, begin, end, joints)
+    last = len(line.rstrip())
+    for start, _, _ in sorted(near, key=lambda t: -t[0]):
+        if start < last:
+            yield Repair(start, last, "")
+
+
+def _clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
+    """All that stands between the joints to either side of a fault, with one of them."""
+    before = list(re.finditer(joints, line[:begin]))
+    after = re.compile(joints).search(line, end)
+    start = before[-1].start() if before else None
+    if start is not None:
+        yield Repair(start, after.start() if after else len(line.rstrip()), "")
+    if after is not None:
+        yield Repair(before[-1].end() + 1 if before else begin, after.end() + 1, "")
+
+
+def _away(token: tuple[int, int, str], begin: int, end: int) -> int:
+    """How far a word lies from the fault; 0 within it."""
+    start, stop, _ = token
+    return max(0, start - end + 1, begin - stop + 1)
+
+
+def hint_of(line: str, repair: Repair) -> str | None:
+    """A change in the words that `fix_of` understands; None where there is nothing to hold on to."""
+    old, new = line[repair.begin : repair.end], repair.new
+    if not old.strip():
+        tokens = [m for m in TOKEN.finditer(line) if m.end() <= repair.begin]
+        if not tokens:
+            return None
+        word = tokens[-1][0]
+        gap = " " if new[:1].isalnum() or new[:1] == " " else ""
+        return f"write `{word}{gap}{new.strip()}` in place of `{word}`"
+    if not new.strip() and old.isprintable():
+        return f"leave `{' '.join(old.split())}` out"
+    if not old.isprintable():
+        return None
+    return f"write `{new.strip()}` in place of `{' '.join(old.split())}`"

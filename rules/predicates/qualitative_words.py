@@ -1,0 +1,135 @@
+"""Allen's relations along an axis of the image, and TPCC of three objects, asked for by their names.
+
+They look at the boxes and centres of this moment alone, without memory: edges nearer than `LEVEL` are
+level, and what lies within `STRAIGHT_DEG` of straight ahead, back or aside is straight. So they may flicker
+at a limit; `for` and `in 3 of 5 samples` steady them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Presence
+from visup.rules.calculi.allen import NAMES as ALLEN_NAMES
+from visup.rules.formula.truth import MAYBE, NO, YES
+from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates.snapshot import Codes, Floats, Snapshot
+
+LEVEL = 0.0025
+"""Image diagonals; the middle of the two limits between which RCC-8 of boxes keeps its state."""
+STRAIGHT_DEG = 5.0
+ALLEN_RELATIONS = tuple(ALLEN_NAMES.values())
+TPCC_RELATIONS = (
+    *(f"{near}{way}" for near in "cd" for way in (
+        "sf", "fl", "lf", "sl", "lb", "bl", "sb", "br", "rb", "sr", "rf", "fr")),
+    "sam",
+)  # fmt: skip
+"""Closer than the relatum is to the origin (`c`) or not (`d`), then where: `lf` is left, rather front."""
+
+_SIGNS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
+    {
+        "before": (-1, -1, -1, -1),
+        "meets": (-1, -1, 0, -1),
+        "overlaps": (-1, -1, 1, -1),
+        "finished_by": (-1, 0, 1, -1),
+        "contains": (-1, 1, 1, -1),
+        "starts": (0, -1, 1, -1),
+        "equal": (0, 0, 1, -1),
+        "started_by": (0, 1, 1, -1),
+        "during": (1, -1, 1, -1),
+        "finishes": (1, 0, 1, -1),
+        "overlapped_by": (1, 1, 1, -1),
+        "met_by": (1, 1, 1, 0),
+        "after": (1, 1, 1, 1),
+    }
+)
+"""Signs of begin - begin, end - end, end of a - begin of b, begin of a - end of b."""
+
+Look = Callable[[Snapshot, str], Codes]
+
+
+def along(axis: int) -> Look:
+    """Whether boxes stand in one of Allen's relations along an axis: 0 to the right, 1 down."""
+
+    def look(facts: Snapshot, relation: str) -> Codes:
+        begin, end = _spans(facts, axis)
+        level = LEVEL * image_diagonal(facts.mind.frame_size)
+        differences = (
+            begin[:, None] - begin,
+            end[:, None] - end,
+            end[:, None] - begin,
+            begin[:, None] - end,
+        )
+        held = np.ones((len(begin), len(begin)), bool)
+        for difference, wanted in zip(differences, _SIGNS[relation], strict=True):
+            held &= _sign(difference, level) == wanted
+        return _codes(held, np.isnan(differences[0]))
+
+    return look
+
+
+def _spans(facts: Snapshot, axis: int) -> tuple[Floats, Floats]:
+    """Where boxes begin and end along an axis, pixels; NaN of what is out of sight."""
+    boxes = np.array([b.region.bbox for b in facts.beliefs], dtype=float).reshape(-1, 4)
+    boxes[~_seen(facts)] = np.nan
+    return boxes[:, axis], boxes[:, axis] + boxes[:, 2 + axis]
+
+
+def _sign(difference: Floats, level: float) -> NDArray[np.int8]:
+    """-1, 0 where it is next to nothing, or 1; also of what is not known, which counts for nothing."""
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(difference) <= level, 0, np.sign(difference)).astype(np.int8)
+
+
+def three_points(facts: Snapshot, relation: str) -> Codes:
+    """Whether the third object lies so for one who went from the first to the second."""
+    centres = np.array([b.region.centroid for b in facts.beliefs], dtype=float).reshape(-1, 2)
+    centres[~_seen(facts)] = np.nan
+    ahead = centres[None, :] - centres[:, None]  # from a to b
+    there = centres[None, None, :] - centres[None, :, None]  # from b to c
+    straight, far = ahead[:, :, None], np.linalg.norm(there, axis=3)
+    cross = straight[..., 0] * there[..., 1] - straight[..., 1] * there[..., 0]
+    dot = (straight * there).sum(axis=3)
+    # Counted to the left, since y points down in images.
+    turn = np.degrees(np.arctan2(-cross, dot))
+    level = LEVEL * image_diagonal(facts.mind.frame_size)
+    same = far <= level
+    if relation == "sam":
+        return _codes(same, np.isnan(far))
+    near = far < np.linalg.norm(ahead, axis=2)[:, :, None]
+    held = _in_sector(turn, relation[1:]) & (near == (relation[0] == "c")) & ~same
+    return _codes(held, np.isnan(turn + far))
+
+
+_STRAIGHT = {"sf": 0.0, "sl": 90.0, "sb": 180.0, "sr": -90.0}
+_BETWEEN = {
+    "fl": (0.0, 45.0),
+    "lf": (45.0, 90.0),
+    "lb": (90.0, 135.0),
+    "bl": (135.0, 180.0),
+    "br": (-180.0, -135.0),
+    "rb": (-135.0, -90.0),
+    "rf": (-90.0, -45.0),
+    "fr": (-45.0, 0.0),
+}
+
+
+def _in_sector(turn: Floats, way: str) -> NDArray[np.bool_]:
+    """Whether directions lie in a sector of TPCC, or on one of its straight lines."""
+    straight = np.min([np.abs((turn - a + 180) % 360 - 180) for a in _STRAIGHT.values()], axis=0)
+    if way in _STRAIGHT:
+        return np.asarray(np.abs((turn - _STRAIGHT[way] + 180) % 360 - 180) <= STRAIGHT_DEG)
+    low, high = _BETWEEN[way]
+    return np.asarray((straight > STRAIGHT_DEG) & (turn > low) & (turn <= high))
+
+
+def _seen(facts: Snapshot) -> NDArray[np.bool_]:
+    return np.array([b.presence is Presence.SEEN for b in facts.beliefs], dtype=bool)
+
+
+def _codes(held: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> Codes:
+    return np.where(unknown, MAYBE, np.where(held, YES, NO)).astype(np.int8)

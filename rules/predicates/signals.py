@@ -1,0 +1,56 @@
+"""Signals that are not from the image, as words of rules; percepts of kind `signal` tell them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from visup.agent import Mind
+from visup.rules.formula.truth import MAYBE, NO, YES
+from visup.rules.predicates.snapshot import Codes, Floats, Snapshot
+
+KIND = "signal"
+
+
+def known_signals(mind: Mind) -> Mapping[str, Any]:
+    """What is known of signals, by name; where several tell one, the last report counts."""
+    told = (p.value for p in mind.percepts.get(KIND, ()) if isinstance(p.value, Mapping))
+    return {name: value for values in told for name, value in values.items()}
+
+
+def number(facts: Snapshot, name: str) -> Floats:
+    """A signal that is a number, as an interval; unknown of any other."""
+    value = _number_of(known_signals(facts.mind).get(name))
+    return np.array([-np.inf, np.inf] if value is None else [value, value])
+
+
+def is_on(facts: Snapshot, name: str) -> Codes:
+    """Whether a signal is true, or a number other than 0; unknown of a word."""
+    value = known_signals(facts.mind).get(name)
+    plain = isinstance(value, bool | np.bool_) or _number_of(value) is not None
+    return _code(bool(value) if plain else None)
+
+
+def is_word(facts: Snapshot, name: str, word: str) -> Codes:
+    """Whether a signal is that word; unknown while the signal is."""
+    value = known_signals(facts.mind).get(name)
+    return _code(None if value is None else value == word)
+
+
+def is_known(facts: Snapshot, name: str) -> Codes:
+    """Whether a signal is known."""
+    return _code(known_signals(facts.mind).get(name) is not None)
+
+
+def _number_of(value: Any) -> float | None:
+    """A signal as a number; None of what is none."""
+    plain = isinstance(value, int | float | np.integer | np.floating)
+    if not plain or isinstance(value, bool) or not np.isfinite(value):
+        return None
+    return float(value)
+
+
+def _code(value: bool | None) -> Codes:
+    return np.array(MAYBE if value is None else YES if value else NO, dtype=np.int8)

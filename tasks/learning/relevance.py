@@ -1,0 +1,297 @@
+"""What a run is made of: meetings, what leads to them, and partings; not what only comes along.
+
+A camera sees more than was meant: what is carried meets what it is carried past, outlines touch where one
+body stands before another. What is left is one row of happenings for each run, alike in all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cmp_to_key
+
+from visup.tasks.learning.order import Item, Joint
+from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Symbol
+
+Pair = tuple[str, ...]
+MEETINGS = ("touching", "coupled")
+LET_GO_S = 0.6
+"""What is carried meets others no longer than so long after it was let go."""
+CLOSE_S = 2.0
+"""An approach may end so long before its meeting; relations are judged with delays."""
+MUCH_LESS = 0.9
+"""Pairs whose meetings differ by less are told apart by who rests."""
+ENDED_S = 0.3
+"""A meeting that ends so long before the run does has ended, and is not cut off."""
+
+
+@dataclass(frozen=True, slots=True)
+class CourseEvent:
+    """A happening in the row of a run.
+
+    Attributes:
+        happening: What, from when to when.
+        at: Seconds by which it is ordered: an approach comes with its meeting.
+        lasts: Whether it goes on to the end of the run.
+        beside: What happens with it.
+    """
+
+    happening: Happening
+    at: float
+    lasts: bool = False
+    beside: tuple[Symbol, ...] = ()
+
+    @property
+    def symbol(self) -> Symbol:
+        """What happens; the first of several."""
+        return self.happening.symbol
+
+    @property
+    def item(self) -> Item:
+        """What happens."""
+        return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Two that are together for a while.
+
+    Attributes:
+        pair: Who.
+        touching: Their first to last touch.
+        coupled: First to last coupling, or None when they only touch.
+    """
+
+    pair: Pair
+    touching: tuple[float, float]
+    coupled: tuple[float, float] | None
+
+    def spell(self, action: str) -> tuple[float, float] | None:
+        """From when to when, as one of the two."""
+        return self.coupled if action == "coupled" else self.touching
+
+
+def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
+    """What each run is made of, in order.
+
+    A touch that becomes a coupling is that coupling, where it does so in all runs; else both are touches.
+    What is coupled to the same thing moves and meets as that does. An approach counts when it leads to a
+    meeting, a parting when it ends one. Where nobody ever meets all counts.
+    """
+    order = pairs_by_weight(runs)
+    met = [meetings_of(run, order) for run in runs]
+    if not any(met):
+        return [[CourseEvent(h, h.begin) for h in run.happenings] for run in runs]
+    words = _words(met)
+    hidden = {m.pair for rows in met for m in rows} - _shared_pairs(met)
+    return [
+        sorted(
+            [*_events(run, rows, words), *_towards(run, rows, hidden)],
+            key=lambda e: (e.at, _RANK[e.symbol[0]], e.symbol),
+        )
+        for run, rows in zip(runs, met, strict=True)
+    ]
+
+
+def _shared_pairs(met: Sequence[Collection[Meeting]]) -> set[Pair]:
+    """Pairs that meet in every run."""
+    return set.intersection(*({m.pair for m in rows} for rows in met))
+
+
+def _towards(
+    run: RunTrace, rows: Sequence[Meeting], pairs: Collection[Pair]
+) -> Iterator[CourseEvent]:
+    """Approaches whose meeting is not seen in this run, as when one goes into the other and is hidden."""
+    met = {m.pair for m in rows}
+    for pair in pairs:
+        found = [h for h in run.happenings if h.symbol == ("converging", pair)]
+        if pair not in met and found:
+            yield CourseEvent(found[0], found[0].begin)
+
+
+_RANK = {"converging": 0, "touching": 1, "coupled": 1, "apart": 2, "decoupled": 2}
+
+
+def _words(met: Sequence[Collection[Meeting]]) -> dict[Pair, str]:
+    """How each pair meets: coupled where it is so in every run in which they meet."""
+    pairs = {m.pair for rows in met for m in rows}
+    return {
+        pair: "coupled"
+        if all(
+            any(m.coupled for m in rows if m.pair == pair)
+            for rows in met
+            if any(m.pair == pair for m in rows)
+        )
+        else "touching"
+        for pair in pairs
+    }
+
+
+def _events(
+    run: RunTrace, meetings: Sequence[Meeting], words: Mapping[Pair, str]
+) -> Iterator[CourseEvent]:
+    for meeting in meetings:
+        action, pair = words[meeting.pair], meeting.pair
+        spell = meeting.spell(action)
+        if spell is None:
+            continue
+        begin, end = spell
+        lasts = end > run.end - ENDED_S
+        approach = _approach(run, pair, meeting.touching[0], begin)
+        if approach is not None and not _held_elsewhere(meeting, begin, meetings):
+            yield CourseEvent(approach, begin)
+        yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
+        if not lasts:
+            parting = "decoupled" if action == "coupled" else "apart"
+            yield CourseEvent(Happening((parting, pair), end, run.end), end)
+
+
+def _held_elsewhere(meeting: Meeting, at: float, meetings: Sequence[Meeting]) -> bool:
+    """Whether a third holds one of two when they meet: how it is carried there is no stage."""
+    others = (m.coupled for m in meetings if set(m.pair) & set(meeting.pair) and m is not meeting)
+    return any(spell is not None and spell[0] < at <= spell[1] + CLOSE_S for spell in others)
+
+
+def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happening | None:
+    """The last time that they draw nearer before they meet."""
+    found = [
+        h
+        for h in run.happenings
+        if h.symbol == ("converging", pair) and h.begin <= begin and h.end >= touch - CLOSE_S
+    ]
+    return found[-1] if found else None
+
+
+def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
+    """Pairs that touch: in the fewest runs, or for much less long, first; then those that move most.
+
+    What is put on a thing that rests meets that thing, and not what was put on it before.
+    """
+    seconds: dict[Pair, list[float]] = {}
+    for run in runs:
+        mine: dict[Pair, float] = {}
+        for h in run.happenings:
+            if h.symbol[0] in MEETINGS:
+                mine[h.symbol[1]] = mine.get(h.symbol[1], 0.0) + h.end - h.begin
+        for pair, long in mine.items():
+            seconds.setdefault(pair, []).append(long)
+
+    def moved(pair: Pair) -> float:
+        return sum(run.moved_s.get(name, 0.0) for run in runs for name in pair)
+
+    def compared(p: Pair, q: Pair) -> int:
+        runs_more, long, other = len(seconds[p]) - len(seconds[q]), sum(seconds[p]), sum(seconds[q])
+        if runs_more or min(long, other) < MUCH_LESS * max(long, other):
+            return runs_more or (1 if long > other else -1)
+        return 1 if (moved(q), p) > (moved(p), q) else -1
+
+    return sorted(seconds, key=cmp_to_key(compared))
+
+
+def meetings_of(run: RunTrace, pairs: Sequence[Pair]) -> list[Meeting]:
+    """All meetings of a run but those of what is only carried along.
+
+    Args:
+        run: The run.
+        pairs: All pairs; of several that meet through each other the first one is let be.
+    """
+    real = [h for h in run.happenings if h.symbol[0] in MEETINGS]
+    for pair in pairs:
+        real = [h for h in real if h.symbol[1] != pair or not _carried(h, real)]
+    found: list[list[Happening]] = []
+    for h in real:
+        of_pair = [g for g in found if g[0].symbol[1] == h.symbol[1]]
+        if of_pair and h.begin <= max(g.end for g in of_pair[-1]) + BREAK_S:
+            of_pair[-1].append(h)
+        else:
+            found.append([h])
+    return [_meeting(group) for group in found]
+
+
+def _meeting(spells: Sequence[Happening]) -> Meeting:
+    coupled = [h for h in spells if h.symbol[0] == "coupled"]
+    return Meeting(
+        spells[0].symbol[1],
+        (spells[0].begin, max(h.end for h in spells)),
+        (coupled[0].begin, max(h.end for h in coupled)) if coupled else None,
+    )
+
+
+def _carried(meeting: Happening, meetings: Sequence[Happening]) -> bool:
+    """Whether two meet only through a third thing, which one holds and which meets the other.
+
+    It then ends as soon as that is let go.
+    """
+    overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
+    for held in overlap:
+        if held.symbol[0] != "coupled" or meeting.end > held.end + LET_GO_S:
+            continue
+        for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
+            if a not in held.symbol[1] or b in held.symbol[1]:
+                continue
+            (x,) = set(held.symbol[1]) - {a}
+            if any({x, b} == set(m.symbol[1]) and m.end > meeting.end - CLOSE_S for m in overlap):
+                return True
+    return False
+
+
+AT_ONCE_S = 0.3
+"""Relations are judged with delays: what comes closer together than so may be seen in either order."""
+
+Row = Sequence[CourseEvent]
+
+
+def joined(rows: Sequence[Row]) -> list[list[CourseEvent]]:
+    """Rows in which what comes about at once, and goes on together in all runs, is one event.
+
+    Which of the two is seen first is chance, so that no order of theirs is asked for.
+    """
+    once = [{e.symbol: e for e in row if _single(e, row)} for row in rows]
+    shared = sorted(set.intersection(*(set(events) for events in once))) if once else []
+    groups: list[list[Symbol]] = []
+    for symbol in shared:
+        if symbol[0] == "converging":
+            continue
+        group = next((g for g in groups if all(_together(once, symbol, s) for s in g)), None)
+        if group is None:
+            groups.append([symbol])
+        else:
+            group.append(symbol)
+    return [_with_joints(row, [g for g in groups if len(g) > 1]) for row in rows]
+
+
+def _single(event: CourseEvent, row: Row) -> bool:
+    return sum(e.symbol == event.symbol for e in row) == 1
+
+
+def _together(once: Sequence[Mapping[Symbol, CourseEvent]], a: Symbol, b: Symbol) -> bool:
+    """Whether two come at once in some run, and go on together for a while in all."""
+    if a[1] == b[1]:
+        return False
+    pairs = [(events[a], events[b]) for events in once]
+    close = any(abs(x.at - y.at) < AT_ONCE_S for x, y in pairs)
+    return close and all(_overlap(x.happening, y.happening) > AT_ONCE_S for x, y in pairs)
+
+
+def _overlap(a: Happening, b: Happening) -> float:
+    return min(a.end, b.end) - max(a.begin, b.begin)
+
+
+def _with_joints(row: Row, groups: Sequence[Sequence[Symbol]]) -> list[CourseEvent]:
+    """A row with each group in the place of its last one."""
+    found = list(row)
+    for group in groups:
+        parts = sorted((e for e in found if e.symbol in group), key=lambda e: group.index(e.symbol))
+        last = max(parts, key=lambda e: e.at)
+        end = min(e.happening.end for e in parts)
+        joint = CourseEvent(
+            Happening(parts[0].symbol, last.happening.begin, end),
+            last.at,
+            all(e.lasts or e.symbol[0] in PARTINGS for e in parts),
+            tuple(e.symbol for e in parts[1:]),
+        )
+        found = [joint if e is last else e for e in found if e is last or e not in parts]
+    return found
+
+
+PARTINGS = ("apart", "decoupled")

@@ -1,0 +1,37 @@
+"""The traffic that a long run is measured on is traffic, and its figures say what they should."""
+
+from __future__ import annotations
+
+from visup.evaluation.runtime.scripted_observations import FPS, SIZE
+from visup.evaluation.runtime.traffic import LANES, evaluate_traffic, traffic
+
+
+def test_cars_come_in_pass_and_go_each_under_its_own_number() -> None:
+    seen = list(traffic(int(20 * FPS)))
+    tracks: dict[int, list[float]] = {}
+    for observation in seen:
+        regions = observation.of("region")
+        assert len(regions) <= 3 * LANES
+        for region in regions:
+            x, _, w, h = region.bbox
+            assert x >= 0
+            assert x + w <= SIZE[0]
+            assert region.mask.shape == (h, w)
+            tracks.setdefault(region.id, []).append(region.centroid[0])
+    whole = [xs for number, xs in tracks.items() if number <= 2 * LANES]
+    assert all(xs == sorted(xs) and xs[0] < 30 and xs[-1] > SIZE[0] - 30 for xs in whole)
+    assert len(tracks) == LANES * 7  # one each 2.9 s and lane
+
+
+def test_the_same_traffic_again_is_the_same() -> None:
+    one, two = (
+        [(r.id, r.bbox, int(r.area)) for o in traffic(60) for r in o.of("region")] for _ in range(2)
+    )
+    assert one == two
+
+
+def test_figures_of_a_short_run() -> None:
+    total = evaluate_traffic(0.01)["total"]
+    assert 3000 < total["objects_per_hour"] < 4500
+    assert 20 < total["journal_mb_per_hour"] < 600
+    assert total["grown"] < 0.2

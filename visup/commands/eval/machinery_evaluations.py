@@ -1,0 +1,194 @@
+"""Evaluations of reasoning, languages and the runtime by themselves: a row for each."""
+
+from __future__ import annotations
+
+from visup.commands.eval import adapters
+from visup.commands.eval.evaluation import EvaluationCommand, count, flag, folder_argument
+from visup.commands.options import Setting
+from visup.runs.settings import Option
+
+_SEED = count("seed", 0, "Of all that is drawn.", 0)
+_ADAPTERS = "visup.commands.eval.adapters"
+
+MACHINERY_EVALUATIONS = (
+    EvaluationCommand(
+        "faults",
+        """Faults put into behaviours: every run ends, every fault is told, nothing unknown reads fine.
+
+        Exit code: 0 when that is so, else 1.
+        """,
+        "tests.oracles.runtime.behaviour_faults:evaluate_faults",
+        "injecting",
+        ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
+        (count("count", 1000, "How many faults are injected."), _SEED),
+        closing=adapters.failures_closing("number {number}, {fault} in '{kind}': {problem}"),
+        failed=adapters.any_failures,
+    ),
+    EvaluationCommand(
+        "hardening",
+        """Damaged and hostile files of every kind, and races of writers: nothing gets in, nothing gets lost.
+
+        Exit code: 0 when all were read or refused within bounds, and nothing was lost, else 1.
+        """,
+        "tests.oracles.hardening.runner:evaluate_hardening",
+        "reading",
+        ("files", "read", "refused", "raised", "slow", "crashed", "memory", "ran"),
+        (
+            count("count", 5000, "Damaged files of each kind."),
+            _SEED,
+            count("races", 100, "How often two writers begin at once.", 0),
+            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
+        ),
+        closing=adapters.failures_closing("{text}"),
+        failed=adapters.any_failures,
+    ),
+    EvaluationCommand(
+        "relations",
+        "Relations of boxes: frames per second, changes of what rests, drift, oracles.",
+        "tests.oracles.reasoning.relations:evaluate_relations",
+        "judging",
+        ("fps", "fps_cpu", "plain_fps", "ratio", "changes", "seen_s"),
+        (
+            count("draws", 10_000, "Random pairs for the oracles."),
+            Setting("minutes", float, 10.0, Option("How long boxes rest.", at_least=0.1)),
+            _SEED,
+        ),
+        closing=adapters.relations_closing,
+        recorded=adapters.relations_settings,
+    ),
+    EvaluationCommand(
+        "rules",
+        "Rules over time: equal to an oracle and to rtamt, cost of windows, of rules, of snapshots.",
+        "tests.oracles.reasoning.rules:evaluate_rules",
+        "judging",
+        (
+            *("formulas", "samples", "online", "different", "us", "samples_per_s", "times_rtamt"),
+            *("rules", "ms", "concerns", "kept", "kb_each", "slower"),
+        ),
+        (count("formulas", 10_000, "How many random formulas.", 10), _SEED),
+        closing=adapters.rules_closing,
+        failed=adapters.rules_differ,
+    ),
+    EvaluationCommand(
+        "peers",
+        """Cases of other tools' own tests, temporal and qualitative: agree, unknown at ends, differ.
+
+        Exit code 1 when a case differs beyond the semantics that docs/coming-from.md states.
+        """,
+        "tests.oracles.peers.runner:evaluate_peers",
+        "judging",
+        (
+            *("cases", "agree", "unknown_at_ends", "other_semantics"),
+            *("differ", "not_expressible"),
+        ),
+        (),
+        folder_argument("Folder with temporal.json and qualitative.json."),
+        adapters.peers_closing,
+        adapters.peers_differ,
+    ),
+    EvaluationCommand(
+        "reasoning",
+        "Reasoning alone, on percepts made from the truth with noise: identity, events, verdicts.",
+        f"{_ADAPTERS}:reasoning",
+        "reasoning",
+        (
+            *("identity", "event_precision", "event_recall", "event_f1", "false_coupled"),
+            *("false_exit", "ece", "spin_error", "stage", "failing_latency_s", "alerts_found"),
+            *("alerts_expected", "false_alerts", "verdicts_right", "verdicts"),
+            # Of a long script:
+            *("frames", "ms", "ms_ten", "rss_mb", "grown", "snapshot_kb"),
+        ),
+        (
+            count("seeds", 20, "Runs of each mission."),
+            count("first", 0, "The first seed.", 0),
+            count("every", 1, "Use every n-th frame."),
+            count("jobs", 2, "Processes."),
+            flag("merge", "Coupled objects are seen as one region."),
+            count("long", 0, "Instead: so many frames of a script, for memory and speed.", 0),
+        ),
+        folder_argument("A mission, or a folder of missions."),
+        adapters.reasoning_closing,
+        recorded=lambda given: {k: v for k, v in given.items() if k != "jobs"},
+    ),
+    EvaluationCommand(
+        "tasks",
+        "Damage task files and read them; time long files and a usual one.",
+        "tests.oracles.reasoning.task_files:evaluate_tasks",
+        "damaging",
+        (),
+        (
+            count("count", 100_000, "How many damaged files are read.", 0),
+            count("seed", 0, "Seed of the first; one more for each file.", None),
+        ),
+        closing=adapters.tasks_closing,
+        failed=adapters.any_failures,
+    ),
+    EvaluationCommand(
+        "recognition",
+        "Recognise random tasks: as the exact oracle does, seen badly, and fast.",
+        f"{_ADAPTERS}:recognition",
+        "recognising",
+        (),
+        (
+            count("grammars", 2_000, "Small grammars compared with the exact oracle."),
+            count("tasks", 20, "Tasks of 30 stages that are followed."),
+            count("seed", 0, "Seed of the first; one more for each.", None),
+        ),
+        closing=adapters.recognition_closing,
+        failed=lambda figures: not all(figures["bars"].values()),
+    ),
+    EvaluationCommand(
+        "resume",
+        "Kill runs with SIGKILL, resume them, and compare them with an unbroken run.",
+        f"{_ADAPTERS}:resume",
+        "killing",
+        ("kills", "early", "resumed", "equal", "lost", "resume_s"),
+        (
+            count("kills", 200, "How many runs are killed."),
+            count("seed", 0, "Of the moments.", 0),
+            flag("demo", "Kill runs of the shipped clip."),
+        ),
+        closing=lambda figures: iter(figures["failures"]),
+        failed=adapters.resume_failed,
+    ),
+    EvaluationCommand(
+        "soak",
+        """A run of hours of scripted percepts: time of a step and memory at its start and end.
+
+        With --traffic instead so many hours of three lanes of cars: growth of memory in the second half,
+        and of the journal.
+        """,
+        f"{_ADAPTERS}:soak",
+        "soaking",
+        ("ms", "rss_mb"),
+        (
+            count("frames", 200_000, "Length of the run.", None),
+            Setting("traffic", float, 0.0, Option("Hours of traffic.", at_least=0.0)),
+        ),
+        closing=adapters.totals_closing,
+    ),
+    EvaluationCommand(
+        "stepping",
+        "Going back by 500 steps: its time, the memory that it takes, and whether it leads to the same.",
+        "visup.evaluation.runtime.stepping:evaluate_stepping",
+        "stepping",
+        ("median_ms", "most_ms"),
+        (
+            count("steps", 10_000, "How many are made and kept.", None),
+            count("seed", 0, "Of the places to go back from.", 0),
+        ),
+        closing=adapters.stepping_closing,
+        failed=adapters.stepping_failed,
+    ),
+    EvaluationCommand(
+        "pace",
+        "The time of a step without perception, of replay and observers, and what a kept mind takes.",
+        "visup.evaluation.runtime.pace:evaluate_pace",
+        "stepping",
+        ("ms", "ms_low", "think_ms", "alerts", "observers", "replay_fps", "mind_kb"),
+        (
+            count("steps", 2000, "Length of each script.", None),
+            count("kept", 10_000, "Minds that are kept in a row.", 100),
+        ),
+    ),
+)

@@ -1,0 +1,231 @@
+"""Evaluations of what is seen and supervised: a row for each."""
+
+from __future__ import annotations
+
+from inspect import Parameter
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from visup.commands.eval import adapters
+from visup.commands.eval.evaluation import (
+    FOLDER,
+    LIMIT,
+    EvaluationCommand,
+    count,
+    flag,
+    folder_argument,
+)
+from visup.commands.options import Setting
+from visup.runs.settings import Option
+
+_SEED = count("seed", 0, "Of all that is drawn.", 0)
+_ADAPTERS = "visup.commands.eval.adapters"
+_CLIP_NAMES = Parameter(
+    "names",
+    Parameter.KEYWORD_ONLY,
+    default=None,
+    annotation=Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="Which clips; all if none.")
+    ],
+)
+
+SCENE_EVALUATIONS = (
+    EvaluationCommand(
+        "shapes",
+        "Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time.",
+        "visup.evaluation.shape.retrieval:evaluate_shapes",
+        "comparing",
+        ("nn1", "rank_sum", "bullseye", "ms_shape", "ms_pair", "compared", "lost"),
+        (LIMIT,),
+        FOLDER,
+        adapters.shapes_closing,
+    ),
+    EvaluationCommand(
+        "missions",
+        "Whole missions: identity, events, stages, alerts, verdicts, speed.",
+        "visup.evaluation.missions.runner:evaluate_missions",
+        "supervising",
+        (
+            *("identity", "event_precision", "event_recall", "event_f1", "stage"),
+            *("failing_latency_s", "alerts_found", "alerts_expected", "false_alerts"),
+            *("false_alerts_per_hour", "verdicts_right", "verdicts", "verdict"),
+            *("view_deg", "spin_error", "fps"),
+        ),
+        (Setting("models", Path | None, None, Option("Model database.")), LIMIT),
+        FOLDER,
+    ),
+    EvaluationCommand(
+        "machines",
+        """Machines at work, rendered and real: taught from a brief, watched, scored against the truth.
+
+        Beside it, in the same run: OpenCV's CSRT on the taught boxes, with the same tasks and rules.
+        """,
+        "visup.evaluation.machines.runner:evaluate_machines",
+        "watching",
+        (
+            *("verdict", "verdicts_right", "stage_f1", "actors"),
+            *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
+        ),
+        (
+            flag("eyes", "Regions are made from the masks of worlds: reasoning by itself."),
+            Setting("baseline", bool, True, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            LIMIT,
+        ),
+        FOLDER,
+        adapters.machines_closing,
+    ),
+    EvaluationCommand(
+        "orbits",
+        "Missions in orbit drawn from a seed: rendered, supervised, scored, thrown away.",
+        f"{_ADAPTERS}:random_orbits",
+        "supervising",
+        (
+            "identity",
+            "event_f1",
+            "stage",
+            "false_alerts",
+            "verdicts_right",
+            "view_deg",
+            "spin_error",
+        ),
+        (
+            count("count", 20, "How many missions."),
+            _SEED,
+            count("width", 480, "Of the image, pixels.", 64),
+            count("workers", None, "Processes; as many as there are cores by default."),
+            LIMIT,
+        ),
+        closing=adapters.orbits_closing,
+    ),
+    EvaluationCommand(
+        "random",
+        """Worlds drawn from a seed: rendered, taught, watched, scored like machines, thrown away.
+
+        Kinds are spread evenly over the count; rows are kinds.
+        """,
+        f"{_ADAPTERS}:random_worlds",
+        "rendering and watching",
+        (
+            *("verdicts_right", "verdicts", "stage_f1", "actors"),
+            *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
+        ),
+        (
+            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
+            count("count", 60, "How many worlds."),
+            _SEED,
+            flag("eyes", "Regions are made from the masks: reasoning by itself."),
+            Setting("baseline", bool, False, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            LIMIT,
+            count("workers", None, "Processes that share the work; as many as there are cores."),
+        ),
+        closing=adapters.random_closing,
+    ),
+    EvaluationCommand(
+        "learning",
+        """Tasks learned from a few good runs of random missions, watched by their masks, judged on others.
+
+        Rows are kinds of mission. Exit code 1 when a kind misses its bar: all good runs accepted, nine
+        of ten bad ones refused.
+        """,
+        f"{_ADAPTERS}:learning",
+        "watching and learning",
+        ("accepted", "good", "refused", "bad", "unlike"),
+        (
+            Setting("kind", list[str] | None, None, Option("Which kinds; five if none.")),
+            count("runs", 3, "Good runs that each task is learned from."),
+            count("count", 10, "Further good runs of each kind, and as many bad ones."),
+            _SEED,
+            count("workers", None, "Processes that share the work; as many as there are cores."),
+        ),
+        closing=adapters.learning_closing,
+        failed=adapters.learning_failed,
+    ),
+    EvaluationCommand(
+        "health",
+        "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
+        "visup.evaluation.health.runner:evaluate_health",
+        "watching",
+        (
+            *("clips", "found", "named", "latency_s", "early"),
+            *("false_reports", "hours", "false_reports_per_hour", "ms"),
+        ),
+        (
+            count("faults", 100, "How many faults are injected."),
+            _SEED,
+            count("limit", None, "Frames of each video when it is run unharmed."),
+        ),
+        folder_argument("Folder with sound video anywhere below it."),
+    ),
+    EvaluationCommand(
+        "alarms",
+        """Alarms on sound footage, watched without a task: how many of each kind an hour.
+
+        Below the folder stand clips, or recorded runs, which are reasoned about again in seconds.
+        """,
+        "visup.evaluation.alarms.runner:evaluate_alarms",
+        "watching",
+        ("alarms", "clips", "per_hour", "hours", "noted", "lines_per_min"),
+        (LIMIT,),
+        folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
+    ),
+    EvaluationCommand(
+        "clips",
+        """Rendered clips of what footage lacks: pan, shake, zoom, stops, eclipse ...
+
+        Each has a bar. Exit code 1 when a clip misses its bar.
+        """,
+        f"{_ADAPTERS}:clips",
+        "rendering and segmenting",
+        (),
+        (Setting("cache", Path, Path("runs/clips"), Option("Folder for the rendered clips.")),),
+        _CLIP_NAMES,
+        adapters.clips_closing,
+        lambda figures: figures["total"]["passed"] < figures["total"]["clips"],
+        lambda given: {"clips": given["names"] or "all"},
+    ),
+    EvaluationCommand(
+        "scale",
+        "Model databases that grow: opening, answering, memory, and what the index loses.",
+        f"{_ADAPTERS}:scale",
+        "growing",
+        (
+            *("open_ms", "first_ms", "ms_query", "ms_search", "ms_cpu"),
+            *("ms_worst", "rss_mb", "compared", "lost"),
+        ),
+        (count("views", 100_000, "Views of the largest database."), _SEED),
+        folder_argument("Folder of meshes (*.ply)."),
+        adapters.scale_closing,
+    ),
+    EvaluationCommand(
+        "robustness",
+        "Damaged database files and odd masks: a clear error, an answer or nothing, within a second.",
+        "tests.oracles.shape.robustness:evaluate_robustness",
+        "damaging",
+        ("trials", "refused", "answered", "nothing", "failed", "worst_s"),
+        (
+            count("files", 2000, "How many damaged database files.", 0),
+            count("masks", 2000, "How many odd masks.", 0),
+            _SEED,
+        ),
+        closing=adapters.failures_closing("{kind}, number {number}: {what}, {seconds:.2f} s"),
+        failed=adapters.any_failures,
+    ),
+    EvaluationCommand(
+        "views",
+        "Views from unseen directions: clean, with contour noise, cut by a border, both.",
+        "visup.evaluation.shape.view_recognition:evaluate_views",
+        "recognising",
+        (),
+        (
+            count("views", 32, "Views of each mesh in the database."),
+            flag("machines", "Add thirteen machines that are made by code."),
+            count("queries", 12, "Silhouettes asked for of each mesh."),
+            count("seed", 0, "Of the queries.", 0),
+            count("limit", None, "Meshes, for a quick look."),
+        ),
+        folder_argument("Folder of mesh files."),
+        adapters.views_closing,
+    ),
+)

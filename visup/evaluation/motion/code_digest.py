@@ -1,0 +1,34 @@
+"""Digests of what figures and examples follow from: code, and the files of a sequence."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from importlib import resources
+from pathlib import Path
+
+from visup.evaluation.motion.runner import LabelledSequence
+
+
+def code_digest(rooms: Sequence[str]) -> bytes:
+    """A digest of some files, and of all code and data in some folders, of the package."""
+    digest = hashlib.sha256()
+    package = Path(str(resources.files("visup")))
+    for room in rooms:
+        for file in [package / room, *sorted((package / room).rglob("*"))]:
+            if file.is_file() and file.parent.name != "__pycache__":
+                digest.update(file.read_bytes())
+    return digest.digest()
+
+
+def files_digest(sequence: LabelledSequence) -> bytes:
+    """A digest of the names, sizes and times of a sequence's files."""
+    digest = hashlib.sha256()
+    for file in (*_files(sequence.source), *sequence.masks.values()):
+        state = file.stat()
+        digest.update(f"{file.name} {state.st_size} {state.st_mtime_ns}\n".encode())
+    return digest.digest()
+
+
+def _files(source: Path) -> Iterable[Path]:
+    return sorted(source.iterdir()) if source.is_dir() else [source]

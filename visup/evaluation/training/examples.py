@@ -1,0 +1,125 @@
+"""Examples to learn from: the cues of every frame of labelled sequences, with the truth where it is known."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame
+from visup.evaluation.motion.code_digest import code_digest, files_digest
+from visup.evaluation.motion.mask_scores import UNSCORED
+from visup.evaluation.motion.runner import LabelledSequence, labelled_frames
+from visup.evaluation.motion.variants import AS_IT_IS
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground.cues import FrameCues
+from visup.percepts.motion.segmenter import MotionSegmenter
+
+SEEING = ("features", "layers", "tracks", "foreground/cues.py", "foreground/_cues_jit.py")
+CODE = tuple(f"percepts/motion/{part}" for part in SEEING)
+SCORED = 0.1  # share of a frame that must be scored for it to be an example
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Example:
+    """One frame to learn from.
+
+    Attributes:
+        cues: What it shows.
+        truth: (count,) float32, share of each superpixel that moves; None where there is no truth.
+        scored: (count,) float32, share of each superpixel that has a truth.
+    """
+
+    cues: FrameCues
+    truth: Floats | None
+    scored: Floats
+
+
+def collected(sequence: LabelledSequence, limit: int | None, cache: Path) -> list[Example]:
+    """The examples of one sequence, from the cache when they were collected before.
+
+    Args:
+        sequence: Frames and masks.
+        limit: Most frames, or None.
+        cache: Folder, made when missing.
+    """
+    digest = hashlib.sha256(code_digest(CODE))
+    digest.update(json.dumps((sequence.name, limit)).encode())
+    digest.update(files_digest(sequence))
+    file = cache / f"{digest.hexdigest()}.npz"
+    return _kept(file, lambda: labelled_frames(sequence, AS_IT_IS, limit))
+
+
+Footage = Iterable[tuple[Frame, NDArray[np.uint8] | None]]
+
+
+def _kept(file: Path, footage: Callable[[], Footage]) -> list[Example]:
+    if not file.is_file():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _write(file, list(_collect(footage())))
+    return _read(file)
+
+
+def _collect(footage: Footage) -> Iterator[Example]:
+    """The examples of a video as it is segmented."""
+    segmenter = MotionSegmenter(MotionSettings(learnt=True))
+    for frame, labels in footage:
+        segmenter.step(frame)
+        if segmenter.trace is not None and segmenter.trace.cues is not None:
+            cells = segmenter.trace.scene.cells
+            truth, scored = _cell_truth(labels, cells.labels, cells.count)
+            yield Example(segmenter.trace.cues, truth, scored)
+
+
+def _cell_truth(
+    labels: NDArray[np.uint8] | None, cells: NDArray[np.int32], count: int
+) -> tuple[Floats | None, Floats]:
+    """Share of each cell that moves, and that is scored, (count,) each; None where nothing is."""
+    none = np.zeros(count, np.float32)
+    if labels is None or np.mean(labels != UNSCORED) < SCORED:
+        return None, none
+    height, width = cells.shape
+    rows = (np.arange(height) + 0.5) * labels.shape[0] / height
+    columns = (np.arange(width) + 0.5) * labels.shape[1] / width
+    small = labels[rows.astype(np.int64)[:, None], columns.astype(np.int64)]
+    at = cells.ravel()
+    pixels = np.maximum(np.bincount(at, minlength=count), 1)
+    scored = np.bincount(at, (small != UNSCORED).ravel(), count)
+    moving = np.bincount(at, ((small > 0) & (small != UNSCORED)).ravel(), count)
+    return (moving / np.maximum(scored, 1)).astype(np.float32), (scored / pixels).astype(np.float32)
+
+
+_PARTS = tuple(f.name for f in fields(FrameCues))
+_SHORT = ("here", "there", "neighbours")
+
+
+def _write(file: Path, examples: Sequence[Example]) -> None:
+    arrays: dict[str, NDArray[np.generic]] = {}
+    for n, e in enumerate(examples):
+        for part in _PARTS:
+            value = getattr(e.cues, part)
+            arrays[f"{n} {part}"] = value.astype(np.uint16) if part in _SHORT else value
+        arrays[f"{n} scored"] = e.scored
+        if e.truth is not None:
+            arrays[f"{n} truth"] = e.truth
+    part_file = file.with_suffix(".part.npz")
+    np.savez(part_file, allow_pickle=False, **arrays)
+    part_file.replace(file)
+
+
+def _read(file: Path) -> list[Example]:
+    with np.load(file) as arrays:
+        found = dict(arrays)
+    count = sum(name.endswith(" scored") for name in found)
+    out = []
+    for n in range(count):
+        parts = {part: found[f"{n} {part}"] for part in _PARTS}
+        cues = FrameCues(**{k: v.astype(np.int32) if k in _SHORT else v for k, v in parts.items()})
+        out.append(Example(cues, found.get(f"{n} truth"), found[f"{n} scored"]))
+    return out
