@@ -15,14 +15,27 @@ from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.evaluation.runtime.stepping import whole
+from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 from visup.stepping import ScriptedObservations, Stepper
+from visup.stepping.what_if import with_rules
 
 COUNT = 60
 SETTINGS = WatchSettings(
     "scripted", tasks=("dock",), actors={"satellite": ("spartan",), "arm": ("arm",)}
 )
+
+AHEAD_S = 9.5
+"""The scene has gone on for so long when it is first seen: the arm and the satellite draw apart."""
+
+STRANGER = """
+rule unexpected_object(a): warning
+    when unexpected(a) for 0.2 s and in_view(a) > 0.5 s
+    hold 1 s
+    say "{a} is in view, and no active task explains it."
+"""
+"""Told at once of anybody, wherever it came from: tests of stepping ask how it is told, not whether."""
 
 
 def asking(mind: Mind, observation: Observation) -> Outcome:
@@ -47,8 +60,16 @@ def plain_stepper(count: int = COUNT) -> Stepper:
 
 def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> Stepper:
     """Three bodies that are recognised, a task, the shipped rules."""
-    feed = ScriptedObservations(moving_ellipses(count))
-    return Stepper(reasoning_agent(SETTINGS), feed, spacing=spacing, latest=latest)
+    feed = ScriptedObservations(moving_ellipses(count, ahead_s=AHEAD_S))
+    return Stepper(suspicious_agent(), feed, spacing=spacing, latest=latest)
+
+
+def suspicious_agent() -> Agent:
+    """An agent with the shipped rules, to which any stranger is unexpected."""
+    agent = reasoning_agent(SETTINGS)
+    rules = [r for r in shipped_rules() if r.name != "unexpected_object"]
+    agent.reasoners = with_rules(agent.reasoners, (*rules, *parse_rules(STRANGER)))
+    return agent
 
 
 def told(step: Step | None) -> bytes:
@@ -80,12 +101,12 @@ def plain_course() -> tuple[bytes, ...]:
 @cache
 def reasoning_course(count: int = COUNT) -> tuple[Step, ...]:
     """The steps of `reasoning_stepper` when they are simply made."""
-    agent = reasoning_agent(SETTINGS)
-    return tuple(agent.reason(seen) for seen in moving_ellipses(count))
+    agent = suspicious_agent()
+    return tuple(agent.reason(seen) for seen in moving_ellipses(count, ahead_s=AHEAD_S))
 
 
 @cache
 def reasoning_bytes() -> tuple[bytes, ...]:
     """What the steps of `reasoning_stepper` come to when they are simply made, and not looked into."""
-    agent = reasoning_agent(SETTINGS)
-    return tuple(told(agent.reason(seen)) for seen in moving_ellipses(COUNT))
+    agent = suspicious_agent()
+    return tuple(told(agent.reason(seen)) for seen in moving_ellipses(COUNT, ahead_s=AHEAD_S))

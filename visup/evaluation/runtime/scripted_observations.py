@@ -87,21 +87,22 @@ def _box_observation(
     return Observation(index, now, SIZE, (report,))
 
 
-def moving_ellipses(count: int, begin: int = 0) -> Iterator[Observation]:
+def moving_ellipses(count: int, begin: int = 0, ahead_s: float = 0.0) -> Iterator[Observation]:
     """What would be perceived of three ellipses that move to and fro, meet and part.
 
     Args:
         count: Frames.
         begin: Number of the first.
+        ahead_s: By how much the scene is further on than its clock, seconds.
     """
     shapes = [_ellipse(20 + 6 * k, 14 + 4 * k) for k in range(ELLIPSES)]
     for index in range(begin, begin + count):
-        yield _ellipse_observation(index, shapes)
+        yield _ellipse_observation(index, shapes, ahead_s)
 
 
-def _ellipse_observation(index: int, shapes: list[tuple[Any, Any]]) -> Observation:
+def _ellipse_observation(index: int, shapes: list[tuple[Any, Any]], ahead_s: float) -> Observation:
     t = index / FPS
-    regions = [_ellipse_region(k + 1, t, *shapes[k]) for k in range(ELLIPSES)]
+    regions = [_ellipse_region(k + 1, t + ahead_s, *shapes[k]) for k in range(ELLIPSES)]
     hypotheses = [
         Hypothesis(r.id, ELLIPSE_NAMES[(r.id + n) % 3], 4 * n + r.id, 0.9 - 0.2 * n, 0.1, 30.0)
         for r in regions
