@@ -52,8 +52,8 @@ YUV = {"yuv422": "UYVY", "uyvy": "UYVY", "yuv422_yuy2": "YUY2", "yuyv": "YUY2"}
 def is_bag(path: Path) -> bool:
     """Whether a path is a bag: a folder with `metadata.yaml` and storage, or a storage file."""
     if path.is_dir():
-        stored = any(p.suffix in BAG_SUFFIXES for p in path.iterdir())
-        return stored and (path / "metadata.yaml").is_file()
+        described = (path / "metadata.yaml").is_file()
+        return described and any(p.suffix in BAG_SUFFIXES for p in path.iterdir())
     return path.suffix.lower() in BAG_SUFFIXES and path.is_file()
 
 

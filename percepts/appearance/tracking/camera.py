@@ -103,7 +103,11 @@ def _scene_motion(track: CameraTrack) -> Doubles | None:
     if np.mean(np.hypot(*(now - key).T) < RESTS_PX) > RESTS:
         return STILL
     found = similarity_of(key, now, OFF_PX)
-    return found[0] if found is not None and found[1] > AGREE else None
+    if found is None or found[1] <= AGREE:
+        return None
+    there = key @ found[0][:, :2].T + found[0][:, 2]
+    # Less than points can be followed by is no motion, whatever hides or shadows some of them.
+    return STILL if np.hypot(*(there - key).T).max() < RESTS_PX else found[0]
 
 
 def _between(old: Doubles | None, new: Doubles | None) -> Doubles | None:

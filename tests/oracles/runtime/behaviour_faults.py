@@ -43,7 +43,16 @@ FPS = 10.0
 BUDGET_S = 0.25
 KINDS = ("region", "hypothesis", "depth", "health", "lamp")
 PROBE = "probe_"
-ARGUMENTS = {"relation": "converging", "kind": "region", "name": "disc", "zone": "bay"}
+ARGUMENTS = {
+    "relation": "converging",
+    "kind": "region",
+    "name": "disc",
+    "zone": "bay",
+    "allen": "before",
+    "tpcc": "clf",
+    "signal": "battery",
+    "word": "auto",
+}
 
 
 @dataclass(slots=True)
@@ -200,13 +209,13 @@ def probes() -> tuple[Rule, ...]:
     for name, word in PREDICATES.items():
         lines += _pair(name, word.takes, "{call}", "not {call}")
     for name, quantity in QUANTITIES.items():
-        one = f"1 {quantity.unit}"
+        one = "1" if quantity.plain else f"1 {quantity.unit}"
         lines += _pair(name, quantity.takes, f"{{call}} >= {one}", f"{{call}} < {one}")
     return parse_rules("\n".join(lines))
 
 
 def _pair(name: str, takes: Sequence[str], yes: str, no: str) -> list[str]:
-    variables = ("a", "b")[: sum(t == "object" for t in takes)]
+    variables = ("a", "b", "c")[: sum(t == "object" for t in takes)]
     free = iter(variables)
     words = [next(free) if t == "object" else ARGUMENTS[t] for t in takes]
     call = f"{name}({', '.join(words)})"
