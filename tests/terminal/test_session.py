@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
-from tests.stepping.timelines import SETTINGS
+from tests.stepping.timelines import SETTINGS, STRANGER, suspicious_agent
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
@@ -72,12 +73,12 @@ def test_the_end_of_the_source_is_told() -> None:
     assert "the source has ended" in out.getvalue()
 
 
-def reasoning_session(width: int = 80) -> tuple[Session, io.StringIO]:
+def reasoning_session(width: int = 80, *, terminal: bool = False) -> tuple[Session, io.StringIO]:
     out = io.StringIO()
     it = Session(
-        reasoning_agent(SETTINGS),
+        suspicious_agent(),
         ScriptedObservations(moving_ellipses(60)),
-        Console(file=out, width=width),
+        Console(file=out, width=width, force_terminal=terminal, color_system=None),
     )
     return it, out
 
@@ -127,7 +128,7 @@ SCRIPT = {
 
 
 def test_a_whole_session_can_be_scripted() -> None:
-    it, out = reasoning_session()
+    it, out = reasoning_session(terminal=True)
     for command, said in SCRIPT.items():
         begin = out.tell()
         it.run([command])
@@ -180,8 +181,11 @@ def test_the_toolbar_is_one_line() -> None:
 
 
 def test_a_recorded_run_is_stepped_from_a_pipe(tmp_path: Path) -> None:
-    agent, journal = reasoning_agent(SETTINGS), Journal(tmp_path / JOURNAL)
-    journal.note(settings=to_jsonable(SETTINGS))
+    rules = tmp_path / "strangers.rules"
+    rules.write_text(STRANGER)
+    settings = replace(SETTINGS, rules=(rules,))
+    agent, journal = reasoning_agent(settings), Journal(tmp_path / JOURNAL)
+    journal.note(settings=to_jsonable(settings))
     for seen in moving_ellipses(40):
         journal.record(agent.reason(seen))
     journal.close()

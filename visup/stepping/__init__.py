@@ -6,7 +6,7 @@
 >>> from visup.runs.wiring import reasoning_agent
 >>> stepper = Stepper(reasoning_agent(WatchSettings("script")), ScriptedObservations(moving_ellipses(100)))
 >>> stepper.step(until="entry").reasons
-('entry: Object 1, believed to be the spartan, is in view.',)
+('entry: Object 1 is in view.',)
 >>> stepper.back(3).frame_index
 6
 
