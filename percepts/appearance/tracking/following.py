@@ -30,6 +30,7 @@ LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # of what is still the thing
 UNSURE_PEAK = 0.4  # of the filter, below which colours are asked where the thing is
 OWN_COLOURS = 0.25  # how much more of its colours a thing shows than what is around it
 MOVED_PX = 1.0  # working pixels
+CARRIED = 0.6  # share that it must explain where many points of it agree on the move
 BETTER = 0.04  # share of its pixels that a move must explain beyond rest
 COVERED = 0.2  # share unchanged below which a thing at rest cannot be seen
 UNCOVERED = 0.5
@@ -99,13 +100,14 @@ def _at_rest(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTra
     kept = float(np.mean(same[rest.blob.mask]))
     if np.mean(same) > AS_IT_WAS:
         return noted(replace(track, explained=kept, peak=1.0), scene.time, pose)
-    best, peak, _ = _located(track, pose, points, motion)
+    best, peak, firm = _located(track, pose, points, motion)
     template = template_of(it.lab, it.mask)
     _, there = explained_pixels(template, scene.patch(best, it.shape))
     _, here = explained_pixels(template, scene.patch(pose, it.shape))
     here = max(here, kept)
-    goes = best.apart(pose, it.radius) >= MOVED_PX and peak >= 0.3 and there >= here + BETTER
-    if goes:
+    # What is as bright as what is behind it hardly changes the place that it leaves; its points tell.
+    least = CARRIED if firm else here + BETTER
+    if best.apart(pose, it.radius) >= MOVED_PX and peak >= 0.3 and there >= least:
         return _seen_moving(track, best, peak, there, scene)
     if kept < COVERED and colour_agreement(scene, best, it)[0] > OWN_COLOURS:
         return _seen_moving(track, best, peak, there, scene)
