@@ -18,7 +18,7 @@ from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
 from visup.agent.contract.phases import AgentSnapshot, Phase
-from visup.agent.contract.saving import Saveable
+from visup.agent.contract.saving import Saveable, Stateless
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
 from visup.agent.model.events import Alert, AlertCondition, Directive, Event, Severity
@@ -118,6 +118,7 @@ __all__ = [
     "Severity",
     "Spin",
     "StageBelief",
+    "Stateless",
     "Status",
     "Step",
     "TaskBelief",

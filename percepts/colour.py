@@ -7,14 +7,14 @@ mask is eroded first. What a palette is called, `rules/traits/colours.py` says.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.contract.behaviour import Contract
+from visup.agent.contract.saving import Stateless
 from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Observation, Percept, Region
 
@@ -34,20 +34,13 @@ Palette = tuple[tuple[float, float, float, float], ...]
 """(L*, a*, b*, share) of each entry, the greatest share first; shares sum to at most 1."""
 
 
-class ColourBehaviour:
+class ColourBehaviour(Stateless):
     """Reports a palette of each region, five times a second.
 
     Its percepts are of the kind 'colour'; their value is a mapping of `region_id` and `palette`.
     """
 
     contract = Contract("colour", gives=("colour",), needs=("region",), every_s=0.2)
-
-    def save(self) -> Mapping[str, Any]:
-        """Nothing: each frame stands for itself."""
-        return {}
-
-    def load(self, state: Mapping[str, Any]) -> None:
-        """Nothing is remembered."""
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]

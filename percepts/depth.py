@@ -12,12 +12,12 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
 
 import cv2
 from scipy.spatial.distance import pdist
 
 from visup.agent.contract.behaviour import Contract
+from visup.agent.contract.saving import Stateless
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Directive
 from visup.agent.model.records import Depth, Frame, Hypothesis, Observation, Percept, Region
@@ -33,7 +33,7 @@ LEAST_RELATIVE_SIGMA = 0.03
 """Even a perfect match has its area from a finite set of views and a pixel grid."""
 
 
-class DepthBehaviour:
+class DepthBehaviour(Stateless):
     """Reports the depth of each whole region under each identity that it may have.
 
     Args:
@@ -64,13 +64,6 @@ class DepthBehaviour:
         self._areas = {(v.name, v.number): v.area for v in views if v.area is not None}
         known = extents(database, sizes_m) if database is not None else {}
         self._enlarged = {n: sizes_m[n] / extent for n, extent in known.items()}
-
-    def save(self) -> Mapping[str, Any]:
-        """Nothing: each frame stands for itself."""
-        return {}
-
-    def load(self, state: Mapping[str, Any]) -> None:
-        """Nothing is remembered."""
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]

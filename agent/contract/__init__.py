@@ -9,7 +9,7 @@ from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
 from visup.agent.contract.phases import AgentSnapshot, Phase
-from visup.agent.contract.saving import Saveable
+from visup.agent.contract.saving import Saveable, Stateless
 
 __all__ = [
     "AgentSnapshot",
@@ -20,4 +20,5 @@ __all__ = [
     "Phase",
     "Reasoner",
     "Saveable",
+    "Stateless",
 ]

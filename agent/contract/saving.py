@@ -19,6 +19,17 @@ class Saveable(Protocol):
         ...
 
 
+class Stateless:
+    """A behaviour that holds nothing from frame to frame: saved, it is as it was made."""
+
+    def save(self) -> Mapping[str, Any]:
+        """Nothing: each frame stands for itself."""
+        return {}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Nothing is remembered."""
+
+
 def saved_attributes(it: object, *left_out: str) -> dict[str, Any]:
     """The attributes of an object besides those left out: what most `save` methods give."""
     return {name: value for name, value in vars(it).items() if name not in left_out}

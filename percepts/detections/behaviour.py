@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.agent.model.errors import BehaviourError
 from visup.percepts.detections.boxes import Detection
 from visup.percepts.detections.files import Frames
 from visup.percepts.detections.network import YoloNetwork
@@ -41,14 +42,18 @@ class DetectorBehaviour:
     names: tuple[str, ...] = ()
 
     def __init__(self, find: Callable[[Frame], Iterable[Detection]] | None = None) -> None:
-        if find is not None:
-            self.find = find  # type: ignore[method-assign,assignment]  # a function in place of it
+        self._find = find
         self._numbering = BoxNumbering()
         self._past: dict[int, list[tuple[float, float, float]]] = {}
 
     def find(self, frame: Frame) -> Iterable[Detection]:
         """The boxes of a frame."""
-        raise NotImplementedError("a detector says in `find` what there is in a frame")
+        if self._find is None:
+            raise BehaviourError(
+                "this detector does not say what there is in a frame",
+                expected="a function that gives the boxes of a frame, or a subclass with its own `find`",
+            )
+        return self._find(frame)
 
     def save(self) -> Mapping[str, Any]:
         """Where things were a moment ago."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
-from visup.agent import Contract, Directive, Frame, Observation, Percept
+from visup.agent import Contract, Directive, Frame, Observation, Percept, Stateless
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """What rules can write."""
@@ -28,7 +28,7 @@ class SignalSource(Protocol):
         """What is known at a time, seconds of the video; what is not known is left out."""
 
 
-class SignalBehaviour:
+class SignalBehaviour(Stateless):
     """Reports all known signals with each frame.
 
     Args:
@@ -46,13 +46,6 @@ class SignalBehaviour:
         if not all(s.names for s in self._sources):
             return frozenset()
         return frozenset[str]().union(*(s.names for s in self._sources))
-
-    def save(self) -> Mapping[str, Any]:
-        """Nothing is remembered: files are read by time, and what a broker told is gone."""
-        return {}
-
-    def load(self, state: Mapping[str, Any]) -> None:
-        """Take on nothing."""
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]

@@ -9,6 +9,7 @@ at all moments between, so that of the piece in which g was true the rest is ask
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any, Protocol
@@ -51,7 +52,7 @@ class Pointwise:
         return []
 
 
-class Swept:
+class Swept(ABC):
     """What all operators with windows share: a sweep over lanes, and how far it may go.
 
     Args:
@@ -77,9 +78,9 @@ class Swept:
         every = lanes if self._grid is None else (*lanes, self._grid)
         self._sweep = Sweep(every, lambda *v: join(*v[: len(lanes)]), self.merges)
 
+    @abstractmethod
     def put(self, piece: Piece) -> None:
         """Put one piece into the lanes."""
-        raise NotImplementedError
 
     def take(self, rows: Sequence[list[Piece]]) -> list[Piece]:
         """See `Operator`."""

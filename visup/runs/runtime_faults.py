@@ -6,8 +6,7 @@ with the percepts, and comes out the same when the run is replayed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
 
 from visup.agent import (
     AlertCondition,
@@ -18,13 +17,14 @@ from visup.agent import (
     Observation,
     Outcome,
     Percept,
+    Stateless,
 )
 
 RUNTIME_FAULT = "trouble"
 FaultSource = Callable[[], Iterable[AlertCondition]]
 
 
-class RuntimeFaults:
+class RuntimeFaults(Stateless):
     """A behaviour that asks parts of the product for their faults before each step."""
 
     contract = Contract("troubles", gives=(RUNTIME_FAULT,))
@@ -35,13 +35,6 @@ class RuntimeFaults:
     def add_source(self, source: FaultSource) -> None:
         """Ask also this one from now on."""
         self._sources.append(source)
-
-    def save(self) -> Mapping[str, Any]:
-        """Nothing: each source answers for now."""
-        return {}
-
-    def load(self, state: Mapping[str, Any]) -> None:
-        """Nothing is remembered."""
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from visup.percepts.motion.outlines.region_outline import RegionOutline, region_
 from visup.percepts.motion.static_camera.track_fusion import MotionEvidence
 from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_region_area
 from visup.percepts.motion.tracks.track import Indices, Track
+
+T = TypeVar("T")
 
 
 def apply_ignore(
@@ -117,11 +119,7 @@ def report_regions(
         return _share_outline(t.share, [o.share for o in told if o is not t], scene, size, least)
 
     told_now = [t for t in told if t.last_seen == scene.time]
-    later = [beside.submit(drawn, t) for t in told_now[1::2]]
-    shapes: list[RegionOutline | None] = [None] * len(told_now)
-    shapes[::2] = [drawn(t) for t in told_now[::2]]
-    shapes[1::2] = [shape.result() for shape in later]
-    out = [_region(t, s, scale) for t, s in zip(told_now, shapes, strict=True) if s is not None]
+    out = [_region(t, shape, scale) for t, shape in _outlined(told_now, drawn, beside)]
     return tuple(sorted(out, key=lambda r: r.id))
 
 
@@ -154,15 +152,22 @@ def report_objects(
         share = object_share(state.objects, o.key, state.belief.share)
         return _share_outline(share, [], scene, size, least)
 
-    later = [beside.submit(drawn, o) for o in told[1::2]]
-    shapes: list[RegionOutline | None] = [None] * len(told)
-    shapes[::2] = [drawn(o) for o in told[::2]]
-    shapes[1::2] = [shape.result() for shape in later]
     return tuple(
         _object_region(o, shape, by_id.get(o.track), state, scene)
-        for o, shape in zip(told, shapes, strict=True)
-        if shape is not None
+        for o, shape in _outlined(told, drawn, beside)
     )
+
+
+def _outlined(
+    things: Sequence[T], drawn: Callable[[T], RegionOutline | None], beside: Executor
+) -> list[tuple[T, RegionOutline]]:
+    """Things with their outlines, every other one drawn beside; those without one are left out."""
+    later = [beside.submit(drawn, thing) for thing in things[1::2]]
+    shapes: list[RegionOutline | None] = [None] * len(things)
+    shapes[::2] = [drawn(thing) for thing in things[::2]]
+    shapes[1::2] = [shape.result() for shape in later]
+    pairs = zip(things, shapes, strict=True)
+    return [(thing, shape) for thing, shape in pairs if shape is not None]
 
 
 def _object_region(

@@ -18,7 +18,7 @@ from visup.percepts.video import Ending, open_source
 from visup.percepts.video.ros_bag import PLAIN, is_bag
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="visup[ros] is not installed")
-typesys = pytest.importorskip("rosbags.typesys")
+typesys = pytest.importorskip("rosbags.typesys", reason="visup[ros] is not installed")
 TYPES = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
 PIXELS = st.integers(0, 2**32 - 1).map(
     lambda seed: np.random.default_rng(seed).integers(0, 256, (6, 8, 3)).astype(np.uint8)
