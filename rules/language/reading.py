@@ -144,7 +144,7 @@ def read_repaired(
         if fault is None:
             break
         repair = None
-        if len(repairs) < MOST_REPAIRS:
+        if len(repairs) < MOST_REPAIRS and patience.left >= 0:
             repair = find_repair(
                 text,
                 fault,
@@ -203,13 +203,14 @@ def _line_of(text: str, at: int) -> tuple[int, int]:
 
 Weight = tuple[int, int]
 """How bad a text is: 1 and how much of it is left unread, or 0 and how many faults of meaning it has."""
+UNTRIED: Weight = (2, 0)
 
 
 def weight(text: str, patience: Patience) -> Weight:
     """How bad the text of a rule is; of one that cannot be tried any more as bad as can be."""
     patience.left -= len(text)
     if patience.left < 0:
-        return 2, 0
+        return UNTRIED
     fault = _syntax_fault(text, "start")
     if fault is not None:
         return 1, len(text) - place_of(text, fault)[0]
@@ -227,6 +228,8 @@ def with_tried_edits(
         weigh: How bad a text is.
     """
     before = weigh(block)
+    if before == UNTRIED:
+        return list(faults)
     return [_with_edit(block, f, before, weigh) for f in faults]
 
 

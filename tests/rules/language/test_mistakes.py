@@ -1,8 +1,11 @@
 """Deliberate mistakes: each is told with its place, what was expected, and a change that makes it legal."""
 
+from functools import partial
+
 import pytest
 
 from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
+from visup.rules.language import reading
 from visup.rules.language.fixes import fix_of
 from visup.rules.language.parser import parse_rules
 
@@ -124,3 +127,16 @@ def test_a_slip_hides_nothing_of_what_else_is_wrong_with_the_rule() -> None:
 def test_what_is_no_rule_at_all_is_told_in_time() -> None:
     noise = "rule " + "( ) when or and [ for 2 " * 300
     assert errors_of(noise)
+
+
+def test_what_more_slips_cost_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked = []
+    monkeypatch.setattr(reading, "find_repair", lambda *_: looked.append("repair"))
+    monkeypatch.setattr(reading, "fix_of", lambda *_: looked.append("hint"))
+    slip = 'rule r(a, b) info\n when touching(a, b) and and nearr(b)\n say "x"\n'
+    spent = reading.Patience(left=-1)
+    found = reading.read_repaired(slip, "start", "r.rules", reading.RULES, spent)
+    told = found.told(slip)
+    weigh = partial(reading.weight, patience=spent)
+    assert told == reading.with_tried_edits(slip, told, weigh)
+    assert not looked
