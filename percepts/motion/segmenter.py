@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import cv2
@@ -76,7 +77,11 @@ from visup.percepts.motion.tracks.measurements import (
     predicted_positions,
 )
 from visup.percepts.motion.tracks.merge_split import assign_unknown, merge_tracks, split_occluded
-from visup.percepts.motion.tracks.salience import stationary_cells, update_salience
+from visup.percepts.motion.tracks.salience import (
+    stands_there,
+    stationary_cells,
+    update_salience,
+)
 from visup.percepts.motion.tracks.track import Tracks
 from visup.percepts.motion.tracks.track_fitting import fit_tracks
 from visup.percepts.motion.tracks.track_prediction import label_priors, predict_tracks
@@ -90,19 +95,22 @@ class MotionSegmenter:
 
     Args:
         settings: What can be set.
+        model: What was learnt of moving foreground; as the settings say when None.
 
     Attributes:
         settings: As given.
         trace: How the last frame was understood; None before the second one of a size.
     """
 
-    def __init__(self, settings: MotionSettings | None = None) -> None:
+    def __init__(
+        self, settings: MotionSettings | None = None, model: ForegroundModel | None = None
+    ) -> None:
         self.settings = settings or MotionSettings()
         # Cells and points do not need each other: one core each. What is found is the same.
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
-        self._model = _model(self.settings)
+        self._model = model or _model(self.settings)
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -178,7 +186,8 @@ class MotionSegmenter:
         if self._model is None:
             self.trace = SegmentationTrace(scene, tracked.tracks, tracked.keys, tracked.posterior)
             return
-        admission = Admission(min_region_area(scene, self.settings), self._ids)
+        stands = partial(stands_there, scene)
+        admission = Admission(min_region_area(scene, self.settings), self._ids, stands)
         old = self._history.back(1)
         cues, self._foreground = follow_foreground(
             self._foreground, self._model, scene, old, tracked, admission

@@ -47,7 +47,7 @@ class MotionSettings:
     max_regions: int = 32
     least_blob: float = 0.0003
     missed_s: float = 3.0
-    learnt: bool = False
+    learnt: bool = True
     foreground: Path | None = None
 
     def __post_init__(self) -> None:

@@ -26,7 +26,8 @@ NEVER = 0.003  # share of the image that counts as nothing at all
 DOUBT = 0.02  # share by which a carried belief is never quite sure
 FIRST = 0.1  # belief where there was no frame before
 MOST_OF = 50  # the log odds of one cell in so many are above those called the most of the frame
-ALONE_NEAR, PAST = len(NAMES) + 1, len(NAMES) + 4  # columns of the cues in context
+ALONE_NEAR, PAST, TOGETHER = (len(NAMES) + k for k in (1, 4, 10))  # columns of the cues in context
+CUES_IN_CONTEXT = len(NAMES) + 17
 TEXTURE = NAMES.index("texture")
 CALM = 8.0  # texture, grey levels a pixel, at which a flow is half trusted
 TRUST = 1.0  # weight of a value that is fully trusted, beside affinities
@@ -84,7 +85,7 @@ def believed(belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats) -
 
 
 def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
-    """The cues of a frame with those that need more than one superpixel, (count, D + 14) float32.
+    """The cues of a frame with those that need more than one superpixel, (count, CUES_IN_CONTEXT) float32.
 
     Args:
         belief: After the frame before.
@@ -109,6 +110,7 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
         *(past, near[:, 1]),
         *(tones, near[:, 2]),
         *even.T,
+        *_together(cues, np.column_stack([alone, past])).T,
         *whole,
         seen,
     ]
@@ -151,6 +153,14 @@ def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
         np.ascontiguousarray(trust, dtype=np.float32),
         SWEEPS,
     )
+
+
+def _together(cues: FrameCues, values: NDArray[Any]) -> Floats:
+    """Means of values (count, K) over all cells that go with the same motion, and its extent, (count, K + 1)."""
+    areas = np.bincount(cues.part, cues.area)
+    sums = [np.bincount(cues.part, cues.area * v) / np.maximum(areas, 1) for v in values.T]
+    extent = np.log(NEVER + areas / cues.area.sum())
+    return np.column_stack([*sums, extent])[cues.part].astype(np.float32)
 
 
 def _near(cues: FrameCues, values: Floats) -> Floats:

@@ -56,6 +56,8 @@ class FrameCues:
         here: (L,) int32, cells of this frame,
         there: (L,) int32, and the cells of the frame before that they come from.
         looked: (count,) float32, pixels of each cell of which it was asked where they come from.
+        part: (count,) int32, which motion each cell goes with: 0 the background's, else a track's, or one of
+            its own.
     """
 
     values: Floats
@@ -67,6 +69,7 @@ class FrameCues:
     here: Labels
     there: Labels
     looked: Floats
+    part: Labels
 
     def carried(self, values: Floats) -> Floats:
         """Values (count before, K) of the cells before, as they come to those of this frame."""
@@ -87,8 +90,21 @@ class CueMemory:
     way: Floats
 
 
-def track_shares(posterior: Floats, confirmed: NDArray[np.bool_]) -> Floats:
-    """How far each cell belongs to tracks that are reported, and to candidates, (count, 2) float32.
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackCues:
+    """What tracks say of the superpixels of a frame.
+
+    Attributes:
+        shares: (count, 2) float32, how far each cell belongs to tracks that are reported, and to candidates.
+        part: As in `FrameCues`.
+    """
+
+    shares: Floats
+    part: Labels
+
+
+def track_cues(posterior: Floats, confirmed: NDArray[np.bool_]) -> TrackCues:
+    """What tracks say of superpixels.
 
     Args:
         posterior: (count, K + 2), of background, K tracks and unknown motion.
@@ -96,14 +112,15 @@ def track_shares(posterior: Floats, confirmed: NDArray[np.bool_]) -> Floats:
     """
     tracks = posterior[:, 1:-1]
     known = tracks[:, confirmed].sum(axis=1)
-    return np.stack([known, tracks.sum(axis=1) - known], axis=1).astype(np.float32)
+    shares = np.stack([known, tracks.sum(axis=1) - known], axis=1)
+    return TrackCues(shares.astype(np.float32), posterior.argmax(axis=1).astype(np.int32))
 
 
 def frame_cues(
     scene: FrameMeasurements,
     flow: Floats,
     old: WorkImage,
-    shares: Floats,
+    tracked: TrackCues,
     memory: CueMemory | None,
 ) -> tuple[FrameCues, CueMemory]:
     """The cues of a frame.
@@ -112,7 +129,7 @@ def frame_cues(
         scene: The frame as measured.
         flow: (h, w, 2) float32, from the newest image back to the one before.
         old: The image before.
-        shares: (count, 2) float32, by `track_shares`.
+        tracked: What tracks say of its superpixels.
         memory: Of the frame before; None when there is none of the same size.
 
     Returns:
@@ -144,7 +161,7 @@ def frame_cues(
         np.hypot(way[:, 0], way[:, 1]) / (way[:, 2] + 0.5),
         _border_distance(cells),
         *_frame_cues(length, np.hypot(*ground.T), median, background.scale),
-        *shares.T,
+        *tracked.shares.T,
     ]
     values = np.column_stack(columns).astype(np.float32)
     link = cells.link
@@ -158,6 +175,7 @@ def frame_cues(
         here if memory is not None else here[:0],
         there if memory is not None else there[:0],
         looked,
+        tracked.part,
     )
     return cues, CueMemory(labels, way)
 

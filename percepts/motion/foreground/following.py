@@ -12,8 +12,9 @@ from visup.percepts.motion.foreground.cues import (
     NAMES,
     CueMemory,
     FrameCues,
+    TrackCues,
     frame_cues,
-    track_shares,
+    track_cues,
 )
 from visup.percepts.motion.foreground.objects import (
     Admission,
@@ -82,13 +83,14 @@ class TrackPosterior:
         for number, t in enumerate(seen, 1):
             place[self.keys.index(t.key) + 1] = number
         winner = place[self.posterior.argmax(axis=1)]
-        return TrackCells([t.id for t in seen], {t.id for t in alive}, winner)
+        share = np.where(winner > 0, self.posterior.max(axis=1), 0).astype(np.float32)
+        return TrackCells([t.id for t in seen], {t.id for t in alive}, winner, share)
 
-    def shares(self) -> Floats:
-        """(count, 2) float32, of reported tracks and of candidates."""
+    def cues(self) -> TrackCues:
+        """What they say of the superpixels."""
         reported = {t.key for t in self.tracks if t.id > 0}
         confirmed = np.array([key in reported for key in self.keys], dtype=bool)
-        return track_shares(self.posterior, confirmed)
+        return track_cues(self.posterior, confirmed)
 
 
 def follow_foreground(
@@ -112,7 +114,7 @@ def follow_foreground(
     Returns:
         The cues of the frame, and the state.
     """
-    cues, memory = frame_cues(scene, scene.flow, old, tracked.shares(), state.memory)
+    cues, memory = frame_cues(scene, scene.flow, old, tracked.cues(), state.memory)
     belief = updated(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
     objects = follow_objects(state.objects, cues, belief, tracks, scene.time, admission)

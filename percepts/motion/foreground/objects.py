@@ -8,7 +8,7 @@ together with none is a candidate, and an object once it has lasted.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -29,6 +29,9 @@ MOVES = 0.5  # belief from which a cell is part of an object
 CAME = 0.4  # share of a cell that comes from an object for it to be that object's still
 OWNED = 0.5  # share of a new track that is an object's already: then it is a part of that one
 EXISTS = 0.7  # running mean of the belief in what is reported: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
+STAYS = 0.6  # the same of what was told before, so that it does not flicker
+WHOLE = 0.9  # share of what is believed to move there that lies in a track which is the whole of it
+BORNE = 0.5  # mean belief in the cells of such a track
 EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # the same for what no track follows: both beliefs
 LEAST_PX = 0.25  # beside the ground, from frame to frame: twice what sampling and compression leave
 RESIDUAL = NAMES.index("residual")
@@ -51,6 +54,7 @@ class MovingObject:
         existence: Running mean of the belief in its superpixels.
         borne_out: The same by the cues of superpixels alone.
         followed: Whether a track ever followed it.
+        told: Whether it was ever believed enough to be told.
     """
 
     key: int
@@ -61,6 +65,7 @@ class MovingObject:
     existence: float = 0.0
     borne_out: float = 0.0
     followed: bool = False
+    told: bool = False
 
     @property
     def exists(self) -> bool:
@@ -70,7 +75,7 @@ class MovingObject:
         believed bears itself out for ever.
         """
         if self.followed:
-            return self.existence >= EXISTS
+            return self.existence >= (STAYS if self.told else EXISTS)
         return self.existence >= EXISTS_ALONE and self.borne_out >= BORNE_OUT
 
 
@@ -80,11 +85,13 @@ class ForegroundObjects:
 
     Attributes:
         owner: (count,) int64, key of the object that has each superpixel, or 0.
+        share: (count,) float32, how surely each superpixel is a part of an object.
         known: The objects by key.
         last_key: The greatest key given so far.
     """
 
     owner: Keys
+    share: Floats
     known: Mapping[int, MovingObject]
     last_key: int
 
@@ -102,7 +109,9 @@ class ForegroundObjects:
 
 def no_objects() -> ForegroundObjects:
     """Before the first frame."""
-    return ForegroundObjects(np.zeros(0, np.int64), MappingProxyType({}), 0)
+    return ForegroundObjects(
+        np.zeros(0, np.int64), np.zeros(0, np.float32), MappingProxyType({}), 0
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,11 +122,13 @@ class TrackCells:
         seen: Public ids of K of them.
         alive: Public ids of all that live, hidden ones too.
         winner: (count,) int64, place among those seen, from 1, of the track that has each cell, or 0.
+        share: (count,) float32, how far that track has it; 0 where none has.
     """
 
     seen: Sequence[int]
     alive: Collection[int]
     winner: Keys
+    share: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,10 +138,13 @@ class Admission:
     Attributes:
         least: Its least area, working pixels.
         ids: Gives its public id.
+        stands: Whether cells, (count,) bool, go as a thing at rest that stands on the ground there: what
+            no track follows is not told then.
     """
 
     least: float
     ids: IdAllocator
+    stands: Callable[[NDArray[np.bool_]], bool] = lambda cells: False
 
 
 def follow_objects(
@@ -161,18 +175,19 @@ def follow_objects(
     owner, fresh = _candidates(owner, moves, cues, admission.least, last_key)
     last_key += len(fresh)
     known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
-    objects = ForegroundObjects(owner, known, last_key)
+    objects = ForegroundObjects(owner, belief.share, known, last_key)
     # What goes no further than sampling leaves from frame to frame does not bear itself out.
     moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
     belief = replace(belief, alone=belief.alone * moved)
-    return _seen(objects, belief, cues.area, now, admission)
+    return _drawn_by_tracks(_seen(objects, belief, cues.area, now, admission), tracks, cues.area)
 
 
-def object_share(objects: ForegroundObjects, key: int, share: Floats) -> Floats:
-    """(count,) float32: the belief where an object has the cells, less than a half elsewhere."""
+def object_share(objects: ForegroundObjects, key: int) -> Floats:
+    """(count,) float32: how surely an object has each superpixel, less than a half where it has not."""
     mine = objects.owner == key
     taken = (objects.owner > 0) & ~mine
-    return np.where(mine, share, np.where(taken, 0, np.minimum(share, 0.49))).astype(np.float32)
+    rest = np.where(taken, 0, np.minimum(objects.share, 0.49))
+    return np.where(mine, objects.share, rest).astype(np.float32)
 
 
 def object_velocity(
@@ -192,6 +207,29 @@ def object_velocity(
     middle = np.median(moved, axis=0)
     off = float(np.median(np.abs(moved - middle))) / np.sqrt(max(len(moved), 1))
     return float(middle[0]), float(middle[1]), 1.5 * off + 0.1
+
+
+def _drawn_by_tracks(
+    objects: ForegroundObjects, tracks: TrackCells, area: Floats
+) -> ForegroundObjects:
+    """The objects with all cells of a track that is the whole of what moves there.
+
+    What is rigid a track outlines better than single cells do. Of what is not it follows a part: then much
+    that is believed to move lies beside it.
+    """
+    owner, share = objects.owner.copy(), objects.share.copy()
+    key_of = {o.track: o.key for o in objects.known.values() if o.track}
+    for place, track in enumerate(tracks.seen, 1):
+        key = key_of[track]
+        mine, followed = owner == key, tracks.winner == place
+        believed = area[mine].sum()
+        if not believed or area[mine & followed].sum() < WHOLE * believed:
+            continue
+        if area[followed] @ objects.share[followed] < BORNE * area[followed].sum():
+            continue
+        share[followed] = np.maximum(share[followed], tracks.share[followed])
+        owner[followed & (owner == 0)] = key
+    return replace(objects, owner=owner, share=share)
 
 
 def _came_from(before: ForegroundObjects, cues: FrameCues) -> Keys:
@@ -301,10 +339,13 @@ def _seen(
             existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
             borne_out=o.borne_out + weight * (float(alone[k] / pixels[k]) - o.borne_out),
         )
-        known[k] = (
-            replace(o, id=admission.ids.new()) if not o.id and o.frames >= LASTS and o.exists else o
-        )
+        if not o.id and o.frames >= LASTS and o.exists:
+            if admission.stands(objects.owner == k):
+                o = replace(o, frames=0)
+            else:
+                o = replace(o, id=admission.ids.new())
+        known[k] = replace(o, told=o.told or bool(o.id and o.exists))
     held = np.zeros(objects.last_key + 1, dtype=bool)
     held[list(known)] = True
     owner = np.where(held[objects.owner], objects.owner, 0)
-    return ForegroundObjects(owner, MappingProxyType(known), objects.last_key)
+    return ForegroundObjects(owner, objects.share, MappingProxyType(known), objects.last_key)

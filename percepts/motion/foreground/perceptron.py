@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import SourceError
 from visup.percepts.motion.features.work_image import Floats
 
-FORMAT = 1
+FORMAT = 2
 FAR = 4.0  # standard deviations beyond which a cue tells no more
 
 
@@ -59,6 +59,11 @@ class ForegroundModel:
     context: Perceptron
 
 
+def blank_model(alone: int, context: int) -> ForegroundModel:
+    """A model that knows nothing of so many cues: it says even odds of everything."""
+    return ForegroundModel(_blank(alone), _blank(context))
+
+
 def write_model(model: ForegroundModel, path: Path, made: Mapping[str, Any]) -> None:
     """Write a model, with what it was made of; the same model gives the same bytes."""
     record = {
@@ -91,6 +96,12 @@ def shipped_model() -> ForegroundModel:
     """The model that ships."""
     file = resources.files("visup.percepts.motion.foreground") / "foreground.json"
     return _model(file.read_text(encoding="utf-8"))
+
+
+def _blank(cues: int) -> Perceptron:
+    none = np.zeros(1, np.float32)
+    zeros, ones = np.zeros(cues, np.float32), np.ones(cues, np.float32)
+    return Perceptron(zeros, ones, np.zeros((cues, 1), np.float32), none, none, 0.0)
 
 
 def _model(text: str) -> ForegroundModel:

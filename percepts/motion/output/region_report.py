@@ -149,7 +149,7 @@ def report_objects(
     told = state.objects.reported(scene.time)
 
     def drawn(o: MovingObject) -> RegionOutline | None:
-        share = object_share(state.objects, o.key, state.belief.share)
+        share = object_share(state.objects, o.key)
         return _share_outline(share, [], scene, size, least)
 
     return tuple(

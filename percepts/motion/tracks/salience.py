@@ -42,6 +42,8 @@ FEWEST_AROUND = 8
 MOST_BORDER = 0.2  # share of the image border that an object may take up when it is first told
 LITTLE_BORDER = 0.04  # the same for one told at first sight: there parallax is greatest
 FOOT = 0.15  # share of the height of a region that is its foot
+LEAST_OWN = 0.25  # pixels from frame to frame: twice what sampling and compression leave
+SWAYS = 0.15  # share of the motion of the ground that counts as none beside it: the foot is not seen to a pixel
 AHEAD = 0.4  # how much faster than the background, the same way, a near thing that rests may go
 
 
@@ -224,6 +226,22 @@ def upright_motion(m: BaselineMotion, foot: tuple[float, float] | None) -> Affin
     matrix = np.zeros((2, 3))
     matrix[:, 2] = m.background.models[-1].shift(foot)
     return Affine(matrix)
+
+
+def stands_there(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
+    """Whether cells go, from one frame to the next, as a thing at rest that stands upright there does.
+
+    Args:
+        scene: The frame.
+        mine: (count,) bool, the cells.
+    """
+    rest = upright_motion(scene.measured[0], foot_point(mine, scene.cells))
+    if rest is None:
+        return False
+    x, y = scene.cells.centre[mine].astype(np.int64).T
+    moved = -np.median(scene.flow[y, x], axis=0)
+    ground = rest.matrix[:, 2]
+    return bool(np.hypot(*(moved - ground)) < LEAST_OWN + SWAYS * np.hypot(*ground))
 
 
 def _misfit(m: BaselineMotion, local: Sequence[Affine]) -> NDArray[np.float32]:

@@ -88,6 +88,7 @@ def sequence(seed: int, frames: int = 6, count: int = 120) -> list[Example]:
             cells if n else cells[:0],
             cells if n else cells[:0],
             np.ones(count, np.float32),
+            np.zeros(count, np.int32),
         )
         out.append(Example(cues, truth if n % 2 == 0 else None, np.ones(count, np.float32)))
     return out

@@ -14,7 +14,7 @@ import numpy as np
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.motion.folds import dealt
 from visup.evaluation.training.examples import Example
-from visup.evaluation.training.fitting import Rows, fit_perceptron
+from visup.evaluation.training.fitting import Rows, fit_ensemble
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import (
     ALONE_NEAR,
@@ -54,7 +54,7 @@ def train(sequences: Sequences, seed: int, progress: Progress = silent) -> Foreg
     fold = dealt(names, FOLDS)
     plain = {n: Judged([e.cues.values for e in sequences[n]], sequences[n]) for n in names}
     progress("cues alone")
-    alone = fit_perceptron(_rows(plain, names, seed), seed)
+    alone = fit_ensemble(_rows(plain, names, seed), seed)
     others = _crossed(plain, fold, seed)
     contexts = {
         n: _contexts(
@@ -69,7 +69,7 @@ def train(sequences: Sequences, seed: int, progress: Progress = silent) -> Foreg
             n: _contexts(sequences[n], others[fold[n]], judges[fold[n]].log_odds) for n in names
         }
     progress("context")
-    return ForegroundModel(alone, fit_perceptron(_rows(contexts, names, seed), seed))
+    return ForegroundModel(alone, fit_ensemble(_rows(contexts, names, seed), seed))
 
 
 def _crossed(
@@ -79,7 +79,7 @@ def _crossed(
     out = {}
     for number in sorted(set(fold.values())):
         rest = [n for n in judged if fold[n] != number] or list(judged)
-        out[number] = fit_perceptron(_rows(judged, rest, seed), seed)
+        out[number] = fit_ensemble(_rows(judged, rest, seed), seed)
     return out
 
 

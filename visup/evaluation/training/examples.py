@@ -16,9 +16,10 @@ from visup.evaluation.motion.code_digest import code_digest, files_digest
 from visup.evaluation.motion.mask_scores import UNSCORED
 from visup.evaluation.motion.runner import LabelledSequence, labelled_frames
 from visup.evaluation.motion.variants import AS_IT_IS
-from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.foreground.cues import FrameCues
+from visup.percepts.motion.foreground.belief import CUES_IN_CONTEXT
+from visup.percepts.motion.foreground.cues import NAMES, FrameCues
+from visup.percepts.motion.foreground.perceptron import blank_model
 from visup.percepts.motion.segmenter import MotionSegmenter
 
 SEEING = ("features", "layers", "tracks", "foreground/cues.py", "foreground/_cues_jit.py")
@@ -68,7 +69,8 @@ def _kept(file: Path, footage: Callable[[], Footage]) -> list[Example]:
 
 def _collect(footage: Footage) -> Iterator[Example]:
     """The examples of a video as it is segmented."""
-    segmenter = MotionSegmenter(MotionSettings(learnt=True))
+    # Cues are the same whatever is believed of them.
+    segmenter = MotionSegmenter(model=blank_model(len(NAMES), CUES_IN_CONTEXT))
     for frame, labels in footage:
         segmenter.step(frame)
         if segmenter.trace is not None and segmenter.trace.cues is not None:
@@ -96,7 +98,7 @@ def _cell_truth(
 
 
 _PARTS = tuple(f.name for f in fields(FrameCues))
-_SHORT = ("here", "there", "neighbours")
+_SHORT = ("here", "there", "neighbours", "part")
 
 
 def _write(file: Path, examples: Sequence[Example]) -> None:

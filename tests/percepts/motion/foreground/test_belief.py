@@ -10,7 +10,9 @@ from scipy import sparse
 from visup.percepts.motion.foreground._cues_jit import settled
 from visup.percepts.motion.foreground.belief import (
     ALONE_NEAR,
+    CUES_IN_CONTEXT,
     PAST,
+    TOGETHER,
     believed,
     context_cues,
     unbiased,
@@ -20,7 +22,10 @@ from visup.percepts.motion.foreground.cues import NAMES, FrameCues, tone_bins
 COUNT = 60
 
 
-def frame(tones: np.ndarray, first: bool = False) -> FrameCues:
+ONE_PART = np.zeros(COUNT, np.int32)
+
+
+def frame(tones: np.ndarray, first: bool = False, part: np.ndarray = ONE_PART) -> FrameCues:
     ones = np.ones(COUNT - 1, np.float32)
     link = sparse.diags([ones, ones], [-1, 1], format="csr")
     cells = np.arange(0 if first else COUNT, dtype=np.int32)
@@ -34,6 +39,7 @@ def frame(tones: np.ndarray, first: bool = False) -> FrameCues:
         cells,
         cells,
         np.ones(COUNT, np.float32),
+        part,
     )
 
 
@@ -65,6 +71,20 @@ def test_neighbours_are_told_of() -> None:
     alone[30] = 8
     near = context_cues(unbiased(), frame(two_tones(), first=True), alone)[:, ALONE_NEAR]
     assert np.flatnonzero(near > 0).tolist() == [29, 31]
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_what_goes_together_speaks_as_one_whatever_its_number(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    part = rng.integers(0, 4, COUNT).astype(np.int32)
+    alone = rng.normal(size=COUNT).astype(np.float32)
+    told = context_cues(unbiased(), frame(two_tones(), True, part), alone)
+    other = context_cues(unbiased(), frame(two_tones(), True, (3 - part).astype(np.int32)), alone)
+    assert np.allclose(told, other, atol=1e-5)
+    for k in np.unique(part):
+        assert np.allclose(told[part == k, TOGETHER], alone[part == k].mean(), atol=1e-5)
+    assert told.shape[1] == CUES_IN_CONTEXT
 
 
 @given(st.integers(0, 1000))

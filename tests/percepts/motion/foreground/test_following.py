@@ -12,7 +12,7 @@ DISC = (lambda n: (60 + 3.0 * n, 80.0), 26.0, texture(2, (320, 480), 0, 255))
 
 
 def test_what_moves_over_a_panning_ground_is_believed_and_reported_under_one_id() -> None:
-    segmenter = MotionSegmenter(MotionSettings(learnt=True))
+    segmenter = MotionSegmenter()
     ids, fits = set(), []
     for shot in clip(texture(1, (320, 480)), lambda n: (20 + 1.5 * n, 30), [DISC], 16):
         regions = segmenter.step(shot.frame)
@@ -30,8 +30,8 @@ def test_what_moves_over_a_panning_ground_is_believed_and_reported_under_one_id(
     assert 0 <= belief.min() < 0.1 < 0.9 < belief.max() <= 1
 
 
-def test_nothing_is_believed_unless_it_is_asked_for() -> None:
-    segmenter = MotionSegmenter()
+def test_nothing_is_believed_where_that_is_not_wanted() -> None:
+    segmenter = MotionSegmenter(MotionSettings(learnt=False))
     for n in range(3):
         segmenter.step(Frame(n, n / 25, np.full((96, 128, 3), 40 * n, np.uint8)))
     assert segmenter.trace is not None
@@ -39,6 +39,6 @@ def test_nothing_is_believed_unless_it_is_asked_for() -> None:
 
 
 def test_a_picture_without_any_structure_is_no_trouble() -> None:
-    segmenter = MotionSegmenter(MotionSettings(learnt=True))
+    segmenter = MotionSegmenter()
     for n in range(4):
         assert segmenter.step(Frame(n, n / 25, np.full((96, 128, 3), 40 * n, np.uint8))) == ()

@@ -38,6 +38,7 @@ def row(shift: int = 0, residual: float = 0.0) -> FrameCues:
         here,
         (here - shift).astype(np.int32),
         np.ones(COUNT, np.float32),
+        np.zeros(COUNT, np.int32),
     )
 
 
@@ -54,7 +55,7 @@ def tracks(**cells: slice) -> TrackCells:
     for place, part in enumerate(cells.values(), 1):
         winner[part] = place
     ids = [int(k[1:]) for k in cells]
-    return TrackCells(ids, ids, winner)
+    return TrackCells(ids, ids, winner, np.where(winner > 0, 0.9, 0).astype(np.float32))
 
 
 class Row:
@@ -65,6 +66,7 @@ class Row:
         self.ids = IdAllocator()
         self.frame = 0
         self.ids.reserve(100)
+        self.stands = False
 
     def step(
         self,
@@ -80,9 +82,8 @@ class Row:
         cues = row(shift, residual)
         none = np.zeros(BINS**3)
         belief = Belief(believed, believed if alone is None else alone, none, none)
-        self.objects = follow_objects(
-            self.objects, cues, belief, seen or tracks(), now, Admission(64.0 * 3, self.ids)
-        )
+        admission = Admission(64.0 * 3, self.ids, lambda cells: self.stands)
+        self.objects = follow_objects(self.objects, cues, belief, seen or tracks(), now, admission)
         return {
             o.id: np.flatnonzero(self.objects.owner == o.key).tolist()
             for o in self.objects.reported(now)
@@ -160,10 +161,34 @@ def test_a_track_that_was_not_seen_for_a_moment_comes_back_as_the_same() -> None
     for _ in range(LASTS + 10):
         first = world.step(share(slice(5, 15)))
     world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
-    hidden = TrackCells([], [7], np.zeros(COUNT, np.int64))
+    hidden = TrackCells([], [7], np.zeros(COUNT, np.int64), np.zeros(COUNT, np.float32))
     for _ in range(60):
         assert world.step(share(), hidden) == {}
     assert world.step(share(slice(5, 15)), tracks(t7=slice(5, 15))) == first
+
+
+def test_what_stands_there_is_told_only_where_a_track_is_sure_of_it() -> None:
+    world = Row()
+    world.stands = True
+    assert all(world.step(share(slice(5, 15))) == {} for _ in range(20))
+    assert world.step(share(slice(5, 15)), tracks(t7=slice(5, 15))) == {7: list(range(5, 15))}
+
+
+def test_a_track_that_is_the_whole_gives_its_outline_and_a_part_does_not() -> None:
+    for believed, outline in (((5, 12), range(5, 15)), ((2, 15), range(2, 15))):
+        world = Row()
+        found = world.step(share(slice(*believed)), tracks(t7=slice(5, 15)))
+        assert found == {7: list(outline)}
+
+
+def test_what_was_told_does_not_flicker() -> None:
+    world = Row()
+    sure, less = share(slice(5, 15)), share()
+    less[5:15] = 0.65
+    assert world.step(less, tracks(t7=slice(5, 15))) == {}
+    for _ in range(5):
+        world.step(sure, tracks(t7=slice(5, 15)))
+    assert all(world.step(less, tracks(t7=slice(5, 15))) for _ in range(20))
 
 
 def test_the_share_of_an_object_is_at_most_a_half_elsewhere() -> None:
@@ -171,5 +196,5 @@ def test_the_share_of_an_object_is_at_most_a_half_elsewhere() -> None:
     believed = share(slice(5, 21))
     world.step(believed, tracks(t7=slice(5, 13), t8=slice(13, 21)))
     for key in world.objects.known:
-        mine = object_share(world.objects, key, believed)
+        mine = object_share(world.objects, key)
         assert ((mine > 0.5) == (world.objects.owner == key)).all()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from visup.agent.model.errors import SourceError
+from visup.percepts.motion.foreground.belief import CUES_IN_CONTEXT
 from visup.percepts.motion.foreground.cues import NAMES
 from visup.percepts.motion.foreground.perceptron import (
     ForegroundModel,
@@ -72,4 +73,4 @@ def test_parts_that_do_not_fit_are_refused(tmp_path: Path) -> None:
 def test_the_shipped_model_takes_the_cues_that_there_are() -> None:
     model = shipped_model()
     assert len(model.alone.mean) == len(NAMES)
-    assert len(model.context.mean) == len(NAMES) + 14
+    assert len(model.context.mean) == CUES_IN_CONTEXT
