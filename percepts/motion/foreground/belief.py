@@ -156,7 +156,7 @@ def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
 
 
 def _together(cues: FrameCues, values: NDArray[Any]) -> Floats:
-    """Means of values (count, K) over all cells that go with the same motion, and its extent, (count, K + 1)."""
+    """Means of values (count, K) over all cells of one motion, and its extent, (count, K + 1)."""
     areas = np.bincount(cues.part, cues.area)
     sums = [np.bincount(cues.part, cues.area * v) / np.maximum(areas, 1) for v in values.T]
     extent = np.log(NEVER + areas / cues.area.sum())

@@ -43,7 +43,7 @@ MOST_BORDER = 0.2  # share of the image border that an object may take up when i
 LITTLE_BORDER = 0.04  # the same for one told at first sight: there parallax is greatest
 FOOT = 0.15  # share of the height of a region that is its foot
 LEAST_OWN = 0.25  # pixels from frame to frame: twice what sampling and compression leave
-SWAYS = 0.15  # share of the motion of the ground that counts as none beside it: the foot is not seen to a pixel
+SWAYS = 0.15  # share of the ground's motion that counts as none: where a foot is, is not seen to a pixel
 AHEAD = 0.4  # how much faster than the background, the same way, a near thing that rests may go
 
 
