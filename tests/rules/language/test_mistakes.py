@@ -8,6 +8,7 @@ from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, Visu
 from visup.rules.language import reading
 from visup.rules.language.fixes import fix_of
 from visup.rules.language.parser import parse_rules
+from visup.rules.predicates.vocabulary import RULES as VOCABULARY
 
 CONDITIONS = [
     "not touching(a, b), seen(a)",
@@ -135,7 +136,7 @@ def test_what_more_slips_cost_is_bounded(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(reading, "fix_of", lambda *_: looked.append("hint"))
     slip = 'rule r(a, b) info\n when touching(a, b) and and nearr(b)\n say "x"\n'
     spent = reading.Patience(left=-1)
-    found = reading.read_repaired(slip, "start", "r.rules", reading.RULES, spent)
+    found = reading.read_repaired(slip, "start", "r.rules", VOCABULARY, spent)
     told = found.told(slip)
     weigh = partial(reading.weight, patience=spent)
     assert told == reading.with_tried_edits(slip, told, weigh)

@@ -58,7 +58,7 @@ def fit_ensemble(rows: Rows, seed: int) -> Perceptron:
         first.deviation,
         np.concatenate([m.hidden for m in members], axis=1),
         np.concatenate([m.offset for m in members]),
-        np.concatenate([m.out for m in members]) / np.float32(MEMBERS),
+        (np.concatenate([m.out for m in members]) / MEMBERS).astype(np.float32),
         float(np.mean([m.bias for m in members])),
     )
 
