@@ -95,7 +95,8 @@ class MotionSegmenter:
 
     Args:
         settings: What can be set.
-        model: What was learnt of moving foreground; as the settings say when None.
+        model: What was learnt of moving foreground; as the settings say when None. One that is given is
+            asked in every frame, else none while the camera is static, when nothing comes of its answer.
 
     Attributes:
         settings: As given.
@@ -111,6 +112,7 @@ class MotionSegmenter:
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
         self._model = model or _model(self.settings)
+        self._always = model is not None
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -183,8 +185,11 @@ class MotionSegmenter:
 
     def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
         """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
-        if self._model is None:
-            self.trace = SegmentationTrace(scene, tracked.tracks, tracked.keys, tracked.posterior)
+        known = self._foreground.objects
+        if self._model is None or (self._static.active and not self._always):
+            self._foreground = replace(self._foreground, memory=None)
+            tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
+            self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
         stands = partial(stands_there, scene)
         admission = Admission(min_region_area(scene, self.settings), self._ids, stands)

@@ -42,3 +42,22 @@ def test_a_picture_without_any_structure_is_no_trouble() -> None:
     segmenter = MotionSegmenter()
     for n in range(4):
         assert segmenter.step(Frame(n, n / 25, np.full((96, 128, 3), 40 * n, np.uint8))) == ()
+
+
+def test_while_the_camera_is_static_nothing_is_asked_of_the_belief_and_ids_stay() -> None:
+    """A camera pans, rests, and pans again; the disc keeps its id."""
+    segmenter, ids, asked = MotionSegmenter(), set(), []
+    disc = (lambda n: (60 + 1.0 * n, 80.0), 26.0, texture(2, (320, 480), 0, 255))
+    ground = texture(1, (320, 480))
+
+    def camera(n: int) -> tuple[float, float]:
+        return 20 + 0.8 * (min(n, 16) + max(n - 75, 0)), 30.0
+
+    for n, shot in enumerate(clip(ground, camera, [disc], 92)):
+        regions = segmenter.step(shot.frame)
+        if n >= 12:
+            ids |= {r.id for r in regions if (r.full_mask(shot.frame.size) & shot.masks[0]).any()}
+        if n and segmenter.camera_static:
+            asked.append(segmenter.trace.cues is not None)
+    assert any(not a for a in asked)
+    assert len(ids) == 1
