@@ -191,8 +191,8 @@ class MotionSegmenter:
             tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
-        stands = partial(stands_there, scene)
-        admission = Admission(min_region_area(scene, self.settings), self._ids, stands)
+        least, stands = min_region_area(scene, self.settings), partial(stands_there, scene)
+        admission = Admission(least, self._ids, stands, alone=not self._foreground.calm)
         old = self._history.back(1)
         cues, self._foreground = follow_foreground(
             self._foreground, self._model, scene, old, tracked, admission

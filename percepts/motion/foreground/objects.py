@@ -140,11 +140,13 @@ class Admission:
         ids: Gives its public id.
         stands: Whether cells, (count,) bool, go as a thing at rest that stands on the ground there: what
             no track follows is not told then.
+        alone: Whether what no track follows may be told at all.
     """
 
     least: float
     ids: IdAllocator
-    stands: Callable[[NDArray[np.bool_]], bool] = lambda cells: False
+    stands: Callable[[NDArray[np.bool_]], bool]
+    alone: bool
 
 
 def follow_objects(
@@ -339,7 +341,7 @@ def _seen(
             existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
             borne_out=o.borne_out + weight * (float(alone[k] / pixels[k]) - o.borne_out),
         )
-        if not o.id and o.frames >= LASTS and o.exists:
+        if admission.alone and not o.id and o.frames >= LASTS and o.exists:
             if admission.stands(objects.owner == k):
                 o = replace(o, frames=0)
             else:

@@ -58,6 +58,7 @@ def test_while_the_camera_is_static_nothing_is_asked_of_the_belief_and_ids_stay(
         if n >= 12:
             ids |= {r.id for r in regions if (r.full_mask(shot.frame.size) & shot.masks[0]).any()}
         if n and segmenter.camera_static:
+            assert segmenter.trace is not None
             asked.append(segmenter.trace.cues is not None)
     assert any(not a for a in asked)
     assert len(ids) == 1

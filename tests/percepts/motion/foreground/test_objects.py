@@ -67,6 +67,7 @@ class Row:
         self.frame = 0
         self.ids.reserve(100)
         self.stands = False
+        self.alone = True
 
     def step(
         self,
@@ -82,7 +83,7 @@ class Row:
         cues = row(shift, residual)
         none = np.zeros(BINS**3)
         belief = Belief(believed, believed if alone is None else alone, none, none)
-        admission = Admission(64.0 * 3, self.ids, lambda cells: self.stands)
+        admission = Admission(64.0 * 3, self.ids, lambda cells: self.stands, self.alone)
         self.objects = follow_objects(self.objects, cues, belief, seen or tracks(), now, admission)
         return {
             o.id: np.flatnonzero(self.objects.owner == o.key).tolist()
@@ -172,6 +173,14 @@ def test_what_stands_there_is_told_only_where_a_track_is_sure_of_it() -> None:
     world.stands = True
     assert all(world.step(share(slice(5, 15))) == {} for _ in range(20))
     assert world.step(share(slice(5, 15)), tracks(t7=slice(5, 15))) == {7: list(range(5, 15))}
+
+
+def test_what_no_track_follows_takes_no_id_where_it_may_not_be_told() -> None:
+    world = Row()
+    world.alone = False
+    assert all(world.step(share(slice(5, 15))) == {} for _ in range(20))
+    world.alone = True
+    assert list(world.step(share(slice(5, 15)))) == [world.ids.new() - 1]
 
 
 def test_a_track_that_is_the_whole_gives_its_outline_and_a_part_does_not() -> None:
