@@ -32,6 +32,7 @@ from visup.percepts.motion.foreground.following import (
     TrackPosterior,
     follow_foreground,
     no_foreground,
+    resting,
 )
 from visup.percepts.motion.foreground.objects import Admission
 from visup.percepts.motion.foreground.perceptron import (
@@ -96,7 +97,7 @@ class MotionSegmenter:
     Args:
         settings: What can be set.
         model: What was learnt of moving foreground; as the settings say when None. One that is given is
-            asked in every frame, else none while the camera is static, when nothing comes of its answer.
+            asked in every frame, else not while the ground hardly moves, when nothing comes of its answer.
 
     Attributes:
         settings: As given.
@@ -186,8 +187,9 @@ class MotionSegmenter:
     def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
         """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
         known = self._foreground.objects
-        if self._model is None or (self._static.active and not self._always):
-            self._foreground = replace(self._foreground, memory=None)
+        unused = self._static.active or self._foreground.calm
+        if self._model is None or (unused and not self._always):
+            self._foreground = resting(self._foreground, scene)
             tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
@@ -204,7 +206,8 @@ class MotionSegmenter:
 
     def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
         """Regions of the objects of the foreground; of the tracks while the ground hardly moves."""
-        if self._model is not None and not (self._static.active or self._foreground.calm):
+        asked = self._foreground.memory is not None
+        if asked and not (self._static.active or self._foreground.calm):
             return report_objects(
                 self._foreground, tracks, scene, self._size, self.settings, self._beside
             )

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.foreground.belief import Belief, unbiased, updated
 from visup.percepts.motion.foreground.cues import (
-    NAMES,
     CueMemory,
     FrameCues,
     TrackCues,
@@ -27,7 +27,6 @@ from visup.percepts.motion.foreground.perceptron import ForegroundModel
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
-GROUND_SPEED = NAMES.index("ground_speed")
 CALM_PX = (
     0.25  # cameras at rest and in orbit: 0.00 in the median; those that travel or pan: 0.5 to 34
 )
@@ -42,18 +41,42 @@ class ForegroundState:
         memory: What the cues of the next frame need; None before the first.
         belief: Of its superpixels.
         objects: Those that it is made of.
-        ground_px: Running mean of how far the ground goes from frame to frame, working pixels.
+        ground_px: Running mean of how far the ground goes from frame to frame, working pixels; None before
+            it was seen to.
     """
 
     memory: CueMemory | None
     belief: Belief
     objects: ForegroundObjects
-    ground_px: float = 0.0
+    ground_px: float | None = None
 
     @property
     def calm(self) -> bool:
         """Whether the ground hardly moves: then tracks, over long baselines, tell more than single frames."""
-        return self.ground_px < CALM_PX
+        return self.ground_px is not None and self.ground_px < CALM_PX
+
+
+def resting(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
+    """The state after a frame in which nothing is asked of the belief: only the ground is looked at.
+
+    Args:
+        state: After the frame before.
+        scene: The frame as measured.
+    """
+    return replace(state, memory=None, ground_px=_ground_px(state, scene))
+
+
+def _ground_px(state: ForegroundState, scene: FrameMeasurements) -> float:
+    """The running mean of how far the ground goes, with a frame."""
+    x, y = scene.cells.centre.astype(np.int64).T
+    models = scene.measured[0].background.models
+    ground = np.stack([model.at(scene.cells.centre) for model in models])
+    # Of several motions of the background, such as none, a cell goes with the one that flow is nearest to.
+    nearest = np.linalg.norm(ground + scene.flow[y, x], axis=-1).argmin(axis=0)
+    speed = float(np.median(np.linalg.norm(ground, axis=-1)[nearest, np.arange(len(nearest))]))
+    return (
+        speed if state.ground_px is None else state.ground_px + FOLLOW * (speed - state.ground_px)
+    )
 
 
 def no_foreground() -> ForegroundState:
@@ -118,6 +141,4 @@ def follow_foreground(
     belief = updated(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
     objects = follow_objects(state.objects, cues, belief, tracks, scene.time, admission)
-    speed = float(np.exp(cues.values[0, GROUND_SPEED])) - 0.1
-    known = state.ground_px if state.memory is not None else speed
-    return cues, ForegroundState(memory, belief, objects, known + FOLLOW * (speed - known))
+    return cues, ForegroundState(memory, belief, objects, _ground_px(state, scene))
