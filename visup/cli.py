@@ -27,7 +27,6 @@ from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
 from visup.terminal.console import complain, echo
 from visup.terminal.overview import Overview
-from visup.version import __version__
 
 BAD_INPUT = 2
 
@@ -70,6 +69,8 @@ app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from visup.version import __version__
+
         echo(f"visup {__version__}")
         raise typer.Exit
 
