@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -83,11 +83,12 @@ from visup.percepts.motion.tracks.salience import (
     stationary_cells,
     update_salience,
 )
-from visup.percepts.motion.tracks.track import Tracks
+from visup.percepts.motion.tracks.track import Track, Tracks
 from visup.percepts.motion.tracks.track_fitting import fit_tracks
 from visup.percepts.motion.tracks.track_prediction import label_priors, predict_tracks
 from visup.percepts.motion.tracks.warping import dense_likelihood, flow_back
 
+Numbered = TypeVar("Numbered", Track, Region)
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
 
 
@@ -186,11 +187,10 @@ class MotionSegmenter:
 
     def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
         """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
-        known = self._foreground.objects
         unused = self._static.active or self._foreground.calm
         if self._model is None or (unused and not self._always):
             self._foreground = resting(self._foreground, scene)
-            tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
+            tracks = self._under_ids_of_objects(tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
         least, stands = min_region_area(scene, self.settings), partial(stands_there, scene)
@@ -199,8 +199,7 @@ class MotionSegmenter:
         cues, self._foreground = follow_foreground(
             self._foreground, self._model, scene, old, tracked, admission
         )
-        known = self._foreground.objects
-        tracks = tuple(replace(t, id=known.id_of_track(t.id)) for t in tracked.tracks)
+        tracks = self._under_ids_of_objects(tracked.tracks)
         share = self._foreground.belief.share
         self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior, cues, share)
 
@@ -212,8 +211,12 @@ class MotionSegmenter:
                 self._foreground, tracks, scene, self._size, self.settings, self._beside
             )
         found = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        return self._under_ids_of_objects(found)
+
+    def _under_ids_of_objects(self, found: Sequence[Numbered]) -> tuple[Numbered, ...]:
+        """Tracks or regions of tracks under the ids of the objects that they follow."""
         known = self._foreground.objects
-        return tuple(replace(r, id=known.id_of_track(r.id)) for r in found)
+        return tuple(replace(one, id=known.id_of_track(one.id)) for one in found)
 
     def _begin(self, image: WorkImage) -> None:
         """Take in the first frame of a size: there is nothing to compare it with."""
