@@ -8,70 +8,62 @@ Rooms, in the order in which to read them:
 4. `execution/`: how behaviours are run and contained.
 5. `plugins/`: how behaviours are found and made.
 6. `storage/`: journals and checkpoints.
+
+Names are loaded when they are first used: errors, which everything raises, come without the rest.
 """
 
-from dataclasses import is_dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
-from visup.agent.contract.contract import Contract
-from visup.agent.contract.limits import Limits
-from visup.agent.contract.phases import AgentSnapshot, Phase
-from visup.agent.contract.saving import Saveable, Stateless
-from visup.agent.model.display import enable_display
-from visup.agent.model.errors import VisupError
-from visup.agent.model.events import Alert, AlertCondition, Directive, Event, Severity
-from visup.agent.model.memory import MemoryKey
-from visup.agent.model.mind import Mind, Zone
-from visup.agent.model.object_beliefs import (
-    Candidate,
-    Coupling,
-    ObjectBelief,
-    Pose,
-    Presence,
-    Question,
-    Spin,
-)
-from visup.agent.model.records import (
-    CameraMotion,
-    Depth,
-    Frame,
-    Health,
-    HealthStatus,
-    Hypothesis,
-    Observation,
-    PastFrame,
-    Percept,
-    Region,
-    Report,
-    ReportState,
-    Truth,
-)
-from visup.agent.model.relation_columns import Column, Relation
-from visup.agent.model.relation_table import RelationTable
-from visup.agent.model.step import Step
-from visup.agent.model.task_beliefs import (
-    Binding,
-    Expectation,
-    Prospect,
-    StageBelief,
-    Status,
-    TaskBelief,
-    Verdict,
-)
+from visup.agent.lazy_names import lazy_names
 
 if TYPE_CHECKING:
+    from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
+    from visup.agent.contract.contract import Contract
+    from visup.agent.contract.limits import Limits
+    from visup.agent.contract.phases import AgentSnapshot, Phase
+    from visup.agent.contract.saving import Saveable, Stateless
     from visup.agent.cycle.agent import Agent, Reasoners
+    from visup.agent.model.errors import VisupError
+    from visup.agent.model.events import Alert, AlertCondition, Directive, Event, Severity
+    from visup.agent.model.memory import MemoryKey
+    from visup.agent.model.mind import Mind, Zone
+    from visup.agent.model.object_beliefs import (
+        Candidate,
+        Coupling,
+        ObjectBelief,
+        Pose,
+        Presence,
+        Question,
+        Spin,
+    )
+    from visup.agent.model.records import (
+        CameraMotion,
+        Depth,
+        Frame,
+        Health,
+        HealthStatus,
+        Hypothesis,
+        Observation,
+        PastFrame,
+        Percept,
+        Region,
+        Report,
+        ReportState,
+        Truth,
+    )
+    from visup.agent.model.relation_columns import Column, Relation
+    from visup.agent.model.relation_table import RelationTable
+    from visup.agent.model.step import Step
+    from visup.agent.model.task_beliefs import (
+        Binding,
+        Expectation,
+        Prospect,
+        StageBelief,
+        Status,
+        TaskBelief,
+        Verdict,
+    )
     from visup.agent.plugins.registry import Registry, discover_behaviours
-
-_LAZY = {
-    "Agent": "visup.agent.cycle.agent",
-    "Reasoners": "visup.agent.cycle.agent",
-    "Registry": "visup.agent.plugins.registry",
-    "discover_behaviours": "visup.agent.plugins.registry",
-}
-"""Names that bring NumPy and the behaviours' runners: imported when first asked for."""
 
 __all__ = [
     "Agent",
@@ -130,15 +122,84 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # else every name would be there for checkers
-
-    def __getattr__(name: str) -> Any:
-        if name not in _LAZY:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(_LAZY[name]), name)
-
-
-_NOT_SHOWN = {AgentSnapshot, Column, Contract, Limits, MemoryKey, PastFrame}
-enable_display(
-    *{k for k in list(vars().values()) if isinstance(k, type) and is_dataclass(k)} - _NOT_SHOWN
+# Where each name is found when it is first used; type checkers and editors read the imports above.
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "visup.agent.contract.behaviour": (
+            "Behaviour",
+            "Outcome",
+            "Reasoner",
+        ),
+        "visup.agent.contract.contract": ("Contract",),
+        "visup.agent.contract.limits": ("Limits",),
+        "visup.agent.contract.phases": (
+            "AgentSnapshot",
+            "Phase",
+        ),
+        "visup.agent.contract.saving": (
+            "Saveable",
+            "Stateless",
+        ),
+        "visup.agent.cycle.agent": (
+            "Agent",
+            "Reasoners",
+        ),
+        "visup.agent.model.errors": ("VisupError",),
+        "visup.agent.model.events": (
+            "Alert",
+            "AlertCondition",
+            "Directive",
+            "Event",
+            "Severity",
+        ),
+        "visup.agent.model.memory": ("MemoryKey",),
+        "visup.agent.model.mind": (
+            "Mind",
+            "Zone",
+        ),
+        "visup.agent.model.object_beliefs": (
+            "Candidate",
+            "Coupling",
+            "ObjectBelief",
+            "Pose",
+            "Presence",
+            "Question",
+            "Spin",
+        ),
+        "visup.agent.model.records": (
+            "CameraMotion",
+            "Depth",
+            "Frame",
+            "Health",
+            "HealthStatus",
+            "Hypothesis",
+            "Observation",
+            "PastFrame",
+            "Percept",
+            "Region",
+            "Report",
+            "ReportState",
+            "Truth",
+        ),
+        "visup.agent.model.relation_columns": (
+            "Column",
+            "Relation",
+        ),
+        "visup.agent.model.relation_table": ("RelationTable",),
+        "visup.agent.model.step": ("Step",),
+        "visup.agent.model.task_beliefs": (
+            "Binding",
+            "Expectation",
+            "Prospect",
+            "StageBelief",
+            "Status",
+            "TaskBelief",
+            "Verdict",
+        ),
+        "visup.agent.plugins.registry": (
+            "Registry",
+            "discover_behaviours",
+        ),
+    },
 )

@@ -20,8 +20,9 @@ To read the source, begin here:
 `docs/tour.md` follows one frame through all of it, and `docs/architecture.md` is the map.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from visup.agent.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from visup.agent import (
@@ -95,19 +96,7 @@ _HOMES = {
     "visup.teaching": ("learn", "teach"),
     "visup.version": ("__version__",),
 }
-_HOME_OF = {
-    name.rpartition(" as ")[2]: (module, name.partition(" as ")[0])
-    for module, names in _HOMES.items()
-    for name in names
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'visup' has no attribute {name!r}")
-    module, there = _HOME_OF[name]
-    found = globals()[name] = getattr(import_module(module), there)
-    return found
+__getattr__ = lazy_names(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

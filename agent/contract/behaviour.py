@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from visup.agent.contract.contract import Contract
+from visup.agent.model.display import enable_display
 from visup.agent.model.events import AlertCondition, Directive, Event
 from visup.agent.model.mind import Mind
 from visup.agent.model.records import Frame, Observation, Percept
@@ -62,3 +63,6 @@ class Outcome:
 Reasoner = Callable[[Mind, Observation], Outcome]
 """A pure function of the mind and of what was observed. It keeps nothing to itself: what it must
 remember goes into the mind under its own `MemoryKey`, so that minds can be saved and restored."""
+
+
+enable_display(Outcome)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
+from visup.agent.model.display import enable_display
 from visup.agent.model.records import empty
 
 
@@ -120,3 +121,6 @@ class Directive:
     kind: str
     reason: str
     data: Mapping[str, Any] = field(default_factory=empty)
+
+
+enable_display(Alert, AlertCondition, Directive, Event)

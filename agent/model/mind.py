@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.model.display import enable_display
 from visup.agent.model.events import Alert
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey, Remembered
@@ -156,3 +157,6 @@ class Mind:
     def _table(self) -> RelationTable:
         given = self.relations
         return given if isinstance(given, RelationTable) else RelationTable(extra=given)
+
+
+enable_display(Mind, Zone)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from visup.agent.model.display import enable_display
 from visup.agent.model.records import Region
 
 UNKNOWN_OBJECT = "unknown object"
@@ -149,3 +150,6 @@ class Coupling:
 
     objects: tuple[int, int]
     since: float
+
+
+enable_display(Candidate, Coupling, ObjectBelief, Pose, Question, Spin)

@@ -15,6 +15,8 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.model.display import enable_display
+
 if TYPE_CHECKING:
     # Only the types: records pass arrays on, so that importing them stays quick.
     import numpy as np
@@ -307,3 +309,6 @@ class PastFrame:
 
     frame: Frame
     observation: Observation
+
+
+enable_display(CameraMotion, Depth, Frame, Health, Hypothesis, Observation, Percept, Region, Report)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from visup.agent.model.display import enable_display
 from visup.agent.model.records import Truth
 
 if TYPE_CHECKING:
@@ -132,3 +133,6 @@ class RelationBlock:
             return None
         value = float(self.numbers[row, k])
         return value if value == value else None  # NaN is not equal to itself
+
+
+enable_display(Relation)

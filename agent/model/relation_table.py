@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 from operator import itemgetter
 from typing import TYPE_CHECKING, overload
 
+from visup.agent.model.display import enable_display
 from visup.agent.model.records import Truth
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, Relation, RelationBlock
 
@@ -265,3 +266,6 @@ def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
     """1 where a state has the code, 0 where it is unknown, else -1."""
     held = (state == code).astype("int8")
     return held + held - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]
+
+
+enable_display(RelationTable)

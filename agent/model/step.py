@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from visup.agent.model.display import drawn
+from visup.agent.model.display import drawn, enable_display
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Alert, Directive, Event
 from visup.agent.model.mind import Mind
@@ -74,3 +74,6 @@ class Step:
 
 Observer = Callable[[Step, Frame], None]
 """Told of each step after it is over: journal, console, report. It cannot change the agent."""
+
+
+enable_display(Step)

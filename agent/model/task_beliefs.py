@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from visup.agent.model.display import enable_display
+
 
 class Status(StrEnum):
     """How a stage of a task stands."""
@@ -132,3 +134,6 @@ class TaskBelief:
     active: float = 1.0
     bystanders: tuple[int, ...] = ()
     machines: tuple[tuple[int, ...], ...] = ()
+
+
+enable_display(Binding, Expectation, Prospect, StageBelief, TaskBelief)
