@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -14,8 +15,10 @@ import pytest
 from tests.cli import Call
 from tests.clips import moving_disc
 from tests.paths import ROOT
-from visup.agent import Verdict
+from visup.agent import Frame, Step, Verdict
 from visup.runs.result import ExitCode, RunResult
+from visup.runs.runner import Audience, supervise
+from visup.runs.settings import WatchSettings
 
 
 @pytest.fixture
@@ -114,7 +117,10 @@ def test_a_reader_that_goes_away_does_not_end_the_run(clip: Path, tmp_path: Path
     assert (run / "report.html").is_file()
 
 
-def test_ctrl_c_ends_a_run_with_its_own_code_and_a_report(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_signal_ends_a_run_with_its_own_code_and_a_report(
+    tmp_path: Path, how: signal.Signals
+) -> None:
     run, clip = tmp_path / "run", ROOT / "examples" / "data" / "bottles.mp4"
     words = ["watch", str(clip), "--no-video", "--json", "--out", str(run)]
     process = subprocess.Popen(
@@ -125,9 +131,24 @@ def test_ctrl_c_ends_a_run_with_its_own_code_and_a_report(tmp_path: Path) -> Non
     )
     assert process.stdout
     process.stdout.readline()  # the first event: it is under way
-    process.send_signal(signal.SIGINT)
+    process.send_signal(how)
     last = process.stdout.read().splitlines()[-1]
     assert process.wait(timeout=60) == ExitCode.STOPPED
     process.stdout.close()
     assert '"problem": "stopped by the user"' in last
     assert (run / "report.html").is_file()
+
+
+def test_a_stop_signal_that_is_swallowed_still_ends_the_run() -> None:
+    """As an interrupt inside compiled code is: printed, and dropped."""
+
+    def swallow(step: Step, frame: Frame) -> None:
+        if step.frame_index == 3:
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+
+    settings = WatchSettings(str(ROOT / "examples" / "data" / "bottles.mp4"))
+    result = supervise(settings, None, audience=Audience((swallow,)))
+    assert result.stopped
+    assert result.steps == 4
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
@@ -24,6 +24,7 @@ from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
+from visup.runs.stop_signals import StopSignals
 from visup.runs.wiring import build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 from visup.version import __version__
@@ -130,12 +131,15 @@ def supervise(
         VisupError: Something given is not as it should be.
     """
     run = supervised(settings, folder, audience or Audience(), options, past)
-    while True:
+    with StopSignals() as stop:
         try:
-            next(run)
+            with suppress(KeyboardInterrupt):  # it may come between two steps
+                while not stop.received:
+                    next(run)
+            run.throw(KeyboardInterrupt())
         except StopIteration as end:
             result: RunResult = end.value
-            return result
+    return result
 
 
 def supervised(
