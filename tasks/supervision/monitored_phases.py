@@ -181,9 +181,9 @@ class MonitoredPhases:
         return {(x.step.stage, x.payload.status) for x in leaves(hypothesis.state)}
 
     def next_stages(self, key: int, hypothesis: TaskHypothesis) -> Mapping[str, float]:
-        """See `TaskModel`."""
+        """See `TaskModel`; a course of which a stage has failed for good goes nowhere."""
         return (
-            {} if hypothesis.finished is not None else self.prognosis.next_stages(hypothesis.node)
+            {} if hypothesis.failed else self.prognosis.next_stages(self.hidden_state(hypothesis))
         )
 
     def success(self, key: int, hypothesis: TaskHypothesis) -> float:

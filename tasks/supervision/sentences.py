@@ -165,10 +165,13 @@ def _say(relation: str, actions: Words) -> str:
 
 def prospects_text(belief: TaskBelief) -> str:
     """What may come next and how likely the task still ends well, in one line."""
-    said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
-    end = 1.0 - sum(p.probability for p in belief.prospects)
-    said += [f"no further stage ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
-    coming = f"next: {', '.join(said)}" if said else "next: unknown"
     if belief.success is None:
-        return coming
-    return f"{coming}; ends well with a probability of {belief.success:.0%}"
+        return "next: unknown"
+    if belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
+        return "next: nothing, it is over"
+    chances = [(f"`{p.stage}`" if p.stage else "the end", p.probability) for p in belief.prospects]
+    lost = 1.0 - sum(p.probability for p in belief.prospects)
+    said = [
+        f"{what} ({chance:.0%})" for what, chance in (*chances, ("failure", lost)) if chance >= 0.01
+    ]
+    return f"next: {', '.join(said)}; ends well with a probability of {belief.success:.0%}"
