@@ -70,6 +70,7 @@ class Narrative:
     _staying: set[int] = field(default_factory=set)
     _told: dict[tuple[object, ...], float] = field(default_factory=dict)
     _alerts: set[object] = field(default_factory=set)
+    _lives_told: int = 0
 
     def lines(self, step: Step, frame: Frame | None) -> list[Event]:
         """What is told of one step.
@@ -78,6 +79,7 @@ class Narrative:
             step: The step.
             frame: Its frame, for colours, or None.
         """
+        self.budget.begin(step.time)
         ended = self.log.add(step, frame)
         if self.detail is Detail.ALL:
             return worded_once(step.events)
@@ -93,12 +95,14 @@ class Narrative:
             time: Of the last step, seconds.
             frame_index: Of its frame.
         """
-        lives = [*self._waiting, *(x for x in self.log.finish() if _counts(x))]
-        self._waiting = []
+        going_on = (x for x in self.log.finish() if _counts(x) and x.id not in self._staying)
+        lives, self._waiting = [*self._waiting, *going_on], []
         if self.detail is Detail.ALL:
             return []
         groups = sorted(_by_course(lives), key=len, reverse=True)
-        told = groups[: self.budget.at_once]
+        told = [g for g in groups if self.budget.take(time)]
+        if not self._lives_told:
+            told = told or groups[:1]  # however short the run, something is told of it
         return [_event(lives_sentence(g), g, time, frame_index) for g in told]
 
     def _worth_telling(self, event: Event, mind: Mind) -> bool:
@@ -132,11 +136,13 @@ class Narrative:
         while self._waiting and self.budget.take(step.time):
             group = max(_by_course(self._waiting), key=lambda g: (len(g), max(x.area for x in g)))
             self._waiting = [x for x in self._waiting if x not in group]
+            self._lives_told += 1
             yield _event(lives_sentence(group), group, step.time, step.frame_index)
         for life in self.log.alive.values():
             long = step.time - life.since >= STAYS_S and life.name is None and _counts(life)
             if long and life.id not in self._staying and self.budget.take(step.time):
                 self._staying.add(life.id)
+                self._lives_told += 1
                 yield _event(stay_sentence(life), [life], step.time, step.frame_index)
 
 

@@ -28,7 +28,7 @@ def summary_lines(log: LifeLog) -> Iterator[str]:
     if log.together:
         pair = min(log.together, key=lambda p: (-log.together[p], p))
         gap = log.gaps[pair]
-        closest = f"at the closest {gap:.0f} px apart" if gap >= 0.5 else "their outlines met"
+        closest = f"at the closest {gap:.0f} px apart" if gap >= 0.5 else "touching in the picture"
         yield (
             f"Busiest pair: objects {pair[0]} and {pair[1]}, near each other for "
             f"{log.together[pair]:.1f} s, {closest}."
