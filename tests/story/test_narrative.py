@@ -136,6 +136,18 @@ def test_a_short_clip_has_no_more_lines_a_minute_than_a_long_one(seconds: float,
     assert 1 <= len(told(steps)) <= most
 
 
+def test_the_summary_counts_those_too_of_whom_nothing_was_told() -> None:
+    steps = [
+        step(t, *(crossing(n, n, n + 1.0, t) for n in range(1, 6) if n <= t)) for t in times(8)
+    ]
+    narrative = Narrative()
+    lines = [e.text for s in steps for e in narrative.lines(s, None)]
+    assert not any("5" in text for text in lines)
+    assert next(iter(summary_lines(narrative.log, narrative.courses))) == (
+        "Seen: 5 objects, at most 2 at a time; 5 crossed from left to right."
+    )
+
+
 def test_lives_of_one_course_share_a_line() -> None:
     lanes = {4: 0.0, 5: 60.0, 6: 120.0, 7: 180.0, 8: 210.0, 9: 30.0}
     steps = [
@@ -164,7 +176,7 @@ def test_specks_and_glimpses_are_only_counted() -> None:
     assert [e for s in steps for e in narrative.lines(s, None)] + narrative.rest(
         steps[-1].time, 0
     ) == []
-    assert next(iter(summary_lines(narrative.log))) == "Seen: 1 object."
+    assert next(iter(summary_lines(narrative.log, narrative.courses))) == "Seen: 1 object."
 
 
 def test_relations_of_objects_that_nobody_knows_are_told_on_request_alone() -> None:
@@ -236,7 +248,7 @@ def test_a_summary_names_the_busiest_pair_and_the_longest_stay() -> None:
         narrative.lines(last, None)
     assert last is not None
     narrative.rest(last.time, last.frame_index)
-    assert list(summary_lines(narrative.log)) == [
+    assert list(summary_lines(narrative.log, narrative.courses)) == [
         "Seen: 3 objects, at most 3 at a time.",
         "Longest in view: object 1, 8.0 s, last in the middle.",
         "Busiest pair: objects 1 and 2, near each other for 4.9 s, at the closest 5 px apart.",

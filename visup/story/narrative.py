@@ -60,12 +60,14 @@ class Narrative:
         log: The lives of all objects.
         budget: Lines a minute of what is not grave and belongs to no task.
         withheld: Events that were not told.
+        courses: What objects did -> the ids of those that did it.
     """
 
     detail: Detail = Detail.USUAL
     log: LifeLog = field(default_factory=LifeLog)
     budget: LineBudget = field(default_factory=LineBudget)
     withheld: int = 0
+    courses: dict[str, set[int]] = field(default_factory=dict)
     _waiting: list[ObjectLife] = field(default_factory=list)
     _staying: set[int] = field(default_factory=set)
     _told: dict[tuple[object, ...], float] = field(default_factory=dict)
@@ -85,7 +87,7 @@ class Narrative:
             return worded_once(step.events)
         told = [e for e in worded_once(step.events) if self._worth_telling(e, step.mind)]
         self.withheld += len(step.events) - len(told)
-        self._waiting += [x for x in ended if _counts(x)]
+        self._waiting += self._counted(ended)
         return [*told, *self._lives(step)]
 
     def rest(self, time: float, frame_index: int) -> list[Event]:
@@ -95,8 +97,9 @@ class Narrative:
             time: Of the last step, seconds.
             frame_index: Of its frame.
         """
-        going_on = (x for x in self.log.finish() if _counts(x) and x.id not in self._staying)
-        lives, self._waiting = [*self._waiting, *going_on], []
+        going_on = self._counted(self.log.finish())
+        lives = [*self._waiting, *(x for x in going_on if x.id not in self._staying)]
+        self._waiting = []
         if self.detail is Detail.ALL:
             return []
         groups = sorted(_by_course(lives), key=len, reverse=True)
@@ -104,6 +107,13 @@ class Narrative:
         if not self._lives_told:
             told = told or groups[:1]  # however short the run, something is told of it
         return [_event(lives_sentence(g), g, time, frame_index) for g in told]
+
+    def _counted(self, lives: Sequence[ObjectLife]) -> list[ObjectLife]:
+        """Those that count; what they did is counted, told or not."""
+        found = [x for x in lives if _counts(x)]
+        for life in found:
+            self.courses.setdefault(course(life, "were"), set()).add(life.id)
+        return found
 
     def _worth_telling(self, event: Event, mind: Mind) -> bool:
         if event.kind not in ABOUT_OBJECTS and event.kind in EVENT_KINDS:
