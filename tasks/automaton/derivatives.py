@@ -9,6 +9,7 @@ are values: a supervisor may follow as many of them side by side as it likes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import product
@@ -27,6 +28,8 @@ from visup.tasks.grammar.nodes import (
     Conditioned,
     Counted,
     Course,
+    Deadline,
+    Delay,
     Hold,
     Reference,
     Repeated,
@@ -72,6 +75,7 @@ class TaskStep:
         conditions: By what it begins, ends, progresses or fails, where the course says so; one of a kind.
         inside: Every stage that has the action inside, the innermost with them.
         already: Whether it is done also by what has been so since before its turn.
+        delay: Least and greatest time, seconds, from the end of what comes before until it begins, or None.
     """
 
     action: str
@@ -82,6 +86,7 @@ class TaskStep:
     conditions: tuple[StageCondition, ...] = ()
     inside: frozenset[str] = frozenset()
     already: bool = False
+    delay: tuple[float, float] | None = None
 
     def condition(self, kind: str) -> StageCondition | None:
         """What the course says of how it begins, ends, progresses or fails, or None."""
@@ -274,11 +279,18 @@ class _Entrance(Generic[W]):
             case Already(item=item):
                 yield from self.states(replace(todo, course=item, already=True))
             case Timed() | Conditioned() as clauses:
-                yield from self.states(_surrounded(self.task, todo, clauses, self.now))
+                yield from self._clauses(todo, clauses)
             case Counted() as counted:
                 yield from self._counted(todo, counted)
             case Repeated() as repeated:
                 yield from self._repeated(todo, repeated)
+
+    def _clauses(
+        self, todo: Continuation, course: Timed | Conditioned
+    ) -> Iterator[State[W] | None]:
+        delay = _delay(self.task, course)
+        for state in self.states(_surrounded(self.task, todo, course, self.now)):
+            yield state if state is None or delay is None else _delayed(state, delay)
 
     def _fact(self, todo: Continuation, fact: Fact) -> Iterator[State[W] | None]:
         key, actors = fact_key(self.task, fact)
@@ -389,7 +401,23 @@ def _timed(
         seconds = value(task.amount(clause.duration))
         if isinstance(clause, Hold):
             continuation = replace(continuation, hold_s=seconds)
-        else:
+        elif isinstance(clause, Deadline):
             due = RunningDeadline(seconds, continuation.stage, now + seconds)
             continuation = replace(continuation, deadlines=(*continuation.deadlines, due))
     return continuation
+
+
+def _delay(task: Task, course: Timed | Conditioned) -> tuple[float, float] | None:
+    """The least and the greatest delay, seconds, with which a course begins, where it says so."""
+    clauses = course.clauses if isinstance(course, Timed) else ()
+    said = next((c for c in clauses if isinstance(c, Delay)), None)
+    if said is None:
+        return None
+    most = math.inf if said.most is None else value(task.amount(said.most))
+    return value(task.amount(said.duration)), most
+
+
+def _delayed(state: State[W], delay: tuple[float, float]) -> State[W]:
+    """A state whose steps begin with a delay."""
+    delayed = (replace(x, step=replace(x.step, delay=delay)) for x in leaves(state))
+    return with_leaves(state, delayed)

@@ -42,6 +42,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Delay,
     FloorPoint,
     Ground,
     Hold,
@@ -308,6 +309,10 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def deadline(self, items: list[Any]) -> Deadline:
         return Deadline(items[1], _of(items[0]).to(items[1].span))
+
+    def delay(self, items: list[Any]) -> Delay:
+        most = items[2] if len(items) > 2 else None
+        return Delay(items[1], most, _of(items[0]).to(items[-1].span))
 
     def sign(self, items: list[Any]) -> StageCondition:
         kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
