@@ -106,8 +106,9 @@ class CourseCheck:
                 if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
                     what = f"what takes at least {least:g} s cannot be over {deadline}"
                     yield self.source.fault("E208", what, deadline.span, "a longer `within`")
-            for delay in (d for d in delays[:1] if d.most is not None):
-                if value(self.task.amount(delay.most)) < value(self.task.amount(delay.duration)):
+            for delay in delays[:1]:
+                most = delay.most or delay.duration
+                if value(self.task.amount(most)) < value(self.task.amount(delay.duration)):
                     what = f"`{delay}` is never: the greatest delay is less than the least"
                     yield self.source.fault(
                         "E208", what, delay.span, "a greater number behind `to`"

@@ -56,7 +56,10 @@ SYNONYMS = {
 WORDS = (*RESERVED_WORDS, *ACTIONS, "leftmost", "rightmost", "ignored")
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
              "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
-KEYWORD = r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|when|any|order|already|each|of)"
+KEYWORD = (
+    r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|when|any|order|already|each"
+    r"|of)"
+)
 NAME = r"[^\W\d]\w*"
 CALL = rf"{NAME}\s*\([^()]*\)"
 TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"

@@ -265,8 +265,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Together(tuple(items), _all(items))
 
     def any_order(self, items: list[Any]) -> AnyOrder:
-        first, *courses, last = items
-        return AnyOrder(tuple(courses), _of(first).to(_of(last)))
+        return AnyOrder(tuple(items[1:-1]), _of(items[0]).to(_of(items[-1])))
 
     def any_of(self, items: list[Any]) -> AnyOrder:
         first, count, *courses, last = items
@@ -311,13 +310,11 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Deadline(items[1], _of(items[0]).to(items[1].span))
 
     def delay(self, items: list[Any]) -> Delay:
-        most = items[2] if len(items) > 2 else None
-        return Delay(items[1], most, _of(items[0]).to(items[-1].span))
+        return Delay(items[1], *items[2:], span=_of(items[0]).to(items[-1].span))
 
     def sign(self, items: list[Any]) -> StageCondition:
         kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
-        lasting = items[2] if len(items) > 2 else None
-        return StageCondition(kind, items[1], lasting, _of(items[0]).to(items[-1].span))
+        return StageCondition(kind, *items[1:], span=_of(items[0]).to(items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:
         span = _of(items[0]).to(_of(items[-1]))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.verification.step_monitor import StepMonitor
 
 

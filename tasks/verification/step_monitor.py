@@ -9,7 +9,7 @@ from typing import NamedTuple
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 
