@@ -33,19 +33,8 @@ def evidence(
     who, alone = names(step.actors), len(step.actors) < 2
     have, them = ("has", "it") if alone else ("have", "them")
     match monitor.status:
-        case Status.FAILING | Status.FAILED if (
-            monitor.early and step.delay and monitor.hasty_s is not None
-        ):
-            return (
-                f"it began {max(0.0, monitor.hasty_s):.1f} s after what comes before it, "
-                f"and should begin no sooner than {step.delay[0]:g} s after it"
-            )
         case Status.FAILING | Status.FAILED if monitor.early:
-            was = "was" if alone else "were"
-            return (
-                f"{who} {was} {meaning.text} before stage `{step.stage}` began, and should become so "
-                "in it"
-            )
+            return _too_soon(step, meaning, monitor)
         case Status.FAILED if monitor.late:
             return _late(step, now)
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
@@ -128,6 +117,20 @@ def _held(
     if followed is not None and (monitor.begun is None or followed > monitor.begun):
         over = min(over, followed)
     return f"{was} {meaning.text} until {over:.1f} s"
+
+
+def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -> str:
+    """What came before its turn, or before its delay was over."""
+    if step.delay is not None and monitor.hasty_s is not None:
+        return (
+            f"it began {max(0.0, monitor.hasty_s):.1f} s after what comes before it, "
+            f"and should begin no sooner than {step.delay[0]:g} s after it"
+        )
+    was = "was" if len(step.actors) < 2 else "were"
+    return (
+        f"{names(step.actors)} {was} {meaning.text} before stage `{step.stage}` began, "
+        "and should become so in it"
+    )
 
 
 def _late(step: TaskStep, now: float) -> str:
