@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 from visup.tasks.automaton.automaton import END, Automaton, Transition
-from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.stage_hmm import WAITING, StageHmm
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.transitions import HiddenState
 
 MOST_NODES = 1_000  # beyond so many nodes success is counted as none

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from visup.agent import AlertCondition, Event, Mind, Severity, TaskBelief, Truth, Verdict
-from visup.tasks.automaton.derivatives import leaves
+from visup.tasks.automaton.states import leaves
 from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Invariant
 from visup.tasks.grammar.structure import fact_key

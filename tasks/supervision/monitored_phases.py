@@ -18,9 +18,9 @@ from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.backpointers import behind
-from visup.tasks.automaton.derivatives import TaskStep, leaves, with_leaves
 from visup.tasks.automaton.prognosis import Prognosis, begun_by
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, StageHmm
+from visup.tasks.automaton.states import TaskStep, leaves, with_leaves
 from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.automaton.transitions import HiddenState
 from visup.tasks.grammar.nodes import Task

@@ -14,7 +14,6 @@ from tests.oracles.recognition_tasks import Draw, text_of
 from visup.agent import Status
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.backpointers import Revision, revisions
-from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.hidden_phases import (
     ActionEvidence,
     ActionKey,
@@ -23,6 +22,7 @@ from visup.tasks.automaton.hidden_phases import (
     hidden_filter,
 )
 from visup.tasks.automaton.stage_hmm import DEFAULT_HMM, ActionStatus, PhaseKind, StageHmm
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.transitions import HiddenState, HiddenTransitions
 from visup.tasks.grammar.parser import read
 
