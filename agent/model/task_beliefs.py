@@ -65,10 +65,10 @@ class Expectation:
 
 @dataclass(frozen=True, slots=True)
 class Prospect:
-    """A stage that may begin next.
+    """What may come next in a task.
 
     Attributes:
-        stage: Its name.
+        stage: Name of the stage that begins; empty for the end of the task.
         probability: 0 to 1.
     """
 
@@ -114,8 +114,8 @@ class TaskBelief:
         machines: Ids of objects that are one machine, for each machine of which parts are found.
         confidence: 0 to 1.
         evidence: One sentence: why the verdict is what it is.
-        prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
-            end of the task.
+        prospects: What may come next, a stage or the end, the likeliest first; what is left of 1
+            is for a failure before that.
         success: Probability that the task still ends well, or None while nothing is followed.
         active: How likely it is that the task is going on at all; 1 when it is the only one given.
     """

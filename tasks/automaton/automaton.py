@@ -12,15 +12,12 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import TypeVar
 
-from visup.tasks.automaton.derivatives import (
-    Derivative,
+from visup.tasks.automaton.derivatives import Derivative, begin, derivatives, enter
+from visup.tasks.automaton.states import (
     Leaf,
     State,
     TaskStep,
-    begin,
     depth,
-    derivatives,
-    enter,
     leaves,
     structural_key,
     with_leaves,

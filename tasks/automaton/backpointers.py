@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 
 MOST_BEHIND = 32  # at least so many steps are remembered, and less than twice as many
 

@@ -9,12 +9,24 @@ are values: a supervisor may follow as many of them side by side as it likes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
-from typing import Generic, TypeAlias, TypeVar
+from typing import Generic, TypeVar
 
 from visup.agent.model.fast_replace import replace
+from visup.tasks.automaton.states import (
+    Continuation,
+    Leaf,
+    ParallelState,
+    RunningDeadline,
+    SequenceState,
+    State,
+    TaskStep,
+    leaves,
+    with_leaves,
+)
 from visup.tasks.grammar.conditions import Fact
 from visup.tasks.grammar.nodes import (
     Action,
@@ -27,11 +39,12 @@ from visup.tasks.grammar.nodes import (
     Conditioned,
     Counted,
     Course,
+    Deadline,
+    Delay,
     Hold,
     Reference,
     Repeated,
     Sequence,
-    StageCondition,
     Task,
     Timed,
     Together,
@@ -41,94 +54,6 @@ from visup.tasks.grammar.units import value
 
 W = TypeVar("W")
 DEEPEST = 200
-
-
-@dataclass(frozen=True, slots=True)
-class RunningDeadline:
-    """A `within` that runs.
-
-    Attributes:
-        seconds: As written.
-        stage: The stage that says it.
-        at: When the time is over, seconds; takes no part in equality, so that two ways to the
-            same place are seen to be the same place.
-    """
-
-    seconds: float
-    stage: str
-    at: float = field(compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class TaskStep:
-    """One action that a course asks for.
-
-    Attributes:
-        action: Its name; for a comparison or a zone its key (see `structure.fact_key`).
-        actors: Who should do it.
-        stage: The innermost stage that asks for it.
-        hold_s: Seconds for which it must hold, or None when the course does not say.
-        deadlines: Each `within` that has the action inside.
-        conditions: By what it begins, ends, progresses or fails, where the course says so; one of a kind.
-        inside: Every stage that has the action inside, the innermost with them.
-        already: Whether it is done also by what has been so since before its turn.
-    """
-
-    action: str
-    actors: tuple[str, ...]
-    stage: str
-    hold_s: float | None = None
-    deadlines: tuple[RunningDeadline, ...] = ()
-    conditions: tuple[StageCondition, ...] = ()
-    inside: frozenset[str] = frozenset()
-    already: bool = False
-
-    def condition(self, kind: str) -> StageCondition | None:
-        """What the course says of how it begins, ends, progresses or fails, or None."""
-        return next((s for s in self.conditions if s.kind == kind), None)
-
-    def same_as(self, other: TaskStep) -> bool:
-        """Whether both ask the same action of the same actors."""
-        return (self.action, self.actors) == (other.action, other.actors)
-
-
-@dataclass(frozen=True, slots=True)
-class Leaf(Generic[W]):
-    """A step under way, with what its supervisor keeps about it."""
-
-    step: TaskStep
-    payload: W
-
-
-@dataclass(frozen=True, slots=True)
-class Continuation:
-    """A course not yet begun, with what surrounds it: its stages, its clauses and conditions."""
-
-    course: Course
-    stage: str
-    hold_s: float | None = None
-    deadlines: tuple[RunningDeadline, ...] = ()
-    conditions: tuple[StageCondition, ...] = ()
-    inside: frozenset[str] = frozenset()
-    already: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class SequenceState(Generic[W]):
-    """What is under way, and what comes after it."""
-
-    head: State[W]
-    rest: Continuation
-
-
-@dataclass(frozen=True, slots=True)
-class ParallelState(Generic[W]):
-    """What is under way at the same time."""
-
-    parts: tuple[State[W], ...]
-
-
-State: TypeAlias = Leaf[W] | SequenceState[W] | ParallelState[W]
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,50 +69,6 @@ class Derivative(Generic[W]):
     state: State[W] | None
     left: tuple[Leaf[W], ...]
     entered: tuple[Leaf[W], ...] = ()
-
-
-def leaves(state: State[W]) -> tuple[Leaf[W], ...]:
-    """The steps under way in a state, in the order of the text."""
-    match state:
-        case Leaf():
-            return (state,)
-        case SequenceState(head=head):
-            return leaves(head)
-        case ParallelState(parts=parts):
-            return tuple(leaf for p in parts for leaf in leaves(p))
-
-
-def depth(state: State[W]) -> int:
-    """How deep a state is: 1 for a single step, one more for each course around it."""
-    match state:
-        case Leaf():
-            return 1
-        case SequenceState(head=head):
-            return 1 + depth(head)
-        case ParallelState(parts=parts):
-            return 1 + max(depth(p) for p in parts)
-
-
-def with_leaves(state: State[W], new: Iterator[Leaf[W]]) -> State[W]:
-    """The same state with each step under way replaced by the next of `new`."""
-    match state:
-        case Leaf():
-            return next(new)
-        case SequenceState(head=head):
-            return replace(state, head=with_leaves(head, new))
-        case ParallelState(parts=parts):
-            return ParallelState(tuple(with_leaves(p, new) for p in parts))
-
-
-def structural_key(state: State[W]) -> object:
-    """What tells two states apart apart from what is kept about their steps; hashable."""
-    match state:
-        case Leaf(step=step):
-            return step
-        case SequenceState(head=head, rest=rest):
-            return (structural_key(head), rest)
-        case ParallelState(parts=parts):
-            return frozenset(enumerate(structural_key(p) for p in parts))
 
 
 def begin(task: Task) -> Continuation:
@@ -274,11 +155,18 @@ class _Entrance(Generic[W]):
             case Already(item=item):
                 yield from self.states(replace(todo, course=item, already=True))
             case Timed() | Conditioned() as clauses:
-                yield from self.states(_surrounded(self.task, todo, clauses, self.now))
+                yield from self._clauses(todo, clauses)
             case Counted() as counted:
                 yield from self._counted(todo, counted)
             case Repeated() as repeated:
                 yield from self._repeated(todo, repeated)
+
+    def _clauses(
+        self, todo: Continuation, course: Timed | Conditioned
+    ) -> Iterator[State[W] | None]:
+        delay = _delay(self.task, course)
+        for state in self.states(_surrounded(self.task, todo, course, self.now)):
+            yield state if state is None or delay is None else _delayed(state, delay)
 
     def _fact(self, todo: Continuation, fact: Fact) -> Iterator[State[W] | None]:
         key, actors = fact_key(self.task, fact)
@@ -389,7 +277,23 @@ def _timed(
         seconds = value(task.amount(clause.duration))
         if isinstance(clause, Hold):
             continuation = replace(continuation, hold_s=seconds)
-        else:
+        elif isinstance(clause, Deadline):
             due = RunningDeadline(seconds, continuation.stage, now + seconds)
             continuation = replace(continuation, deadlines=(*continuation.deadlines, due))
     return continuation
+
+
+def _delay(task: Task, course: Timed | Conditioned) -> tuple[float, float] | None:
+    """The least and the greatest delay, seconds, with which a course begins, where it says so."""
+    clauses = course.clauses if isinstance(course, Timed) else ()
+    said = next((c for c in clauses if isinstance(c, Delay)), None)
+    if said is None:
+        return None
+    most = math.inf if said.most is None else value(task.amount(said.most))
+    return value(task.amount(said.duration)), most
+
+
+def _delayed(state: State[W], delay: tuple[float, float]) -> State[W]:
+    """A state whose steps begin with a delay."""
+    delayed = (replace(x, step=replace(x.step, delay=delay)) for x in leaves(state))
+    return with_leaves(state, delayed)

@@ -88,7 +88,7 @@ class HiddenPhases:
 
     def next_stages(self, key: HiddenState, hypothesis: Backpointer | None) -> Mapping[str, float]:
         """See `TaskModel`."""
-        return self.prognosis.next_stages(key.node)
+        return self.prognosis.next_stages(key)
 
     def success(self, key: HiddenState, hypothesis: Backpointer | None) -> float:
         """See `TaskModel`."""

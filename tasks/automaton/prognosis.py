@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 from visup.tasks.automaton.automaton import END, Automaton, Transition
-from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.stage_hmm import WAITING, StageHmm
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.transitions import HiddenState
 
 MOST_NODES = 1_000  # beyond so many nodes success is counted as none
@@ -44,21 +44,32 @@ class Prognosis:
             return 1.0
         if self._hopes is None:
             self._hopes = self._solved()
-        steps = self._automaton.steps(state.node)
         hope = self._hopes.get(state.node)
         if hope is None:
             # Come to only by following the task far: as from the state itself, looked at anew.
             hope = self._hoped(state.node, self._hopes)
-        fates = (self._process.fate(s, p) for s, p in zip(steps, state.phases, strict=True))
-        return hope * math.prod(fates)
+        return hope * self._fate(state)
 
-    def next_stages(self, node: int) -> Mapping[str, float]:
-        """For each stage the probability that it is the next to begin; the rest is for the end."""
-        if node not in self._next:
+    def next_stages(self, state: HiddenState) -> Mapping[str, float]:
+        """For each stage the probability that it is the next to begin.
+
+        The end of the task stands among them under an empty name; what is left of 1 is lost before
+        any of them is come to, so that success is never likelier than all of them together.
+        """
+        if state.node == END:
+            return {"": 1.0}
+        if state.node not in self._next:
             found: dict[str, float] = {}
-            self._follow(node, {s.stage for s in self._automaton.steps(node)}, 1.0, found, 0)
-            self._next[node] = found
-        return self._next[node]
+            here = {s.stage for s in self._automaton.steps(state.node)}
+            self._follow(state.node, here, 1.0, found, 0)
+            self._next[state.node] = found
+        fate = self._fate(state)
+        return {stage: fate * chance for stage, chance in self._next[state.node].items()}
+
+    def _fate(self, state: HiddenState) -> float:
+        """Probability that all steps under way are left at last, and none is lost."""
+        steps = self._automaton.steps(state.node)
+        return math.prod(self._process.fate(s, p) for s, p in zip(steps, state.phases, strict=True))
 
     def _follow(
         self, node: int, here: set[str], chance: float, found: dict[str, float], depth: int
@@ -71,7 +82,10 @@ class Prognosis:
             fresh = dict.fromkeys(s for s in entered if s not in here)
             for stage in fresh:
                 found[stage] = found.get(stage, 0.0) + likely
-            if not fresh and transition.target != END:
+            if transition.target == END:
+                found[""] = found.get("", 0.0) + likely
+            elif not fresh:
+                likely *= self._fate_of_begun(transition)
                 self._follow(transition.target, here, likely, found, depth + 1)
 
     def _shares(self, node: int) -> list[tuple[Transition, float]]:
@@ -102,8 +116,12 @@ class Prognosis:
     def _after(self, transition: Transition, hopes: Mapping[int, float]) -> float:
         if transition.target == END:
             return 1.0
-        fates = (self._process.fate(s, WAITING) for s in begun_by(self._automaton, transition))
-        return hopes.get(transition.target, 0.0) * math.prod(fates)
+        return hopes.get(transition.target, 0.0) * self._fate_of_begun(transition)
+
+    def _fate_of_begun(self, transition: Transition) -> float:
+        """Probability that all steps that a way begins are left at last, and none is lost."""
+        begun = begun_by(self._automaton, transition)
+        return math.prod(self._process.fate(s, WAITING) for s in begun)
 
 
 def begun_by(automaton: Automaton, transition: Transition) -> list[TaskStep]:

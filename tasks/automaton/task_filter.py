@@ -84,7 +84,7 @@ class TaskModel(Protocol[K, H, E]):
         """The stages under way by a hypothesis, each with its statuses; ("", DONE) at the end."""
 
     def next_stages(self, key: K, hypothesis: H) -> Mapping[str, float]:
-        """For each stage the probability that it is the next to begin."""
+        """For each stage the probability that it is the next to begin; under "" the end."""
 
     def success(self, key: K, hypothesis: H) -> float:
         """Probability that the course reaches its end from a hypothesis."""
@@ -153,7 +153,10 @@ class TaskFilter(Generic[K, H, E]):
         return sorted(found.items(), key=lambda item: -item[1])
 
     def next_stages(self, posterior: TaskPosterior[K, H]) -> list[tuple[str, float]]:
-        """Stages by the probability that they are the next to begin; the rest is for the end."""
+        """Stages by the probability that they are the next to begin, and "" for the end.
+
+        The rest is for what is lost before.
+        """
         found: dict[str, float] = {}
         for key, weighted in posterior.hypotheses.items():
             for stage, chance in self.model.next_stages(key, weighted.value).items():

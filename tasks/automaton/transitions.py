@@ -13,8 +13,8 @@ from itertools import product
 from typing import NamedTuple
 
 from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition
-from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.stage_hmm import WAITING, PhaseKind, StageHmm
+from visup.tasks.automaton.states import TaskStep
 
 MOST_SPANS = 64  # so many different times between frames are remembered
 SPAN_DIGITS = 4  # times between frames are told apart to a tenth of a millisecond

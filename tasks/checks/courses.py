@@ -20,6 +20,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Delay,
     Hold,
     Invariant,
     Reference,
@@ -31,7 +32,7 @@ from visup.tasks.grammar.nodes import (
 )
 from visup.tasks.grammar.units import value
 
-MOST_IN_ANY_ORDER = 6
+MOST_IN_ANY_ORDER = 12
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,8 @@ class CourseCheck:
                 continue
             holds = [c for c in course.clauses if isinstance(c, Hold)]
             deadlines = [c for c in course.clauses if isinstance(c, Deadline)]
-            for word, clauses in (("for", holds), ("within", deadlines)):
+            delays = [c for c in course.clauses if isinstance(c, Delay)]
+            for word, clauses in (("for", holds), ("within", deadlines), ("after", delays)):
                 if len(clauses) > 1:
                     span = clauses[1].span
                     yield self.source.fault(
@@ -104,6 +106,13 @@ class CourseCheck:
                 if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
                     what = f"what takes at least {least:g} s cannot be over {deadline}"
                     yield self.source.fault("E208", what, deadline.span, "a longer `within`")
+            for delay in delays[:1]:
+                most = delay.most or delay.duration
+                if value(self.task.amount(most)) < value(self.task.amount(delay.duration)):
+                    what = f"`{delay}` is never: the greatest delay is less than the least"
+                    yield self.source.fault(
+                        "E208", what, delay.span, "a greater number behind `to`"
+                    )
             if holds and self.grammar.is_sequential(course.item):
                 what = f"`{holds[0]}` stands behind things that follow one another"
                 hint = "put `for` behind the one that must hold"

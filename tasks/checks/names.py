@@ -28,8 +28,10 @@ from visup.tasks.grammar.criteria import Extent
 from visup.tasks.grammar.nodes import (
     Actor,
     Actors,
+    Clause,
     Conditioned,
     Course,
+    Delay,
     Parameter,
     Task,
     Timed,
@@ -96,7 +98,7 @@ class NameCheck:
         """Every amount that is used, with what it should measure; empty when nobody knows."""
         for course in self.courses:
             if isinstance(course, Timed):
-                yield from ((c.duration, TIME) for c in course.clauses)
+                yield from ((a, TIME) for c in course.clauses for a in _durations(c))
             if isinstance(course, Conditioned):
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
@@ -286,3 +288,11 @@ _MEASURED = frozenset(d for d, _ in UNITS.values())
 
 def _a(noun: str) -> str:
     return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
+def _durations(clause: Clause) -> tuple[Amount, ...]:
+    """The durations of a clause that must be positive; `after 0 s to 60 s` may begin at once."""
+    if not isinstance(clause, Delay) or clause.most is None:
+        return (clause.duration,)
+    at_once = isinstance(clause.duration, Number) and clause.duration.value == 0
+    return (clause.most,) if at_once else (clause.duration, clause.most)

@@ -56,7 +56,10 @@ SYNONYMS = {
 WORDS = (*RESERVED_WORDS, *ACTIONS, "leftmost", "rightmost", "ignored")
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
              "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
-KEYWORD = r"(?:for|within|at|least|most|times?|begins|ends|fails|progresses|when|any|order|already|each|of)"
+KEYWORD = (
+    r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|when|any|order|already|each"
+    r"|of)"
+)
 NAME = r"[^\W\d]\w*"
 CALL = rf"{NAME}\s*\([^()]*\)"
 TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"
@@ -105,19 +108,19 @@ USUAL = (
     _usual("E114", r"\s*[|&]\s*$", ""),
     _usual("E114", r"([|&])\s*[|&]", r"\1"),
     _usual("E114", r"(::=)\s*[|&]", r"\1"),
-    _usual("E116", r"\b((?:for|within)\s+[\d.]+)\b(?!\s*\w)", r"\1 s"),
+    _usual("E116", r"\b((?:for|within|after)\s+[\d.]+)\b(?!\s*\w)", r"\1 s"),
     _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 px"),
     _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 s"),
     _usual("E116", r"\bsignal\(\s*(\w+)\s*,[^()]*\)", r"signal(\1)"),
     _usual("E228 E223", rf"<\s*({NAME})\s*$", r"<\1>"),
     _usual("E116", r"(\d)(?!\s*[\w%.])", r"\1 px"),
-    _usual("E115", r"\b(for|within)\s+-\s*([\d.]+)", r"\1 \2"),
+    _usual("E115", r"\b(for|within|after)\s+-\s*([\d.]+)", r"\1 \2"),
     _usual("E218 E226", r"(\d)\s*m\b", r"\1 min"),
     _usual("E115", r"\bfor\s+(?:each|all|every)\s+of\s*(\([^()]*\))", r"for each one of \1"),
     _usual("E115", r"\bfor\s+(?:all|every)\s+(?=\w+\s+(?:of|in)\b)", "for each "),
     _usual("E115 E101", r"\b(for\s+each\s+\w+)\s+in\b", r"\1 of"),
-    _usual("E115", r"\s*\b(?:for|within)\s*$", ""),
-    _usual("E115", r"\b(for|within)\b", r"\1 5 s"),
+    _usual("E115", r"\s*\b(?:for|within|after)\s*$", ""),
+    _usual("E115", r"\b(for|within|after)\b", r"\1 5 s"),
     _usual("E120", r"\s*[.;]\s*$", ""),
     _usual("E121", r"//|--|%|/\*", "#"),
     _usual("E122", r"&&|\|\|", lambda m: m[0][0]),
@@ -156,7 +159,7 @@ USUAL = (
     _usual("E219", rf"\b({NAME})\s+({NAME}),?\s+({NAME})\b", r"\1(\2, \3)"),
     _usual("E219", rf"\b(never|always)\s+({NAME})\s+({NAME})", r"\1 moving(\3)"),
     _usual("E219", rf"\b({NAME})\s+({NAME})\s+({NAME})\b", r"\2(\1, \3)"),
-    _usual("E223", rf"\b(for|within)\s+{NAME}", r"\1 5 s"),
+    _usual("E223", rf"\b(for|within|after)\s+{NAME}", r"\1 5 s"),
     _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px"),
     _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 s"),
     _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px/s"),

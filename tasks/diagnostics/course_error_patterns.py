@@ -116,12 +116,12 @@ def no_actors(text: str) -> RecognisedError | None:
 
 def clause(text: str) -> RecognisedError | None:
     """`for` or `within` without a proper duration."""
-    m = re.search(r"\b(for|within)\b\s*(-\s*\d\S*)", text)
+    m = re.search(r"\b(for|within|after)\b\s*(-\s*\d\S*)", text)
     if m is not None:
         return RecognisedError(
             "E115", m.start(2), len(m[2]), "a duration is never negative", "a number and a unit"
         )
-    m = re.search(r"\b(for|within)\b(?!\s*[\d-])(?!\s*\()", text)
+    m = re.search(r"\b(for|within|after)\b(?!\s*[\d-])(?!\s*\()", text)
     if m is not None:
         what = f"`{m[1]}` is not followed by a duration"
         return RecognisedError("E115", m.start(1), len(m[1]), what, f"such as `{m[1]} 5 s`")
@@ -131,7 +131,7 @@ def clause(text: str) -> RecognisedError | None:
         return RecognisedError(
             "E116", m.start(2), len(m[2]), what, "a unit, such as `5 px` or `3 px/s`"
         )
-    m = re.search(r"\b(for|within)\s+(\d+(?:\.\d+)?)(?![\d.]|[ ]*[^\W\d])", text)
+    m = re.search(r"\b(for|within|after)\s+(\d+(?:\.\d+)?)(?![\d.]|[ ]*[^\W\d])", text)
     if m is not None:
         what = f"`{m[0]}` has no unit"
         expected = f"`s`, `min`, `ms` or `h`, such as `{m[1]} {m[2]} s`"

@@ -63,7 +63,9 @@ def _not_in_language(text: str) -> RecognisedError | None:
         meant = {"import": '`include "common.task"`', "stage": "`<approach> ::= ...`"}
         expected = meant.get(m[1], "`parameter patience is 90 s`")
         return RecognisedError("E127", m.start(1), len(m[1]), what, expected)
-    m = re.search(r"(?<=[\s)>])(?:until|unless|after|before|while|if)\b(?!\s*[,)])", text)
+    m = re.search(
+        r"(?<=[\s)>])(?:until|unless|after(?!\s*[\d-])|before|while|if)\b(?!\s*[,)])", text
+    )
     if m is not None:
         what = f"`{m[0]}` is not part of the language of task files"
         hint = "in turn is `<a> <b>`, at the same time `<a> & <b>`; a stage `ends when ...`"

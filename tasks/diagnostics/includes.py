@@ -10,7 +10,7 @@ from visup.rules.language.diagnostics import Source
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import ParsedFile, parse
 from visup.tasks.grammar.nodes import Include, Task
-from visup.tasks.grammar.parser import relocated
+from visup.tasks.grammar.relocation import relocated
 
 Read = Callable[[str, str], tuple[str, str]]
 """(path, the file that includes it) -> (name of the file, its text); raises TaskError."""

@@ -28,7 +28,7 @@ OPENS = re.compile(  # a line that begins a statement, well written or not
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
-    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
+    r"(?:::=|[|&(,]|\b(?:for|within|after|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
 LONGEST = 4000  # characters of a statement that mistakes are looked for in

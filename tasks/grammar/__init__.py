@@ -3,5 +3,6 @@
 Read in this order: `tasks.lark` (the language), `conditions.py` and `ast_courses.py` (the nodes
 inside a stage), `nodes.py` (the file as a whole), `parser.py` (text to tree), `statement.py` (one
 statement of the text), `analysis.py` (what is reachable, nullable, recursive), `structure.py` (stages
-and actors of a task), `units.py` (units peculiar to tasks), `graphs.py` (graphs of stage names).
+and actors of a task), `units.py` (units peculiar to tasks), `graphs.py` (graphs of stage names),
+`relocation.py` (the tree of an included file).
 """

@@ -36,7 +36,24 @@ class Deadline:
         return f"within {self.duration}"
 
 
-Clause: TypeAlias = Hold | Deadline
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """`after 10 s to 60 s`: it begins so long after what comes before it is over, no sooner and no later.
+
+    Attributes:
+        duration: The least delay.
+        most: The greatest, or None when it may begin at any time after the least.
+    """
+
+    duration: Amount
+    most: Amount | None = None
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"after {self.duration}" + (f" to {self.most}" if self.most else "")
+
+
+Clause: TypeAlias = Hold | Deadline | Delay
 
 
 @dataclass(frozen=True, slots=True)

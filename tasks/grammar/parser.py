@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Several
-from dataclasses import replace
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal, Protocol, TypeVar, cast
@@ -42,6 +41,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Delay,
     FloorPoint,
     Ground,
     Hold,
@@ -264,8 +264,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Together(tuple(items), _all(items))
 
     def any_order(self, items: list[Any]) -> AnyOrder:
-        first, *courses, last = items
-        return AnyOrder(tuple(courses), _of(first).to(_of(last)))
+        return AnyOrder(tuple(items[1:-1]), _of(items[0]).to(_of(items[-1])))
 
     def any_of(self, items: list[Any]) -> AnyOrder:
         first, count, *courses, last = items
@@ -309,10 +308,12 @@ class _TaskBuilder(Transformer[Token, Any]):
     def deadline(self, items: list[Any]) -> Deadline:
         return Deadline(items[1], _of(items[0]).to(items[1].span))
 
+    def delay(self, items: list[Any]) -> Delay:
+        return Delay(items[1], _third(items), _of(items[0]).to(items[-1].span))
+
     def sign(self, items: list[Any]) -> StageCondition:
         kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
-        lasting = items[2] if len(items) > 2 else None
-        return StageCondition(kind, items[1], lasting, _of(items[0]).to(items[-1].span))
+        return StageCondition(kind, items[1], _third(items), _of(items[0]).to(items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:
         span = _of(items[0]).to(_of(items[-1]))
@@ -369,6 +370,10 @@ def _bare(token: Token) -> str:
     return canonical(str(token)[1 : str(token).index(">")])
 
 
+def _third(items: list[Any]) -> Any:
+    return items[2] if len(items) > 2 else None
+
+
 def _of(token: Token) -> Span:
     """Where a token stands; of a head only the part in angle brackets."""
     line, column = token.line or 0, token.column or 0
@@ -378,21 +383,3 @@ def _of(token: Token) -> Span:
 
 def _all(items: Several[_Placed]) -> Span:
     return items[0].span.to(items[-1].span)
-
-
-def relocated(task: Task, file: str) -> Task:
-    """The same tree with every place said to be in an included file."""
-    return cast("Task", _moved(task, file))
-
-
-def _moved(node: object, file: str) -> object:
-    if isinstance(node, Span):
-        return replace(node, file=file)
-    if isinstance(node, Name):
-        return Name(node, replace(node.span, file=file))
-    if isinstance(node, tuple):
-        return tuple(_moved(n, file) for n in node)
-    fields = getattr(node, "__dataclass_fields__", None)
-    if fields is None:
-        return node
-    return replace(node, **{f: _moved(getattr(node, f), file) for f in fields})  # type: ignore[type-var]

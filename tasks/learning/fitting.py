@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import floor
 
 from visup.rules.formula.units import Number, Span
-from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
+from visup.tasks.grammar.nodes import Actors, Deadline, Delay, Task, Timed, walk
 from visup.tasks.grammar.units import value
 from visup.tasks.learning.induction import deadline
 from visup.tasks.learning.judging import JudgedRun
@@ -63,6 +63,8 @@ def _clauses(task: Task) -> Iterator[tuple[str, str, Number]]:
             continue
         for course in walk(stage.body):
             for clause in course.clauses if isinstance(course, Timed) else ():
+                if isinstance(clause, Delay):
+                    continue
                 if isinstance(clause.duration, Number) and not clause.duration.span.file:
                     word = "within" if isinstance(clause, Deadline) else "for"
                     yield stage.name, word, clause.duration

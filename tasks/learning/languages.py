@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from visup.tasks.automaton.automaton import END, Automaton
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.nodes import Actors, Task, Timed, walk
 
 MOST_STATES = 4_000

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import behind, extended
-from visup.tasks.automaton.derivatives import Leaf, TaskStep, leaves, with_leaves
+from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import outcome
@@ -173,7 +173,9 @@ class Advance:
         state = transition.taken(leaves(hypothesis.state), entered(self.now))
         begun = set(transition.transition.begun)
         under_way = [
-            self._begun(_in_turn(x, transition.left), opened) if i in begun else x
+            self._begun(self._after(_in_turn(x, transition.left), transition), opened)
+            if i in begun
+            else x
             for i, x in enumerate(leaves(state))
         ]
         left = tuple(x.step for x in transition.left)
@@ -217,6 +219,19 @@ class Advance:
         if meaning.lasts or meaning.measures or held_by is None or held_by.since >= turn:
             return False
         return frozenset(step.actors) not in asked
+
+    def _after(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
+        """A step that begins, with when what comes before it was over; its delay counts from then."""
+        if leaf.step.delay is None:
+            return leaf
+        over = max((self._over_at(x) for x in transition.left), default=self.now)
+        return replace(leaf, payload=replace(leaf.payload, after=over))
+
+    def _over_at(self, left: Leaf[StepMonitor]) -> float:
+        """When a step was over: what goes on until the next thing begins, when it was last seen."""
+        by_itself = self.steps.over(left)
+        at = left.payload.fulfilled_at if by_itself else left.payload.helped_at
+        return self.now if at is None else at
 
     def _begun(self, leaf: Leaf[StepMonitor], opened: bool) -> Leaf[StepMonitor]:
         """A step that begins now, with what is seen of it at once."""

@@ -7,7 +7,7 @@ from visup.agent.model.fast_replace import replace
 from visup.rules.formula.truth import YES
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES
-from visup.tasks.automaton.derivatives import leaves
+from visup.tasks.automaton.states import leaves
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.snapshot import TaskSnapshot
 

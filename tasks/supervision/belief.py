@@ -87,7 +87,7 @@ def task_belief(
         _expected(model, snapshot, near),
         confidence=probability,
         evidence=interrupted or why,
-        prospects=_prospects(model, near),
+        prospects=() if told in LOST else _prospects(model, near),
         success=0.0 if told in LOST else model.filter.success(near),
     )
 
@@ -118,6 +118,7 @@ def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) 
         stages=stages,
         current=current,
         evidence=why,
+        prospects=(),
         success=0.0,
     )
 
@@ -259,14 +260,16 @@ def _current(posterior: TaskHypotheses) -> str:
 
 
 def _near(posterior: TaskHypotheses) -> TaskHypotheses:
-    """The hypotheses that are not much less likely than the best."""
+    """The hypotheses that are not much less likely than the best, as if there were no others."""
     least = NEAR * posterior.hypotheses[posterior.best].mass
     near = {k: w for k, w in posterior.hypotheses.items() if w.mass >= least}
-    return replace(posterior, hypotheses=near)
+    whole = sum(w.mass for w in near.values())
+    shares = {k: replace(w, mass=w.mass / whole) for k, w in near.items()}
+    return replace(posterior, hypotheses=shares)
 
 
 def _prospects(model: MonitoredPhases, near: TaskHypotheses) -> tuple[Prospect, ...]:
-    """The stages that may begin next; those that are hardly possible are left out."""
+    """What may come next, a stage or the end; what is hardly possible is left out."""
     likely = (s for s in model.filter.next_stages(near) if s[1] >= NEAR)
     return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
 

@@ -12,7 +12,7 @@ from enum import IntEnum
 
 from visup.agent import StageBelief, Status
 from visup.tasks.automaton.backpointers import Backpointer
-from visup.tasks.automaton.derivatives import Leaf, State, TaskStep, leaves
+from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.automaton.task_filter import TaskPosterior
 from visup.tasks.verification.step_monitor import StepMonitor
 

@@ -18,9 +18,9 @@ from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.backpointers import behind
-from visup.tasks.automaton.derivatives import TaskStep, leaves, with_leaves
 from visup.tasks.automaton.prognosis import Prognosis, begun_by
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, StageHmm
+from visup.tasks.automaton.states import TaskStep, leaves, with_leaves
 from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.automaton.transitions import HiddenState
 from visup.tasks.grammar.nodes import Task
@@ -181,9 +181,9 @@ class MonitoredPhases:
         return {(x.step.stage, x.payload.status) for x in leaves(hypothesis.state)}
 
     def next_stages(self, key: int, hypothesis: TaskHypothesis) -> Mapping[str, float]:
-        """See `TaskModel`."""
+        """See `TaskModel`; a course of which a stage has failed for good goes nowhere."""
         return (
-            {} if hypothesis.finished is not None else self.prognosis.next_stages(hypothesis.node)
+            {} if hypothesis.failed else self.prognosis.next_stages(self.hidden_state(hypothesis))
         )
 
     def success(self, key: int, hypothesis: TaskHypothesis) -> float:

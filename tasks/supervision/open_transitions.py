@@ -10,15 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition, with_payloads
-from visup.tasks.automaton.derivatives import (
-    Leaf,
-    State,
-    TaskStep,
-    begin,
-    derivatives,
-    enter,
-    leaves,
-)
+from visup.tasks.automaton.derivatives import begin, derivatives, enter
+from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
 from visup.tasks.verification.step_monitor import StepMonitor, entered
 

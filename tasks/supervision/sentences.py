@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.verification.step_monitor import StepMonitor
 
 
@@ -34,14 +34,9 @@ def evidence(
     have, them = ("has", "it") if alone else ("have", "them")
     match monitor.status:
         case Status.FAILING | Status.FAILED if monitor.early:
-            was = "was" if alone else "were"
-            return (
-                f"{who} {was} {meaning.text} before stage `{step.stage}` began, and should become so "
-                "in it"
-            )
+            return _too_soon(step, meaning, monitor)
         case Status.FAILED if monitor.late:
-            due = next(d for d in step.deadlines if now > d.at)
-            return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
+            return _late(step, now)
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
             what = _say(monitor.contrary, actions)
             return (
@@ -87,8 +82,7 @@ def outcome(
     """
     who, was = names(step.actors), "was" if len(step.actors) < 2 else "were"
     if monitor.late:
-        due = next(d for d in step.deadlines if now > d.at)
-        return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
+        return Status.FAILED, _late(step, now)
     if step.hold_s is not None and not monitor.fulfilled:
         return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
     end = step.condition("ends")
@@ -123,6 +117,32 @@ def _held(
     if followed is not None and (monitor.begun is None or followed > monitor.begun):
         over = min(over, followed)
     return f"{was} {meaning.text} until {over:.1f} s"
+
+
+def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -> str:
+    """What came before its turn, or before its delay was over."""
+    if step.delay is not None and monitor.hasty_s is not None:
+        return (
+            f"it began {max(0.0, monitor.hasty_s):.1f} s after what comes before it, "
+            f"and should begin no sooner than {step.delay[0]:g} s after it"
+        )
+    was = "was" if len(step.actors) < 2 else "were"
+    return (
+        f"{names(step.actors)} {was} {meaning.text} before stage `{step.stage}` began, "
+        "and should become so in it"
+    )
+
+
+def _late(step: TaskStep, now: float) -> str:
+    """Which time ran out before a step was over, or had begun."""
+    due = next((d for d in step.deadlines if now > d.at), None)
+    if due is not None:
+        return f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
+    assert step.delay is not None
+    return (
+        f"`{step.stage}` should begin no later than {step.delay[1]:g} s after what comes before it, "
+        "and did not"
+    )
 
 
 def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
@@ -165,10 +185,13 @@ def _say(relation: str, actions: Words) -> str:
 
 def prospects_text(belief: TaskBelief) -> str:
     """What may come next and how likely the task still ends well, in one line."""
-    said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
-    end = 1.0 - sum(p.probability for p in belief.prospects)
-    said += [f"no further stage ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
-    coming = f"next: {', '.join(said)}" if said else "next: unknown"
     if belief.success is None:
-        return coming
-    return f"{coming}; ends well with a probability of {belief.success:.0%}"
+        return "next: unknown"
+    if belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
+        return "next: nothing, it is over"
+    chances = [(f"`{p.stage}`" if p.stage else "the end", p.probability) for p in belief.prospects]
+    lost = 1.0 - sum(p.probability for p in belief.prospects)
+    said = [
+        f"{what} ({chance:.0%})" for what, chance in (*chances, ("failure", lost)) if chance >= 0.01
+    ]
+    return f"next: {', '.join(said)}; ends well with a probability of {belief.success:.0%}"

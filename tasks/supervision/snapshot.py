@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from visup.agent import Binding, Mind, Truth
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Hold
 from visup.tasks.supervision.monitored_phases import MonitoredPhases

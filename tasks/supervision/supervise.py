@@ -28,7 +28,7 @@ from visup.agent.model.memory import MemoryKey
 from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
-from visup.tasks.automaton.derivatives import leaves
+from visup.tasks.automaton.states import leaves
 from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.casting.matching import (
     bystanders,

@@ -37,6 +37,7 @@ STATEMENTS = (
 WORDS = {
     "for": "must hold so long without a break: `for 5 s`",
     "within": "must be over so long after it began: `within 60 s`",
+    "after": "begins so long after what comes before it is over: `after 10 s to 60 s`",
     "between": "a quantity stays within a range: `gap(arm, satellite) between 20 px and 100 px`",
     "at least": "how often at least: `at least 2 times`",
     "at most": "how often at most: `at most 5 times`",

@@ -10,15 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from random import Random
 
-from visup.tasks.automaton.derivatives import (
-    State,
-    TaskStep,
-    begin,
-    derivatives,
-    enter,
-    leaves,
-    structural_key,
-)
+from visup.tasks.automaton.derivatives import begin, derivatives, enter
+from visup.tasks.automaton.states import State, TaskStep, leaves, structural_key
 from visup.tasks.grammar.nodes import Task
 
 LONGEST = 200  # moments after which a course drawn at random is cut off

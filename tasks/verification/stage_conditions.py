@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from visup.agent import Relation, Truth
 from visup.rules.formula.nodes import And, Formula, Not, Or
 from visup.rules.formula.truth import NEGATION, conjunction, disjunction
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
 from visup.tasks.grammar.structure import fact_key

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import Leaf
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
+from visup.tasks.automaton.states import Leaf
 from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 
@@ -61,6 +61,9 @@ class StepMonitor:
         early: Whether it had been so since before its turn, and has not ceased to be since: what a
             stage asks for must happen in it.
         parted_s: How long it has been seen not to be so, since its turn.
+        after: When what comes before it was over.
+        hasty_s: How long after that it began, where its course asks for a longer delay; else None.
+        fulfilled_at: When it was first fulfilled, or None.
     """
 
     entered: float
@@ -89,6 +92,9 @@ class StepMonitor:
     opened: bool = False
     early: bool = False
     parted_s: float = 0.0
+    after: float = -math.inf
+    hasty_s: float | None = None
+    fulfilled_at: float | None = None
 
     @property
     def begun_anew(self) -> bool:
@@ -127,12 +133,15 @@ def update(
         # Until it begins, nothing that is seen speaks for or against it.
         monitor = replace(monitor, opened=seen.entry is not None)
         seen = seen if monitor.opened else replace(UNOBSERVED, observed=seen.observed)
+    if step.delay is not None:
+        monitor = _note_haste(monitor, step.delay[0], seen)
     if monitor.early:
         monitor, seen = _not_yet(monitor, seen, moment, settings)
     noted = _note_contrary(
         _note_progress(monitor, step, meaning, seen, moment, settings), seen, now
     )
     late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
+    late = late or (noted.begun is None and now > latest(noted, step))
     noted = replace(noted, late=late)
     status = _status(noted, seen, now, settings)
     if status is noted.status:
@@ -150,6 +159,19 @@ def update(
         fulfilled=False,
         held_s=0.0,
     )
+
+
+def latest(monitor: StepMonitor, step: TaskStep) -> float:
+    """By when a step must have begun, seconds; without end where its course does not say."""
+    return math.inf if step.delay is None else monitor.after + step.delay[1]
+
+
+def _note_haste(monitor: StepMonitor, least: float, seen: ActionObservation) -> StepMonitor:
+    """What begins sooner than its course allows counts for nothing until it begins anew."""
+    if monitor.held or monitor.early or seen.held_by is None or seen.holds is not Truth.TRUE:
+        return monitor
+    passed = seen.held_by.since - monitor.after
+    return replace(monitor, early=True, hasty_s=passed) if passed < least else monitor
 
 
 def _not_yet(
@@ -219,6 +241,7 @@ def _note_progress(
         held_s=held,
         broken_since=broken,
         fulfilled=monitor.fulfilled or complete,
+        fulfilled_at=_first(monitor.fulfilled_at, now) if complete else monitor.fulfilled_at,
         helped_by=seen.helps.name if seen.helps else monitor.helped_by,
         helped_since=seen.helps.since if seen.helps else monitor.helped_since,
         helped_at=now if helping else monitor.helped_at,

@@ -55,3 +55,14 @@ def test_what_is_meant_is_understood_before_the_first_step(
     done = visup("step", clip, *TASK)
     assert told in done.out
     assert done.code == 0
+
+
+def test_what_is_read_from_a_pipe_is_whole(
+    visup: Call, clip: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    piped(monkeypatch, "step 30", "why object 1", "percepts", "tasks")
+    done = visup("step", clip, *TASK)
+    reasons = [line for line in done.out.splitlines() if "motion reported" in line]
+    assert reasons
+    assert all(line.rstrip().endswith(" s]") and len(line) > 80 for line in reasons), reasons
+    assert "motion ran, 1 percept\n" in done.out

@@ -14,9 +14,10 @@ from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Severi
 from visup.agent.model.object_beliefs import Candidate
 from visup.agent.model.step import Step
 from visup.story import Detail, Narrative, summary_lines
-from visup.story.life_sentences import lives_sentence
+from visup.story.life_sentences import course, lives_sentence
 from visup.story.line_budget import LineBudget
 from visup.story.lives import ObjectLife
+from visup.story.places import Box
 from visup.testing import region_of
 from visup.wording import worded_once
 
@@ -70,8 +71,81 @@ def test_a_life_is_one_line_with_who_where_how_long_and_whom_it_came_near() -> N
     lines = [e.text for e in told(steps)]
     assert lines[0] == "Object 4 crossed from left to right, 3.0 s, closest to object 1 at 10 px."
     assert lines[1].startswith("Object 1 has been in view since 0.0 s, now on the right")
-    assert len(lines) == 3
-    assert lines[2].startswith("Object 1 moved about on the right")
+    assert len(lines) == 2  # that it is still there is not told twice
+
+
+def test_who_is_sure_to_be_an_object_late_is_told_from_where_it_was_first_seen() -> None:
+    """It counts as an object only near the other side, where it would be said to come in."""
+    steps = [
+        step(t, *([replace(crossing(13, 1.0, 4.0, t), confirmed=t > 3.7)] if t >= 1 else []))
+        for t in times(9)
+    ]
+    assert [e.text for e in told(steps)] == ["Object 13 crossed from left to right, 3.0 s."]
+
+
+def test_who_never_becomes_an_object_is_not_told_of() -> None:
+    steps = [
+        step(t, *([replace(crossing(3, 1.0, 4.0, t), confirmed=False)] if t >= 1 else []))
+        for t in times(9)
+    ]
+    assert told(steps) == []
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "left", "words"),
+    [
+        ((60, 100, 20, 20), (300, 100, 20, 20), True, "crossed from left to right"),
+        ((0, 100, 20, 20), (150, 0, 20, 20), True, "came in from the left and went out at the top"),
+        ((150, 100, 20, 20), (150, 0, 20, 20), True, "went from the middle out at the top"),
+        (
+            (0, 100, 20, 20),
+            (0, 120, 20, 20),
+            True,
+            "came in from the left and went out there again",
+        ),
+        (
+            (0, 100, 20, 20),
+            (0, 120, 20, 20),
+            False,
+            "came in from the left and was last seen there",
+        ),
+    ],
+)
+def test_a_course_is_told_by_its_sides(first: Box, last: Box, left: bool, words: str) -> None:
+    assert course(ObjectLife(1, SIZE, 1.0, 4.0, first, last, left=left)) == words
+
+
+def test_who_is_there_to_the_end_is_told_to_be() -> None:
+    steps = [step(t, *([crossing(2, 2.0, 15.0, t)] if t >= 2 else [])) for t in times(8)]
+    assert [e.text for e in told(steps)] == [
+        "Object 2 came in from the left and was still in view in the middle at the end, 6.0 s."
+    ]
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(2.0, 1), (12.4, 2), (28.4, 4), (60.0, 9)])
+def test_a_short_clip_has_no_more_lines_a_minute_than_a_long_one(seconds: float, most: int) -> None:
+    """Someone crosses every second, each another way: some lines, at most ten for each minute."""
+    steps = []
+    for t in times(seconds):
+        alive = [
+            replace(crossing(n + 1, n, n + 0.9, t, 200.0 * (n % 2)), confirmed=n <= t)
+            for n in range(round(t) + 1)
+            if n <= t
+        ]
+        steps.append(step(t, *alive))
+    assert 1 <= len(told(steps)) <= most
+
+
+def test_the_summary_counts_those_too_of_whom_nothing_was_told() -> None:
+    steps = [
+        step(t, *(crossing(n, n, n + 1.0, t) for n in range(1, 6) if n <= t)) for t in times(8)
+    ]
+    narrative = Narrative()
+    lines = [e.text for s in steps for e in narrative.lines(s, None)]
+    assert not any("5" in text for text in lines)
+    assert next(iter(summary_lines(narrative.log, narrative.courses))) == (
+        "Seen: 5 objects, at most 2 at a time; 5 crossed from left to right."
+    )
 
 
 def test_lives_of_one_course_share_a_line() -> None:
@@ -102,7 +176,7 @@ def test_specks_and_glimpses_are_only_counted() -> None:
     assert [e for s in steps for e in narrative.lines(s, None)] + narrative.rest(
         steps[-1].time, 0
     ) == []
-    assert next(iter(summary_lines(narrative.log))) == "Seen: 1 object."
+    assert next(iter(summary_lines(narrative.log, narrative.courses))) == "Seen: 1 object."
 
 
 def test_relations_of_objects_that_nobody_knows_are_told_on_request_alone() -> None:
@@ -149,7 +223,7 @@ def test_however_much_happens_lines_are_few_and_nothing_grave_is_withheld(
     assert [e for e in lines if e.severity > Severity.INFO] == grave
     about = [e for e in lines if e.kind in ("life", "relation", "entry", "alert", "coupled")]
     light = [e for e in about if e.severity is Severity.INFO]
-    assert len(light) <= 10 + LineBudget().at_once
+    assert len(light) <= 10
     assert all(e.objects for e in light)
 
 
@@ -174,7 +248,7 @@ def test_a_summary_names_the_busiest_pair_and_the_longest_stay() -> None:
         narrative.lines(last, None)
     assert last is not None
     narrative.rest(last.time, last.frame_index)
-    assert list(summary_lines(narrative.log)) == [
+    assert list(summary_lines(narrative.log, narrative.courses)) == [
         "Seen: 3 objects, at most 3 at a time.",
         "Longest in view: object 1, 8.0 s, last in the middle.",
         "Busiest pair: objects 1 and 2, near each other for 4.9 s, at the closest 5 px apart.",

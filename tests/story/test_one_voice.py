@@ -113,6 +113,16 @@ BROKEN = [
         prospects_agree_with_the_verdict,
         believed(TaskBelief("dock", Verdict.IN_PROGRESS, prospects=(Prospect("a", 0.7), Prospect("b", 0.4)))),
     ),
+    (
+        prospects_agree_with_the_verdict,
+        believed(
+            TaskBelief("dock", Verdict.IN_PROGRESS, prospects=(Prospect("captured", 0.07),), success=0.27)
+        ),
+    ),
+    (
+        prospects_agree_with_the_verdict,
+        believed(TaskBelief("dock", Verdict.IN_PROGRESS, prospects=(Prospect("", 0.93),), success=0.27)),
+    ),
     (a_stage_fails_as_its_task_does, believed(TaskBelief("dock", Verdict.SUCCEEDED, FAILED))),
 ]  # fmt: skip
 

@@ -117,7 +117,7 @@ def who_has_left_does_nothing(told: Told) -> Iterator[str]:
 
 
 def prospects_agree_with_the_verdict(told: Told) -> Iterator[str]:
-    """What is over is not going to end otherwise, and shares of what comes next are shares of one whole."""
+    """What is over ends as it did; what comes next is shares of one whole, and success a part of it."""
     for step in told.steps:
         for task in step.mind.tasks:
             yield from (f"{step.time:.2f} s: {task.task}: {x}" for x in _prospects(task))
@@ -172,12 +172,20 @@ def _prospects(task: TaskBelief) -> Iterator[str]:
         yield f"what comes next adds up to {total:.3f}"
     if task.success is None:
         return
+    if task.success > total + 0.02 * (len(task.prospects) + 1):  # the hardly possible is left out
+        yield f"ends well with {task.success:.2f}, but something comes next with {total:.2f}"
+    if task.verdict is Verdict.IN_PROGRESS and task.success < _share_of_end(task) - 1e-6:
+        yield f"ends well with {task.success:.2f}, but is at its end with {_share_of_end(task):.2f}"
     if not -1e-9 <= task.success <= 1.0 + 1e-9:
         yield f"ends well with {task.success}"
     if task.verdict in (Verdict.FAILED, Verdict.INTERRUPTED) and task.success > 0.005:
         yield f"is {task.verdict} and ends well with {task.success:.2f}"
     if task.verdict is Verdict.SUCCEEDED and task.success < 0.5:
         yield f"is {task.verdict} and ends well with {task.success:.2f}"
+
+
+def _share_of_end(task: TaskBelief) -> float:
+    return sum(p.probability for p in task.prospects if not p.stage)
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Delay,
     Ground,
     Hold,
     Include,
@@ -67,7 +68,11 @@ amounts_said = st.one_of(
     st.builds(ParameterRef, names),
 )
 holds = st.builds(Hold, amounts_said)
-clauses: st.SearchStrategy[Clause] = st.one_of(holds, st.builds(Deadline, amounts_said))
+clauses: st.SearchStrategy[Clause] = st.one_of(
+    holds,
+    st.builds(Deadline, amounts_said),
+    st.builds(Delay, amounts_said, st.none() | amounts_said),
+)
 actors = st.lists(names.map(Name), min_size=1, max_size=3).map(tuple)
 actions = st.builds(Action, names, actors)
 measures = st.builds(Measure, names, actors)

@@ -18,13 +18,13 @@ from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.inputs.preflight import check_cast
+from visup.runs.inputs.stop_signals import StopSignals
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
 from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.runs.stop_signals import StopSignals
 from visup.runs.wiring import build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 from visup.version import __version__

@@ -27,7 +27,7 @@ FaultSource = Callable[[], Iterable[AlertCondition]]
 class RuntimeFaults(Stateless):
     """A behaviour that asks parts of the product for their faults before each step."""
 
-    contract = Contract("troubles", gives=(RUNTIME_FAULT,))
+    contract = Contract("runtime_faults", gives=(RUNTIME_FAULT,))
 
     def __init__(self) -> None:
         self._sources: list[FaultSource] = []

@@ -10,6 +10,9 @@ from visup.story.lives import ObjectLife
 STAYED = 0.06
 """Who has come no farther than that, in image diagonals, has stayed where it was."""
 
+OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+OUT = {side: f"{'to' if side in ('left', 'right') else 'at'} the {side}" for side in OPPOSITE}
+
 MOST_NAMED = 4
 """Of more objects than that the rest are counted."""
 
@@ -29,15 +32,23 @@ def course(life: ObjectLife, was: str = "was") -> str:
         was: `were` when several are spoken of.
     """
     came, went = life.came_from, life.went_to
+    if life.at_end:
+        begun = f"came in from the {came} and " if came else ""
+        return f"{begun}{was} still in view {life.ended_at} at the end"
     if came and went:
-        crossed = f"crossed from {came} to {went}"
-        return crossed if came != went else f"came in from the {came} and went out there again"
+        if came == OPPOSITE[went]:
+            return f"crossed from {came} to {went}"
+        return (
+            f"came in from the {came} and went out {OUT[went] if came != went else 'there again'}"
+        )
     if came:
         seen_last = "there" if came in life.ended_at else life.ended_at
         return f"came in from the {came} and {was} last seen {seen_last}"
     if went:
+        if OPPOSITE[went] in life.begun_at:
+            return f"crossed from {OPPOSITE[went]} to {went}"
         origin = "" if went in life.begun_at else f" from {_place(life.begun_at)}"
-        return f"went out to the {went}{origin}"
+        return f"went{origin} out {OUT[went]}"
     if life.travelled < STAYED:
         return f"moved about {life.ended_at}"
     if life.begun_at == life.ended_at:
@@ -72,7 +83,7 @@ def lives_sentence(lives: Sequence[ObjectLife]) -> str:
 def stay_sentence(life: ObjectLife) -> str:
     """Of an object that stays: since when it is in view, and where it is now."""
     since = f"has been in view since {life.since:.1f} s"
-    text = f"{who(life)} {since}, now {life.ended_at}{_nearest(life)}."
+    text = f"{who(life)} {since}, now {life.ended_at}{_nearest(life, 'has touched')}."
     return text[:1].upper() + text[1:]
 
 
@@ -84,10 +95,10 @@ def _place(words: str) -> str:
     return words.split(" ", 1)[1]
 
 
-def _nearest(life: ObjectLife) -> str:
+def _nearest(life: ObjectLife, touched: str = "touched") -> str:
     if life.closest is None:
         return ""
     other, gap = life.closest
-    return f", closest to object {other} " + (
-        f"at {gap:.0f} px" if gap >= 0.5 else "(outlines met)"
-    )
+    if gap < 0.5:
+        return f", and {touched} object {other} in the picture"
+    return f", closest to object {other} at {gap:.0f} px"

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-AT_ONCE = 2
+AT_ONCE, AT_START = 2, 1
 EVERY_S = 7.5
-"""So many lines may come at once, and then one in so many seconds: at most ten in any minute."""
+"""So many lines may come at once, and then one in so many seconds: at most ten in any minute.
+
+Less is saved at the start, so that a short clip has hardly more than ten a minute, too.
+"""
 
 
 @dataclass(slots=True)
@@ -20,8 +23,12 @@ class LineBudget:
 
     at_once: int = AT_ONCE
     every_s: float = EVERY_S
-    _saved: float = field(default=float(AT_ONCE), init=False)
+    _saved: float = field(default=float(AT_START), init=False)
     _at: float | None = field(default=None, init=False)
+
+    def begin(self, now: float) -> None:
+        """The run goes on since now, seconds; only the first call counts."""
+        self._at = now if self._at is None else self._at
 
     def take(self, now: float) -> bool:
         """Whether one more line may be told now, seconds; if so it is counted."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 from visup.agent import Frame, Mind, ObjectBelief, Presence
@@ -47,6 +47,7 @@ class ObjectLife:
         near: Object id -> least gap in pixels, of those that came near it.
         left: Whether it went over the border.
         from_start: Whether it was in view in the first frames.
+        at_end: Whether it was in view in the last one.
     """
 
     id: int
@@ -61,6 +62,7 @@ class ObjectLife:
     near: dict[int, float] = field(default_factory=dict)
     left: bool = False
     from_start: bool = False
+    at_end: bool = False
 
     @property
     def seconds(self) -> float:
@@ -110,6 +112,21 @@ def diagonal(size: tuple[int, int]) -> float:
     return float((size[0] ** 2 + size[1] ** 2) ** 0.5)
 
 
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where something that may be an object was first seen.
+
+    Attributes:
+        since: When, seconds.
+        first: Its box then.
+        until: When it was seen last.
+    """
+
+    since: float
+    first: Box
+    until: float
+
+
 @dataclass(slots=True)
 class LifeLog:
     """Follows all objects of a run; give it each step.
@@ -128,7 +145,8 @@ class LifeLog:
     most_at_once: int = 0
     longest: ObjectLife | None = None
     _ids: set[int] = field(default_factory=set)
-    _looked: dict[int, float] = field(default_factory=dict)
+    _looked: dict[int, tuple[float, str | None]] = field(default_factory=dict)
+    _origins: dict[int, Origin] = field(default_factory=dict)
     _begun: float | None = None
     _now: float = 0.0
 
@@ -151,37 +169,63 @@ class LifeLog:
         lasted = 0.0 if self._begun is None else step.time - self._now
         self._begun = step.time if self._begun is None else self._begun
         self._now = step.time
-        seen = [
-            b for b in mind.present() if b.presence is Presence.SEEN and b.last_seen == step.time
+        shown = [
+            b
+            for _, b in sorted(mind.objects.items())
+            if b.presence is Presence.SEEN and b.last_seen == step.time
         ]
+        for belief in shown:
+            self._look(belief, frame)
+        self._await(b for b in shown if not b.confirmed)
+        seen = [b for b in shown if b.confirmed]
         for belief in seen:
-            self._see(belief, mind, frame)
+            self._see(belief, mind)
         self.most_at_once = max(self.most_at_once, len(seen))
         self._meet(seen, mind, lasted)
-        return list(self._over(mind))
+        over = list(self._over(mind))
+        self._looked = {i: x for i, x in self._looked.items() if i in mind.objects}
+        return over
 
     def finish(self) -> list[ObjectLife]:
         """The lives that are not over when the run is."""
         rest = [self.alive[i] for i in sorted(self.alive)]
         for life in rest:
+            life.at_end = life.until == self._now
             self._close(life)
         return rest
 
-    def _see(self, belief: ObjectBelief, mind: Mind, frame: Frame | None) -> None:
+    def _await(self, candidates: Iterable[ObjectBelief]) -> None:
+        """Remember where those were first seen that are not yet sure to be objects."""
+        for b in candidates:
+            known = self._origins.get(b.id, Origin(self._now, b.region.bbox, self._now))
+            self._origins[b.id] = replace(known, until=self._now)
+        self._origins = {i: x for i, x in self._origins.items() if self._now - x.until <= OVER_S}
+
+    def _look(self, belief: ObjectBelief, frame: Frame | None) -> None:
+        """What colour it has, where it shows best so far."""
+        area, word = self._looked.get(belief.id, (0.0, None))
+        if frame is not None and belief.region.area > GROWN * area:
+            word = colour_word(palette(frame.image, belief.region)) or word
+            self._looked[belief.id] = belief.region.area, word
+
+    def _see(self, belief: ObjectBelief, mind: Mind) -> None:
         box, size = belief.region.bbox, mind.frame_size
         life = self.alive.get(belief.id)
         if life is None:
             # It was followed for some frames before it counted as an object.
-            since = max(belief.first_seen, self._now - OVER_S)
-            start = self._begun is not None and since - self._begun < OVER_S
-            life = ObjectLife(belief.id, size, since, self._now, box, box, from_start=start)
+            since = (
+                self._now if belief.id in self._ids else max(belief.first_seen, self._now - OVER_S)
+            )
+            origin = self._origins.pop(belief.id, Origin(since, box, since))
+            start = self._begun is not None and origin.since - self._begun < OVER_S
+            life = ObjectLife(
+                belief.id, size, origin.since, self._now, origin.first, box, from_start=start
+            )
             self.alive[belief.id] = life
         life.until, life.last, life.left = self._now, box, False
         life.name = spoken_name(mind, belief.id)
         life.area = max(life.area, belief.region.area)
-        if frame is not None and belief.region.area > GROWN * self._looked.get(belief.id, 0.0):
-            self._looked[belief.id] = belief.region.area
-            life.colour = colour_word(palette(frame.image, belief.region)) or life.colour
+        life.colour = self._looked.get(belief.id, (0.0, None))[1]
 
     def _meet(self, seen: Sequence[ObjectBelief], mind: Mind, lasted: float) -> None:
         """Who is near whom."""
@@ -214,7 +258,6 @@ class LifeLog:
 
     def _close(self, life: ObjectLife) -> None:
         del self.alive[life.id]
-        self._looked.pop(life.id, None)
         self._ids.add(life.id)
         if self.longest is None or life.seconds > self.longest.seconds:
             self.longest = life

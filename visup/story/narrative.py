@@ -60,16 +60,19 @@ class Narrative:
         log: The lives of all objects.
         budget: Lines a minute of what is not grave and belongs to no task.
         withheld: Events that were not told.
+        courses: What objects did -> the ids of those that did it.
     """
 
     detail: Detail = Detail.USUAL
     log: LifeLog = field(default_factory=LifeLog)
     budget: LineBudget = field(default_factory=LineBudget)
     withheld: int = 0
+    courses: dict[str, set[int]] = field(default_factory=dict)
     _waiting: list[ObjectLife] = field(default_factory=list)
     _staying: set[int] = field(default_factory=set)
     _told: dict[tuple[object, ...], float] = field(default_factory=dict)
     _alerts: set[object] = field(default_factory=set)
+    _lives_told: int = 0
 
     def lines(self, step: Step, frame: Frame | None) -> list[Event]:
         """What is told of one step.
@@ -78,12 +81,13 @@ class Narrative:
             step: The step.
             frame: Its frame, for colours, or None.
         """
+        self.budget.begin(step.time)
         ended = self.log.add(step, frame)
         if self.detail is Detail.ALL:
             return worded_once(step.events)
         told = [e for e in worded_once(step.events) if self._worth_telling(e, step.mind)]
         self.withheld += len(step.events) - len(told)
-        self._waiting += [x for x in ended if _counts(x)]
+        self._waiting += self._counted(ended)
         return [*told, *self._lives(step)]
 
     def rest(self, time: float, frame_index: int) -> list[Event]:
@@ -93,13 +97,23 @@ class Narrative:
             time: Of the last step, seconds.
             frame_index: Of its frame.
         """
-        lives = [*self._waiting, *(x for x in self.log.finish() if _counts(x))]
+        going_on = self._counted(self.log.finish())
+        lives = [*self._waiting, *(x for x in going_on if x.id not in self._staying)]
         self._waiting = []
         if self.detail is Detail.ALL:
             return []
         groups = sorted(_by_course(lives), key=len, reverse=True)
-        told = groups[: self.budget.at_once]
+        told = [g for g in groups if self.budget.take(time)]
+        if not self._lives_told:
+            told = told or groups[:1]  # however short the run, something is told of it
         return [_event(lives_sentence(g), g, time, frame_index) for g in told]
+
+    def _counted(self, lives: Sequence[ObjectLife]) -> list[ObjectLife]:
+        """Those that count; what they did is counted, told or not."""
+        found = [x for x in lives if _counts(x)]
+        for life in found:
+            self.courses.setdefault(course(life, "were"), set()).add(life.id)
+        return found
 
     def _worth_telling(self, event: Event, mind: Mind) -> bool:
         if event.kind not in ABOUT_OBJECTS and event.kind in EVENT_KINDS:
@@ -132,11 +146,13 @@ class Narrative:
         while self._waiting and self.budget.take(step.time):
             group = max(_by_course(self._waiting), key=lambda g: (len(g), max(x.area for x in g)))
             self._waiting = [x for x in self._waiting if x not in group]
+            self._lives_told += 1
             yield _event(lives_sentence(group), group, step.time, step.frame_index)
         for life in self.log.alive.values():
             long = step.time - life.since >= STAYS_S and life.name is None and _counts(life)
             if long and life.id not in self._staying and self.budget.take(step.time):
                 self._staying.add(life.id)
+                self._lives_told += 1
                 yield _event(stay_sentence(life), [life], step.time, step.frame_index)
 
 

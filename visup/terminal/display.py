@@ -154,7 +154,7 @@ def _(record: Observation) -> RenderableType:
     for report in record.reports:
         branch = tree.add(Text(_report(report)))
         for percept in report.percepts[:12]:
-            branch.add(Text(percept_text(percept.value)))
+            branch.add(Text(percept_text(percept.value).removeprefix("that ")))
         if more := len(report.percepts) - 12:
             branch.add(Text(f"and {more} more", style="dim")) if more > 0 else None
     return tree
@@ -162,7 +162,8 @@ def _(record: Observation) -> RenderableType:
 
 def _report(r: Report) -> str:
     error = f": {r.error}" if r.error else ""
-    return f"{r.behaviour} {r.state.value}, {len(r.percepts)} percepts{error}"
+    count = "1 percept" if len(r.percepts) == 1 else f"{len(r.percepts)} percepts"
+    return f"{r.behaviour} {r.state.value}, {count}{error}"
 
 
 @shown.register

@@ -62,7 +62,7 @@ class Narrator:
             return
         for event in self.narrative.rest(self.last.time, self.last.frame_index):
             self.print_event(event)
-        for text in summary_lines(self.narrative.log):
+        for text in summary_lines(self.narrative.log, self.narrative.courses):
             self.console.print(text, soft_wrap=True, markup=False)
 
     def print_event(self, event: Event) -> None:

@@ -31,6 +31,7 @@ from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
 from visup.wording import prose, worded_once
 
 Answer = RenderableType | None
+WIDE = 1000
 PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -57,6 +58,8 @@ class Session:
         self._picture = picture
         self.timelines = [Stepper(agent, frames)]
         self.console = console or make_console()
+        if not (console or self.console.is_terminal):
+            self.console.width = WIDE  # a pipe has no width: nothing is cut
         self._marks: dict[str, Bookmark] = {}
 
     @property
@@ -96,7 +99,7 @@ class Session:
             answer = self.execute(command)
             refused |= isinstance(answer, Refusal)
             if answer is not None:
-                self.console.print(answer, soft_wrap=not self.console.is_terminal)
+                self.console.print(answer)
         return 2 if refused else 0
 
     def execute(self, command: str) -> Answer:

@@ -116,7 +116,7 @@ _COMMANDS = (
     Command("leave", "back to the timeline that this branch left"),
     Command("mind", "all that is believed, in short"),
     Command(
-        "show [why [not] WHAT] [FILE]",
+        "show [why WHAT] [FILE]",
         "the frame with what is believed drawn over it",
         "'show why WHAT' lights the regions that the answer to 'why WHAT' rests on,\n"
         "in the frame that it speaks of. A terminal that can show pictures (kitty,\n"
@@ -145,10 +145,11 @@ _COMMANDS = (
 COMMANDS: Mapping[str, Command] = MappingProxyType({c.name: c for c in _COMMANDS})
 """By their names."""
 
+_WIDTH = max(len(c.usage) for c in _COMMANDS)
 HELP = "\n".join(
     [
-        *(f"{c.usage:<22} {c.does}" for c in _COMMANDS),
-        f"{'quit':<22} end",
+        *(f"{c.usage:<{_WIDTH}} {c.does}" for c in _COMMANDS),
+        f"{'quit':<{_WIDTH}} end",
         "A unique beginning of a command is enough; an empty line repeats the last one.",
     ]
 )

@@ -36,10 +36,10 @@ KINDS = ("region", "hypothesis", "depth")
 
 TOLD = {
     "verdict": ("the verdict on dock is interrupted", "unexpected_object(object 2) is true"),
-    "approach": ("stage approach is failing", "the arm and the satellite have been diverging"),
-    "stage captured": ("stage captured is pending", "arm is played by object 3"),
-    "touching 1 2": ("touching(the satellite, the hubble) is false", "its quantity is"),
-    "coupled 1 3": ("coupled(the satellite, the arm) is false", "touching"),
+    "approach": ("stage approach: failing", "the arm and the satellite have been diverging"),
+    "stage captured": ("stage captured: pending", "arm is played by object 3"),
+    "touching 1 2": ("touching(the satellite, the hubble) has been false", "its value is"),
+    "coupled 1 3": ("coupled(the satellite, the arm) has been false", "touching"),
     "identity 1": ("object 1 is spartan", "votes, share"),
     "object 3": ("object 3 is believed to be seen", "first seen at 0.00 s"),
     "collision_course 1 2": ("collision_course(the", "converging("),
@@ -84,7 +84,7 @@ MISSING = {
     "reappearance 1": "object 1 is seen",
     "identified 1": "was identified as spartan",
     "entry 1": "has entered",
-    "touching 1 2": "its quantity is",
+    "touching 1 2": "its value is",
     "touching 1 9": "object 9 is not believed to be there",
     "unexpected_object": "alert 1 is open since 0.60 s",
 }

@@ -5,16 +5,8 @@ from itertools import product
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.tasks.automaton.derivatives import (
-    Leaf,
-    State,
-    begin,
-    derivatives,
-    enter,
-    leaves,
-    structural_key,
-    with_leaves,
-)
+from visup.tasks.automaton.derivatives import begin, derivatives, enter
+from visup.tasks.automaton.states import Leaf, State, leaves, structural_key, with_leaves
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.nodes import (
     Action,

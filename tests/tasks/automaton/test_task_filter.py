@@ -14,7 +14,6 @@ from tests.oracles.recognition_tasks import Draw, text_of
 from visup.agent import Status
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.backpointers import Revision, revisions
-from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.hidden_phases import (
     ActionEvidence,
     ActionKey,
@@ -23,12 +22,15 @@ from visup.tasks.automaton.hidden_phases import (
     hidden_filter,
 )
 from visup.tasks.automaton.stage_hmm import DEFAULT_HMM, ActionStatus, PhaseKind, StageHmm
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.transitions import HiddenState, HiddenTransitions
 from visup.tasks.grammar.parser import read
 
 ROW = "<t> ::= <one> <two> <three>\n<one> ::= a(x)\n<two> ::= b(x)\n<three> ::= c(x)"
 HELD = TaskStep("a", ("x",), "t", 2.0)
 PLAIN = TaskStep("a", ("x",), "t")
+SURE = StageHmm(lose=0.0)
+"""Nothing is ever lost."""
 LAW = settings(max_examples=40, deadline=None)
 
 
@@ -150,7 +152,7 @@ def test_a_contrary_that_lasts_is_failing_and_ends_it() -> None:
 
 def test_what_may_come_next_is_told_with_equal_shares() -> None:
     task = "<t> ::= <a> (<b> | <c> <b>)\n<a> ::= a(x)\n<b> ::= b(x)\n<c> ::= c(x)"
-    recogniser = hidden_filter(read(task))
+    recogniser = hidden_filter(read(task), SURE)
     assert dict(recogniser.next_stages(recogniser.start())) == {
         "b": pytest.approx(0.5),
         "c": pytest.approx(0.5),
@@ -160,10 +162,19 @@ def test_what_may_come_next_is_told_with_equal_shares() -> None:
 
 def test_what_comes_next_is_a_stage_however_many_steps_away() -> None:
     task = "<t> ::= <a> <b>?\n<a> ::= (a(x) c(x))+\n<b> ::= b(x)"
-    recogniser = hidden_filter(read(task))
-    after_one = dict(recogniser.next_stages(recogniser.start()))["b"]
+    recogniser = hidden_filter(read(task), SURE)
+    coming = dict(recogniser.next_stages(recogniser.start()))
     # From c: a again, b, or the end; a leads back to c: p = 1/3 p + 1/3.
-    assert after_one == pytest.approx(0.5, abs=1e-6)
+    assert coming == {"b": pytest.approx(0.5, abs=1e-6), "": pytest.approx(0.5, abs=1e-6)}
+
+
+@LAW
+@given(st.floats(0.0, 1.0), st.sampled_from([ROW, "<t> ::= (a(x) for 2 s b(x))+ c(x)?"]))
+def test_success_is_a_part_of_what_comes_next(lose: float, text: str) -> None:
+    recogniser = hidden_filter(read(text), StageHmm(lose=lose))
+    start = recogniser.start()
+    coming = sum(chance for _, chance in recogniser.next_stages(start))
+    assert recogniser.success(start) <= coming + 1e-6 <= 1.0 + 2e-6
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from visup.agent import Relation, Truth
 from visup.evaluation.oracles import oracle
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.stage_hmm import ActionStatus
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.grammar.parser import read
 from visup.tasks.supervision.advance import Observe

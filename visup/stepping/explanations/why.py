@@ -171,7 +171,8 @@ class ReasonFinder:
             raise SettingsError(f"{named} is not judged", expected="a relation of objects in view")
         who = ", ".join(short(self.mind, i) for i in objects)
         text = (
-            f"{name}({who}) is {r.truth.value} since {r.since:.2f} s, confidence {r.confidence:.2f}"
+            f"{name}({who}) has been {r.truth.value} since {r.since:.2f} s, "
+            f"confidence {r.confidence:.2f}"
         )
         parts = self._measured(r) + (self._coupled(objects) if name == "coupled" else ())
         sights = tuple(self._sight(i) for i in objects) if deep else ()
@@ -181,7 +182,7 @@ class ReasonFinder:
         if r.value is None:
             return ()
         about = "" if r.sigma is None else f" ± {r.sigma:.3g}"
-        return (Why(f"its quantity is {r.value:.3g}{about}"),)
+        return (Why(f"its value is {r.value:.3g}{about}"),)
 
     def _coupled(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
         low, high = sorted(objects)
@@ -208,7 +209,7 @@ class ReasonFinder:
         """Why an object is believed to be there and to be what it is."""
         b = self._belief(object_id)
         return Why(
-            f"object {b.id} is believed to be {b.presence.value}, {_named(b)}",
+            f"object {b.id} is believed to be {b.presence.value}; it is {_named(b)}",
             (self._sight(object_id), self.identity(object_id)),
             *self._here,
         )
@@ -272,7 +273,7 @@ class ReasonFinder:
         parts = [Why(s.evidence)] if s.evidence else []
         parts += [Why("it was told", tuple(since[-3:]))] if since else []
         parts += self._asked(task) if task.current == s.stage else []
-        text = f"stage {s.stage} is {s.status.value} since {s.since:.2f} s"
+        text = f"stage {s.stage}: {s.status.value} since {s.since:.2f} s"
         return Why(f"{text}, confidence {s.confidence:.2f}", (*parts, *self._actors(task)))
 
     def _asked(self, task: TaskBelief) -> list[Why]:
@@ -312,7 +313,7 @@ class ReasonFinder:
         stages = tuple(
             self._stage(task, s)
             if s.stage == task.current or s.status.value in ("failing", "failed")
-            else Why(f"stage {s.stage} is {s.status.value} since {s.since:.2f} s")
+            else Why(f"stage {s.stage}: {s.status.value} since {s.since:.2f} s")
             for s in task.stages
         )
         alerts = tuple(

@@ -118,7 +118,7 @@ def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
         who = ", ".join(short(mind, i) for i in wanted.objects)
         if r is None or r.truth is not Truth.TRUE:
             stands = "not judged" if r is None else r.truth.value
-            amount = "" if r is None or r.value is None else f"; its quantity is {r.value:.3g}"
+            amount = "" if r is None or r.value is None else f"; its value is {r.value:.3g}"
             yield Why(f"awaited: {wanted.relation}({who}) is {stands}{amount}")
 
 
@@ -239,12 +239,12 @@ def relation_unmet(mind: Mind, name: str, objects: tuple[int, ...]) -> Why:
     found = []
     if r.value is not None:
         about = "" if r.sigma is None else f" ± {r.sigma:.3g}"
-        found.append(Why(f"its quantity is {r.value:.3g}{about}"))
+        found.append(Why(f"its value is {r.value:.3g}{about}"))
     for i in objects:
         belief = mind.objects[i]
         if belief.last_seen < mind.time:
             found.append(Why(f"object {i} was last seen at {belief.last_seen:.2f} s"))
-    return Why(f"{called} is {r.truth.value} since {r.since:.2f} s", tuple(found))
+    return Why(f"{called} has been {r.truth.value} since {r.since:.2f} s", tuple(found))
 
 
 def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
