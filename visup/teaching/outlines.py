@@ -63,9 +63,7 @@ def _corners(name: str, text: str) -> Iterable[tuple[float, float]]:
             )
         x, y = (float(n) for n in found.groups())
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise SettingsError(
-                f"the outline of '{name}' has a corner that is nowhere"
-            )
+            raise SettingsError(f"the outline of '{name}' has a corner that is nowhere")
         yield x, y
         at = _skip(text, found.end())
 
