@@ -43,14 +43,18 @@ class PeopleBehaviour(DetectorBehaviour):
     class Settings(BaseModel):
         """What can be set by `--set people.NAME=VALUE`."""
 
-        least_px: float = Field(60.0, ge=24, description="height of the smallest person, pixels")
-        least: float = Field(0.6, ge=0, description="boxes found with less than that are left out")
+        least_px: float = Field(
+            default=60.0, ge=24, description="height of the smallest person, pixels"
+        )
+        least: float = Field(
+            default=0.6, ge=0, description="boxes found with less than that are left out"
+        )
 
     def __init__(self, settings: Settings | None = None) -> None:
         super().__init__()
         self.settings = settings or self.Settings()
         self._detector = cv2.HOGDescriptor()
-        self._detector.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
+        self._detector.setSVMDetector(cv2.HOGDescriptor.getDefaultPeopleDetector())
 
     def find(self, frame: Frame) -> Iterable[Detection]:
         """The people of a frame, from left to right."""
