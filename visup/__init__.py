@@ -2,9 +2,8 @@
 
     import visup
 
-    for step in visup.watch("clip.mp4", task="dock", models="things.models"):
-        for event in step.events:
-            print(f"{event.time:6.1f} s  {event.text}")
+    for event in visup.watch("clip.mp4", task="dock", models="things.models").narrate():
+        print(f"{event.time:6.1f} s  {event.text}")
 
 What stands in `__all__` is the public API; docs/api.md lists it with examples. Names are loaded when they
 are first used, so that `import visup` costs next to nothing.

@@ -86,6 +86,8 @@ def _told(model: MonitoredPhases, belief: TaskBelief, reason: str) -> str:
     """What is said of a broken invariant: what the task has come to by it, in the verdict's own words."""
     if reason == belief.evidence and belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
         return verdict_sentence(model.task.name, belief.verdict, reason)
+    if belief.verdict is Verdict.SUCCEEDED:  # which stays so: it came too late for that
+        return f"Task `{model.task.name}` has succeeded, but {reason}."
     return f"Task `{model.task.name}`: {reason}."
 
 

@@ -30,46 +30,59 @@ STILL_S = 13.6
 WIDTH, HEIGHT, PANEL = 480, 360, 118
 """Of the picture and of the strip below it, pixels."""
 
-EVERY = 5
-"""The clip has 25 frames a second, the film five."""
+EVERY = 6
+"""The clip has 25 frames a second, of which the demo looks at every other one; the film has four."""
 
 READ_MS, QUALITY = 1500, 32
 LETTERS, LINE, ROWS, WRAPPED = 13, 17, 6, 74
 INK, GRAVE, GROUND = (224, 228, 232), (250, 170, 90), (26, 28, 32)
 
+Rows = list[tuple[str, bool]]
+"""Lines of one sentence, each with whether it is grave."""
+
 
 def film() -> tuple[list[Image.Image], list[int]]:
     """Pictures, and how long each is shown, milliseconds."""
-    narrative, rows = Narrative(), list[tuple[str, bool]]()
+    narrative, rows = Narrative(), list[Rows]()
     pictures, shown = [], []
-    run = visup.watch(demo_settings(1))
+    run = visup.watch(demo_settings())
     for step in run:
         assert step.frame is not None
         news = narrative.lines(step, step.frame)
         for event in news:
-            rows += _rows(event)
+            rows.append(_rows(event))
         if abs(step.time - STILL_S) < 0.01:
             still = Image.fromarray(np.ascontiguousarray(step.draw()[:, :, ::-1]))
             still.quantize(128).save(STILL, optimize=True)
         if news or step.frame_index % EVERY == 0:
             pictures.append(_picture(step.draw(), rows))
             shown.append(READ_MS if news else 40 * EVERY)
-    rows.append((Text.from_markup(verdict_line(run.verdict)).plain, True))
+    rows.append([(Text.from_markup(verdict_line(run.verdict)).plain, True)])
     pictures.append(_picture(step.draw(), rows))
     shown.append(2 * READ_MS)
     return pictures, shown
 
 
-def _rows(event: Event) -> list[tuple[str, bool]]:
+def _rows(event: Event) -> Rows:
     told = f"{event.time:5.1f} s  {prose(event.text)}"
     lines = textwrap.wrap(told, WRAPPED, subsequent_indent=" " * 9)
     return [(line, event.severity > Severity.INFO) for line in lines]
 
 
-def _picture(image: NDArray[np.uint8], rows: list[tuple[str, bool]]) -> Image.Image:
+def _latest(rows: list[Rows]) -> Rows:
+    """What was told last, as much of it as has room, nothing of it cut."""
+    shown: Rows = []
+    for told in reversed(rows):
+        if len(told) + len(shown) > ROWS:
+            break
+        shown = [*told, *shown]
+    return shown
+
+
+def _picture(image: NDArray[np.uint8], rows: list[Rows]) -> Image.Image:
     page = np.full((HEIGHT + PANEL, WIDTH, 3), GROUND[::-1], np.uint8)
     page[:HEIGHT] = cv2.resize(image, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    for place, (text, grave) in enumerate(rows[-ROWS:]):
+    for place, (text, grave) in enumerate(_latest(rows)):
         at = (10 + LETTERS * 4 * text.startswith(" " * 9), HEIGHT + 8 + place * LINE)
         write(page, text.strip(), at, LETTERS, GRAVE if grave else INK)
     return Image.fromarray(np.ascontiguousarray(page[:, :, ::-1]))

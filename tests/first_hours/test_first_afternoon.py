@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import shutil
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ import pytest
 
 from tests.cli import Call
 from tests.first_hours.test_sessions import piped
+from tests.paths import ROOT
 
 OUTLINE = "disc=8,20 40,20 40,52 8,52"
 
@@ -98,3 +100,22 @@ def test_thirty_commands_of_a_first_afternoon_all_go_as_told(
                 f"$ visup {line}\n  code {done.code}, not {code}; not told: {told!r}\n{said}"
             )
     assert wrong == [], "\n".join(wrong)
+
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TOLD = re.sub(r"[`|]", " ", "\n".join(p.read_text(encoding="utf-8") for p in PAGES))
+GROUPS = ("task", "rules", "behaviours", "models")
+
+
+@pytest.mark.parametrize("line", [line for line, _, _ in COMMANDS])
+def test_every_command_of_it_is_told_by_the_readme_or_a_page(line: str) -> None:
+    typed, _, session = line.partition(" <- ")
+    words = shlex.split(typed)
+    name = " ".join(words[: 2 if words[0] in GROUPS else 1])
+    assert f"visup {name}" in TOLD or any(
+        f" {words[1]}" in row for row in re.findall(rf"visup {words[0]} .*", TOLD)
+    )
+    assert all(w in TOLD for w in words if w.startswith("--"))
+    asked = [c.split()[0] for c in session.split(";") if c.strip()]
+    stepping = (ROOT / "docs" / "stepping.md").read_text(encoding="utf-8")
+    assert all(c in stepping for c in asked)

@@ -9,12 +9,14 @@ import pytest
 
 from tests.cli import Call
 from tests.first_hours.test_sessions import piped
+from visup import watch
 from visup.agent.cycle.answers import resolve_model
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.model.mind import Mind
 from visup.agent.storage.journal_reader import _unreadable
 from visup.runs.settings import complete_task
 from visup.terminal.display import html_of
+from visup.terminal.narrator import event_line
 from visup.terminal.tables import table
 
 
@@ -93,3 +95,16 @@ def test_shells_complete_task_names_and_files(
     (tmp_path / "dot.task").touch()
     assert complete_task("do") == ["dock", "dock_with_retry", "dot.task"]
     assert complete_task("nothing") == []
+
+
+def test_a_program_is_told_what_the_terminal_is_and_nothing_twice(
+    visup: Call, clip: Path, tmp_path: Path
+) -> None:
+    task = tmp_path / "never.task"
+    task.write_text("actor disc is what moves first\n<t> ::= moving(disc)\nnever present(disc)\n")
+    run = watch(clip, task=task)
+    lines = [event_line(event) for event in run.narrate()]
+    assert any("Task 't' has succeeded, but 'never present(disc)' has not held" in x for x in lines)
+    assert len({line[10:] for line in lines}) == len(lines) < len(run.events)
+    done = visup("watch", clip, "--task", task, "--no-video")
+    assert done.out.splitlines()[: len(lines)] == lines

@@ -27,6 +27,7 @@ def watching() -> visup.Verdict | None:
             assert_type(event.severity >= visup.Severity.WARNING, bool)
         for concern in step.alerts:
             assert_type(concern, visup.Alert)
+    assert_type(next(run.narrate()), visup.Event)
     assert_type(run.events[0], visup.Event)
     assert_type([s.mind for s in run.steps], list[visup.Mind])
     assert_type(run.alerts[-1].cause, str)

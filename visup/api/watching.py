@@ -26,6 +26,7 @@ from visup.runs.result import RunResult
 from visup.runs.runner import Audience, fresh_folder, supervised
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict
+from visup.story import Narrative
 
 KEPT_STEPS = 2000
 """Steps that a run keeps in memory, some 100 kB each; events and alerts are kept all."""
@@ -134,6 +135,18 @@ class Run(Iterator[Step]):
 
     def _repr_html_(self) -> str:
         return html_with_picture(self._story(), self._last())
+
+    def narrate(self) -> Iterator[Event]:
+        """Watch what is left of the source, and yield what is worth telling as it comes.
+
+        It is what `visup watch` prints: what has one cause is told once, objects that nobody knows by a
+        line a life. `events` has all that happened.
+        """
+        narrative = Narrative()
+        for step in self:
+            yield from narrative.lines(step, step.frame)
+        if self._steps:
+            yield from narrative.rest(self._steps[-1].time, self._steps[-1].frame_index)
 
     def finish(self) -> Self:
         """Watch what is left of the source, and return the run itself."""
