@@ -34,7 +34,7 @@ check: setup
 
 # Damaged and hostile files of every kind, for a minute; `make bench` takes longer.
 fuzz: setup
-	$(BIN)/visup eval hardening --count 150 --seed 0
+	$(BIN)/visup eval hardening --count 150 --cuts 100 --seed 0
 
 oracles: setup
 	$(BIN)/python -m tests.oracles

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic_core import from_json, to_json
 
-from visup.agent.storage.mask_codec import check_room
+from visup.agent.storage.text_file import check_room
 
 LARGEST_BYTES = 256 * 2**20
 """Bytes of a message; a larger one is refused unread."""

@@ -12,6 +12,9 @@ algebra take one a core. The system does not count those of root."""
 STARTING_MB = 4096.0
 """Memory that it may take for its libraries and models until it has started, megabytes."""
 
+ADDRESSES_MB = 2048
+"""Addresses beyond its memory, megabytes: a thread reserves some 130 for its stack and its allocations."""
+
 
 def limit_at_start(memory_mb: float) -> None:
     """Bound this process before code of the user's own runs in it, where the platform can.
@@ -32,6 +35,9 @@ def limit_at_start(memory_mb: float) -> None:
 def limit_memory(memory_mb: float, *, final: bool = True) -> None:
     """Bound the memory of this process, where the platform can: what it has now and so much more.
 
+    Memory that may be shared is no data to the system, and is bounded by addresses: in the end alone,
+    since a library that is loaded may reserve many of them (a GPU's).
+
     Args:
         memory_mb: How much more, megabytes.
         final: Whether the process itself may not raise the bound again.
@@ -39,9 +45,11 @@ def limit_memory(memory_mb: float, *, final: bool = True) -> None:
     try:
         import resource
 
-        pages = int(Path("/proc/self/statm").read_text().split()[5])
-        most = pages * resource.getpagesize() + int(memory_mb * 2**20)
-        _set(resource.RLIMIT_DATA, most, final=final)
+        addresses, *_, data, _ = map(int, Path("/proc/self/statm").read_text().split())
+        page, more = resource.getpagesize(), int(memory_mb * 2**20)
+        _set(resource.RLIMIT_DATA, data * page + more, final=final)
+        if final:
+            _set(resource.RLIMIT_AS, addresses * page + more + ADDRESSES_MB * 2**20)
     except (ImportError, OSError, ValueError):
         return
 

@@ -30,12 +30,12 @@ from visup.agent.model.errors import OutputError
 from visup.agent.model.records import Observation, Percept, Region, Report, ReportState
 from visup.agent.storage.mask_codec import (
     chain_to_contour,
-    check_room,
     contour_to_chain,
     mask_to_runs,
     room,
     runs_to_mask,
 )
+from visup.agent.storage.text_file import check_room
 
 LARGEST_STEP_BYTES = 256 * 2**20
 """No step is larger, bytes uncompressed: a damaged file must not fill the memory."""

@@ -158,6 +158,8 @@ class Journal:
         self._open(self.path, 1)
 
     def _open(self, path: Path, number: int) -> None:
+        if path.is_symlink():  # one that leads nowhere: the file would be made elsewhere
+            raise OutputError("the journal would be written elsewhere", where=str(path))
         try:
             self._db = _connected(path)
             self._durable = False

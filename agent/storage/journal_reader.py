@@ -18,7 +18,7 @@ from visup.agent.model.records import Observation
 from visup.agent.storage.atomic import replacing
 from visup.agent.storage.codec import LARGEST_STEP_BYTES, unpack_observation
 from visup.agent.storage.journal import check_version, is_empty, segments
-from visup.agent.storage.mask_codec import check_room
+from visup.agent.storage.text_file import check_room
 
 JOURNAL = "journal.sqlite"
 _LARGEST_ROW = LARGEST_STEP_BYTES

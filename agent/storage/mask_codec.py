@@ -14,20 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_VALUES = 4_000_000
-"""No document holds more values: an empty list takes two bytes of text, and thirty times that in memory."""
 MOST_PIXELS = 2**28
 """No step has masks and contours of more pixels and points together."""
-
-
-def check_room(text: bytes) -> None:
-    """Refuse a document that would take far more memory than its text does.
-
-    Raises:
-        ValueError: It holds more than `MOST_VALUES` values.
-    """
-    if text.count(b",") + text.count(b"[") + text.count(b"{") > MOST_VALUES:
-        raise ValueError(f"it holds more than {MOST_VALUES} values")
 
 
 _left: ContextVar[list[int]] = ContextVar("pixels that are left")

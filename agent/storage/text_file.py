@@ -38,5 +38,24 @@ def read_bounded(path: Path, most: int) -> bytes:
     return data
 
 
+MOST_VALUES = 4_000_000
+"""No document holds more values: an empty list takes two bytes of text, and thirty times that in memory."""
+
+
+def check_room(text: bytes, most: int = MOST_VALUES, marks: bytes = b",[{") -> None:
+    """Refuse a document that would take far more memory than its text does.
+
+    Args:
+        text: The document: JSON, unless `marks` are others.
+        most: How many values it may hold.
+        marks: Characters of which each begins a value.
+
+    Raises:
+        ValueError: It holds more.
+    """
+    if sum(text.count(mark) for mark in marks) > most:
+        raise ValueError(f"it holds more than {most} values")
+
+
 def _size(most: int) -> str:
     return f"{most >> 20} MB" if most >= 2**20 else f"{most} bytes"

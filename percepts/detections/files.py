@@ -8,13 +8,20 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError
+from visup.agent.storage.text_file import check_room, read_text_file
 from visup.percepts.detections.boxes import Detection
 
 EXPECTED = (
     "MOT lines `frame,id,left,top,width,height,score,...` (frames from 1), or COCO JSON whose "
     "annotations have `image_id` and `bbox` (and `track_id`, where a tracker has numbered them)"
 )
-MOST_BYTES = 2**30
+MOST_BYTES = 2**27
+MOST_COCO_VALUES, MOST_MOT_LINES = 12_000_000, 2_000_000
+"""About a million boxes and two: they take a gigabyte."""
+FARTHEST, MOST_TRACKS = 1e6, 10**9
+"""Pixels from the corner, and the highest number of a track."""
+SCORE = 6
+"""The last value of a line of MOT that is looked at, counted from 0."""
 
 
 Frames = Mapping[int, tuple[Detection, ...]]
@@ -30,10 +37,10 @@ def read_detections(path: Path) -> Frames:
         SettingsError: It cannot be read, is of neither form, or some of its boxes have numbers and some not.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise SettingsError("the file of detections is too large", where=str(path))
-        text = path.read_text(encoding="utf-8")
-        rows = _coco(json.loads(text)) if text.lstrip().startswith("{") else _mot(text)
+        text = read_text_file(path, MOST_BYTES)
+        is_coco = text.lstrip().startswith("{")
+        check_room(text.encode(), *((MOST_COCO_VALUES,) if is_coco else (MOST_MOT_LINES, b"\n")))
+        rows = _coco(json.loads(text)) if is_coco else _mot(text)
         found: dict[int, list[Detection]] = {}
         for frame, detection in rows:
             _check(frame, detection)
@@ -41,7 +48,7 @@ def read_detections(path: Path) -> Frames:
     except OSError as fault:
         what = f"the detections cannot be read ({fault.strerror})"
         raise SettingsError(what, where=str(path)) from fault
-    except (KeyError, TypeError, ValueError, IndexError) as fault:
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, RecursionError) as fault:
         said = f"no {fault}" if isinstance(fault, KeyError) else str(fault)
         what = f"the detections cannot be used: {said}"
         raise SettingsError(what, where=str(path), expected=EXPECTED) from fault
@@ -57,6 +64,10 @@ def read_detections(path: Path) -> Frames:
 def _check(frame: int, detection: Detection) -> None:
     if frame < 0:
         raise ValueError(f"there is no frame {frame}")
+    if not all(abs(side) <= FARTHEST for side in detection.box):
+        raise ValueError(f"a box at {detection.box}")
+    if detection.track > MOST_TRACKS:
+        raise ValueError("a track has a number of more than nine digits")
     if not min(detection.box[2:]) > 0:
         raise ValueError(f"a box of {detection.box[2]:g} x {detection.box[3]:g} pixels")
 
@@ -65,11 +76,11 @@ def _mot(text: str) -> Iterator[tuple[int, Detection]]:
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip():
             continue
-        cells = line.split(",")
+        cells = line.split(",", SCORE + 1)
         if len(cells) < 6:
             raise ValueError(f"line {number} has {len(cells)} values")
         x, y, w, h = (float(c) for c in cells[2:6])
-        score = float(cells[6]) if len(cells) > 6 else 1.0
+        score = float(cells[SCORE]) if len(cells) > SCORE else 1.0
         sure = min(1.0, score) if score > 0 else 1.0
         track = max(0, int(float(cells[1])))  # -1 where only a detector spoke
         yield int(float(cells[0])) - 1, Detection(track, (x, y, w, h), sure)

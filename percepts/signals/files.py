@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
@@ -11,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from visup.agent.model.errors import SettingsError
-from visup.agent.storage.text_file import read_text_file
+from visup.agent.storage.text_file import check_room, read_text_file
 from visup.percepts.signals.behaviour import NAME, Value
 
-MOST_BYTES = 2**27
+MOST_BYTES, MOST_VALUES = 2**27, 6_000_000
 TIME = "time"
 TRUTHS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 EXPECTED = (
@@ -54,11 +53,12 @@ def read_signals(path: Path) -> SignalTable:
     """
     try:
         text = read_text_file(path, MOST_BYTES)
-        rows = list(csv.reader(io.StringIO(text), strict=True))
+        check_room(text.encode(), MOST_VALUES, b",\n")
+        rows = list(csv.reader((f"{line}\n" for line in text.split("\n")), strict=True))
     except OSError as fault:
         what = f"the signals cannot be read ({fault.strerror or fault})"
         raise SettingsError(what, where=str(path), hint="check the path") from None
-    except (UnicodeDecodeError, csv.Error) as fault:
+    except (ValueError, csv.Error) as fault:
         what = f"the signals cannot be read: {fault}"
         raise SettingsError(what, where=str(path), expected=EXPECTED) from None
     header, times, told = _header(rows, path), list[float](), list[dict[str, Value]]()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
 from visup.agent.storage.picture_size import check_picture_size
-from visup.agent.storage.text_file import read_bounded
+from visup.agent.storage.text_file import read_bounded, read_text_file
 from visup.percepts.video.quiet_decoder import quiet
 from visup.percepts.video.source import DEFAULT_FPS, Ending, VideoSource, to_bgr
 
@@ -240,7 +240,7 @@ def _sequence_info(folder: Path) -> dict[str, str]:
     """What a MOT `seqinfo.ini` says (keys in lower case); empty when there is none to be read."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
-        parser.read_string((folder / "seqinfo.ini").read_text(encoding="utf-8-sig"))
+        parser.read_string(read_text_file(folder / "seqinfo.ini"))
         return dict(parser["Sequence"])
     except (OSError, UnicodeDecodeError, configparser.Error, KeyError):
         return {}

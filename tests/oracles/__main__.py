@@ -35,7 +35,7 @@ COMPARISONS: dict[str, Callable[[], bool]] = {
         evaluate_robustness(files=60, masks=60)["failures"]
     ),
     "damaged files of every kind, and races": lambda: bool(
-        evaluate_hardening(count=40, races=10)["failures"]
+        evaluate_hardening(count=40, races=10, cuts=100)["failures"]
     ),
     "misbehaving behaviours": lambda: bool(evaluate_faults(count=31)["failures"]),
 }

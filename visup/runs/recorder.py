@@ -6,9 +6,11 @@ supervision: what is to be written waits in memory, the trouble is told as an al
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,7 +87,7 @@ class Recorder:
         self.complete = True
         self.collector = Collector()
         self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
-        path = _free(folder / "annotated.webm")
+        path = free_path(folder / "annotated.webm")
         self.video = AnnotatedVideo(path, source.fps / source.every) if options.video else None
         self._wants_report = options.report
         self._derived = {"report": self.collector.add} if options.report else {}
@@ -229,9 +231,8 @@ def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:
     return recorder.collector.save() if recorder else {}
 
 
-def _free(path: Path) -> Path:
+def free_path(path: Path) -> Path:
     """A file beside those that an earlier part of the run wrote."""
-    if not path.exists():
-        return path
     names = (path.with_name(f"{path.stem}-{n}{path.suffix}") for n in range(2, 10**6))
-    return next(p for p in names if not p.exists())
+    # Not even a link that leads nowhere: what is written there would be a file elsewhere.
+    return next(p for p in chain((path,), names) if not os.path.lexists(p))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from visup.agent.model.errors import DatabaseError, VisupError
+from visup.agent.storage.text_file import read_bounded
 from visup.percepts.shape.database.catalogue import Shapes, Views
 from visup.percepts.shape.database.file_format import VERSION
 from visup.percepts.shape.index.view_records import LAYOUT, NewView
@@ -20,6 +21,8 @@ from visup.version import __version__
 
 VIEWS_OF_A_PART = 64
 """Views of a part at most: one mesh with many views keeps all processes busy."""
+
+LARGEST_MESH_BYTES = 2**28
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +53,10 @@ def parts_of(mesh: Path, folder: Path, views: int, seed: int) -> list[BuildPart]
         DatabaseError: The mesh cannot be read.
     """
     try:
-        content = mesh.read_bytes()
+        content = read_bounded(mesh, LARGEST_MESH_BYTES)
     except OSError as e:
         raise DatabaseError(
-            "there is no such mesh file" if not mesh.exists() else f"cannot be read ({e.strerror})",
+            f"cannot be read ({e.strerror})" if mesh.exists() else "there is no such mesh file",
             where=str(mesh),
             expected="a mesh file",
         ) from e

@@ -156,6 +156,13 @@ def test_nonsense_on_the_wire_is_its_failure_and_holds_nobody_up(
     assert said in told[0].error
 
 
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no bounds of memory here")
+def test_memory_that_may_be_shared_is_bounded_too(tmp_path: Path) -> None:
+    taken = reports(plug(tmp_path, "import mmap\nmmap.mmap(-1, 2**40)\nreturn 1"), 1, PATIENT)
+    assert taken[0].state is ReportState.FAILED
+    assert "memory" in taken[0].error
+
+
 needs_namespaces = pytest.mark.skipif(
     not isolating(), reason="processes cannot have namespaces of their own here"
 )

@@ -26,7 +26,7 @@ Make = Callable[[Path, random.Random], None]
 Read = Callable[[Path], None]
 
 
-def media(clip: Path) -> Mapping[str, tuple[Make, Read]]:
+def media(clip: Path) -> dict[str, tuple[Make, Read]]:
     """Kinds of moving pictures: what makes a damaged one, and what reads it.
 
     Args:

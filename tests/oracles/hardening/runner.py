@@ -1,13 +1,14 @@
-"""`visup eval hardening`: damaged files of every kind, and races of writers.
+"""`visup eval hardening`: damaged files of every kind, attacks, races of writers and losses of power.
 
-Bars: no traceback, no hang over 10 s, no gigabyte of memory over the process's own, no crash, no code run;
-writers at once lose nothing. Losses of power, hostile servers, plug-ins and terminals have tests of their own
-(`tests/runs/power`, `tests/sinks`, `tests/agent/execution`, `tests/terminal`).
+Bars: no traceback, no hang over 10 s, no gigabyte of memory over the process's own, no crash, no wrong exit
+code, no code run; neither writers at once nor cuts of power lose anything. Hostile servers and plug-ins have
+further tests of their own (`tests/sinks`, `tests/agent/execution`).
 """
 
 from __future__ import annotations
 
 import os
+import random
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,8 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from tests.oracles.hardening.fuzzing import fuzz
-from tests.oracles.hardening.subjects import subjects
+from tests.oracles.hardening.attack_list import attacks
+from tests.oracles.hardening.attacks import attacked
+from tests.oracles.hardening.fuzzing import Findings, fuzz
+from tests.oracles.hardening.subjects import Subject, subjects
+from tests.runs.power.cuts import lost_in_cuts, recorded_run
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.evaluation.figures import Progress, silent
@@ -26,28 +30,33 @@ from visup.percepts.taught.view import taught_view
 OUTCOMES = ("read", "refused", "raised", "slow", "crashed", "memory", "ran")
 BAD = OUTCOMES[2:]
 SHOWN = 20
+ATTACKS = "attacks"
+FILES_FOR_AN_ATTACK = 10
+"""An attack is a whole command, and takes as long as some files that are read."""
 
 
 def evaluate_hardening(
     count: int = 5000,
     seed: int = 0,
     races: int = 100,
+    cuts: int = 1000,
     kind: Sequence[str] | None = None,
     *,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Read damaged files, and let writers race.
+    """Read damaged files, make attacks, let writers race, and cut the power.
 
     Args:
         count: Files of each kind.
-        seed: Of the damage.
+        seed: Of the damage, the choice of attacks, and the moments of the cuts.
         races: How often two writers begin at once.
+        cuts: How often the power is lost; not at all where there is no C compiler to make the disk.
         kind: Names of kinds; all if none.
         progress: Shows what is being done.
 
     Returns:
         `items` by kind, with `files` and how many were read, refused, or failed and how; `total` of these
-        with `races`, `lost` (writers' work that is not there); `failures` in words.
+        with `races`, `cuts`, `lost` (of either: what was written or told is not there); `failures` in words.
 
     Raises:
         SettingsError: There is no such kind.
@@ -55,21 +64,48 @@ def evaluate_hardening(
     items: dict[str, dict[str, int]] = {}
     failures: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
-        known = subjects(Path(scratch))
-        for name in _chosen(kind, list(known)):
+        place = Path(scratch)
+        known = subjects(place)
+        for name in _chosen(kind, [*known, ATTACKS]):
             progress(name)
-            found = fuzz(known[name], count, seed, Path(scratch))
-            items[name] = {"files": count, **{o: found.outcomes[o] for o in OUTCOMES}}
+            found = _found(known.get(name), count, seed, place)
+            items[name] = {
+                "files": found.outcomes.total(),
+                **{o: found.outcomes[o] for o in OUTCOMES},
+            }
             failures += [f"{name} {failure}" for failure in found.failures]
         progress("races")
-        lost = sum(_raced(Path(scratch) / f"race {n}", n) for n in range(races))
+        raced = sum(_raced(place / f"race {n}", n) for n in range(races))
+        progress("cuts of power")
+        made, cut = _cut(place / "power", cuts, seed)
     total = {key: sum(item[key] for item in items.values()) for key in ("files", *OUTCOMES)}
-    failures += [f"{lost} of {races} races lost something"] if lost else []
+    failures += [f"{raced} of {races} races lost something"] if raced else []
+    failures += [f"after {len(cut)} of {made} cuts something was lost: {cut[0]}"] if cut else []
     return {
         "items": items,
-        "total": {**total, "races": races, "lost": lost},
+        "total": {**total, "races": races, "cuts": made, "lost": raced + len(cut)},
         "failures": [{"text": f} for f in failures[:SHOWN]],
     }
+
+
+def _found(subject: Subject | None, count: int, seed: int, place: Path) -> Findings:
+    """What came of a kind of file, or of attacks."""
+    if subject is not None:
+        return fuzz(subject, count, seed, place)
+    known = attacks()
+    number = min(len(known), max(1, count // FILES_FOR_AN_ATTACK))
+    names = random.Random(seed).sample(sorted(known), number)
+    return attacked({name: known[name] for name in names}, place)
+
+
+def _cut(folder: Path, cuts: int, seed: int) -> tuple[int, list[str]]:
+    """How often the power was lost, and what was missing after the cuts that lost something."""
+    folder.mkdir()
+    run = recorded_run(folder) if cuts else None
+    if run is None:
+        return 0, []
+    lost = lost_in_cuts(run, cuts, seed, folder / "again")
+    return len(lost), [", ".join(what[:3]) for what in lost if what]
 
 
 def _chosen(wanted: Sequence[str] | None, known: list[str]) -> list[str]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from tests.clips import moving_disc, write_clip
+from tests.oracles.hardening.documents import documents
 from tests.oracles.hardening.media import media
 from tests.oracles.hardening.mutations import mutated
 from visup.agent.model.errors import VisupError
@@ -56,7 +57,7 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         place: An empty folder, for what the sound files are made of.
     """
     clip = write_clip(place / "clip.avi", moving_disc(12), fps=10.0)
-    run = _interrupted(place, clip)
+    run = interrupted_run_at(place, clip)
     database = _database(place)
     texts = {
         "tasks": ("a.task", sorted((ROOT / "tasks" / "shipped").glob("*.task")), _tasks),
@@ -78,7 +79,7 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         "resumed journals": Subject(_resumable(journal, state), _resumed),
         "states": Subject(_damaging(CHECKPOINT, [state]), _state),
         "signals": Subject(_damaging("signals.csv", [SIGNALS]), _signals),
-        **{name: Subject(make, read) for name, (make, read) in media(clip).items()},
+        **{n: Subject(make, read) for n, (make, read) in (documents() | media(clip)).items()},
     }
 
 
@@ -98,8 +99,8 @@ class _Stop(Exception):
     pass
 
 
-def _interrupted(place: Path, clip: Path) -> Path:
-    """A run that was killed at its eighth frame, with a state."""
+def interrupted_run_at(place: Path, clip: Path) -> Path:
+    """A run in `place`/run that was killed at its eighth frame, with a state."""
     folder = place / "run"
     folder.mkdir()
 

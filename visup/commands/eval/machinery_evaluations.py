@@ -26,7 +26,7 @@ MACHINERY_EVALUATIONS = (
     ),
     EvaluationCommand(
         "hardening",
-        """Damaged and hostile files of every kind, and races of writers: nothing gets in, nothing gets lost.
+        """Damaged files of every kind, attacks, races of writers, cuts of power: nothing gets in or lost.
 
         Exit code: 0 when all were read or refused within bounds, and nothing was lost, else 1.
         """,
@@ -34,9 +34,10 @@ MACHINERY_EVALUATIONS = (
         "reading",
         ("files", "read", "refused", "raised", "slow", "crashed", "memory", "ran"),
         (
-            count("count", 5000, "Damaged files of each kind."),
+            count("count", 5000, "Damaged files of each kind; an attack for ten, at most."),
             _SEED,
             count("races", 100, "How often two writers begin at once.", 0),
+            count("cuts", 1000, "How often the power is lost.", 0),
             Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
         ),
         closing=adapters.failures_closing("{text}"),

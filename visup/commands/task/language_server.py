@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 from lsprotocol import types as lsp
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
-from visup.agent.model.errors import SourceLocation, VisupError
+from visup.agent.model.errors import SourceError, SourceLocation, VisupError
 from visup.commands.task.editor_features import (
     FEATURES,
     faults_of,
@@ -39,9 +40,41 @@ KINDS = {
 }
 
 
-def serve() -> None:
-    """Serve one editor over stdin and stdout until it says that it is done."""
-    make_server().start_io()
+LARGEST_MESSAGE_BYTES = 2**26
+
+
+def serve(sent: BinaryIO, answers: BinaryIO) -> None:
+    """Serve one editor until it says that it is done, or goes away.
+
+    Raises:
+        SourceError: It announces a message that is longer than any may be.
+    """
+    make_server().start_io(cast("BinaryIO", EditorInput(sent)), answers)
+
+
+class EditorInput:
+    """What an editor sends; memory is taken for no more than a message may have.
+
+    Args:
+        sent: The stream.
+    """
+
+    def __init__(self, sent: BinaryIO) -> None:
+        self.readline = partial(sent.readline, LARGEST_MESSAGE_BYTES)
+        self._read = sent.read
+
+    def read(self, count: int) -> bytes:
+        """So many bytes of a message.
+
+        Raises:
+            SourceError: They are too many.
+        """
+        if count > LARGEST_MESSAGE_BYTES:
+            raise SourceError(
+                f"the editor sends a message of {count} bytes",
+                expected=f"at most {LARGEST_MESSAGE_BYTES >> 20} MB",
+            )
+        return self._read(count)
 
 
 def make_server() -> LanguageServer:

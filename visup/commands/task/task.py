@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -142,7 +143,7 @@ def lsp() -> None:
         if (e.name or "").split(".")[0] not in ("pygls", "lsprotocol"):
             raise
         raise ExtraMissingError("`visup task lsp`", "lsp") from e
-    serve()
+    serve(sys.stdin.buffer, sys.stdout.buffer)
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:
