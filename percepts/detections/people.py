@@ -54,7 +54,8 @@ class PeopleBehaviour(DetectorBehaviour):
         super().__init__()
         self.settings = settings or self.Settings()
         self._detector = cv2.HOGDescriptor()
-        self._detector.setSVMDetector(cv2.HOGDescriptor.getDefaultPeopleDetector())
+        weights = np.array(cv2.HOGDescriptor.getDefaultPeopleDetector(), np.float32)
+        self._detector.setSVMDetector(weights)
 
     def find(self, frame: Frame) -> Iterable[Detection]:
         """The people of a frame, from left to right."""
