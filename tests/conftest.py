@@ -29,6 +29,8 @@ class SameProvider(HypothesisProvider):
 
 
 AVAILABLE_PROVIDERS["visup-same"] = SameProvider
-settings.register_profile("same", derandomize=True, deadline=None, backend="visup-same")
-settings.register_profile("explore", deadline=None, print_blob=True)
+settings.register_profile(
+    "same", derandomize=True, deadline=None, backend="visup-same", max_examples=50
+)
+settings.register_profile("explore", deadline=None, print_blob=True, max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))

@@ -36,7 +36,7 @@ class YoloNetwork:
         except ModuleNotFoundError as missing:
             raise ExtraMissingError("a detector's network", "onnx") from missing
         if not path.is_file():
-            raise SettingsError("there is no such file of a network", where=str(path))
+            raise SettingsError("there is no such file", where=str(path))
         options = onnxruntime.SessionOptions()
         options.log_severity_level = 4  # what is wrong is told below
         try:

@@ -121,7 +121,7 @@ def _rows(output: NDArray[np.float32], classes: int) -> tuple[NDArray[np.float32
     if output.ndim == 3 and output.shape[0] == 1:
         output = output[0]
     if output.ndim != 2 or (output.shape[1] < 5 and output.shape[0] < 5):
-        raise ValueError(f"an array of shape {output.shape} is no layout of YOLO's")
+        raise ValueError(f"an array of shape {output.shape} is not one of YOLO's layouts")
     if _chosen(output):
         return output, Layout.CHOSEN
     known = {5 + classes: Layout.ANYTHING, 4 + classes: Layout.CLASSES} if classes else {}

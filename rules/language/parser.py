@@ -39,7 +39,7 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
     try:
         return _parsed(text, file)
     except RecursionError:
-        raise RuleError("things stand inside one another too deep", where=file) from None
+        raise RuleError("things are nested too deeply", where=file) from None
 
 
 def _parsed(text: str, file: str) -> tuple[Rule, ...]:
@@ -108,7 +108,7 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
     try:
         return _formula(text, file, vocabulary)
     except RecursionError:
-        raise RuleError("things stand inside one another too deep", where=file) from None
+        raise RuleError("things are nested too deeply", where=file) from None
 
 
 def _formula(text: str, file: str, vocabulary: Vocabulary) -> Formula:

@@ -65,7 +65,7 @@ def _ordered(
     try:
         task, faults = _diagnosed(text, source, actions, percepts, read)
     except RecursionError:
-        what = "things stand inside one another too deep"
+        what = "things are nested too deeply"
         return Task(()), [Diagnostic("E128", what, source.place(1, 1))]
     order = {name: i for i, name in enumerate((file, *source.included))}
     return task, sorted(faults, key=lambda f: _order(f, order))[:MOST_FAULTS]

@@ -69,7 +69,7 @@ def test_a_brief_says_what_is_outlined_where(tmp_path: Path) -> None:
         (["no.mp4", "--models", "a", *words("part")], "no.mp4"),
         (["cell.png", "--models", "a", "--outline", "part"], "has no name"),
         (["cell.png", "--models", "a", *words("part"), "--frame", "4"], "no frame 4"),
-        (["cell.png", "--models", "a", "--brief", "b.json"], "a brief says itself"),
+        (["cell.png", "--models", "a", "--brief", "b.json"], "a brief already says"),
         (["--models", "a", "--brief", "b.json"], "cannot be read"),
         (["cell.png", "--models", "no/a", *words("part")], "cannot be written"),
     ],

@@ -74,7 +74,7 @@ def watch(
         return Run(settings_from(source, task, models, actors, options), out)
     if options or not (task is None and models is None and actors is None):
         raise SettingsError(
-            "settings come whole: nothing but `out` can be given besides",
+            "settings come whole: nothing but `out` can stand beside them",
             hint="change them with dataclasses.replace(settings, ...)",
         )
     return Run(source, out)

@@ -19,7 +19,7 @@ def check(
     ],
     settings_file: SettingsFile = None,
 ) -> None:
-    """Say whether `visup watch` with the same words could begin, and come to anything.
+    """Say beforehand whether `visup watch` with the same options can begin, and lead to anything.
 
     The source is opened and its first frame read; tasks, rules, zones, models and behaviours are loaded;
     and the actors of each task are looked for among the models. Exit code: 0 when a run can begin, 2 when it

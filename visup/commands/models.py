@@ -34,7 +34,7 @@ def build(
     seed: Annotated[int, typer.Option(help="Seed of the rotation of the views' directions.")] = 0,
     jobs: Annotated[int, typer.Option(help="Processes; 0 for one on each core.")] = 0,
 ) -> None:
-    """Build a database from meshes. Each model is called as its file, without the ending.
+    """Build a database from meshes. Each model is named after its file, without the ending.
 
     A build that was stopped goes on where it was when the same command is given again. Views that are
     the same by symmetry are stored once.
@@ -109,7 +109,7 @@ def add(
 def learn(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder, or its journal.")],
     models: Annotated[
-        Path, typer.Option(metavar="DB", help="Model database; begun if there is none.")
+        Path, typer.Option(metavar="DB", help="Model database; created if there is none.")
     ],
     thing: Annotated[
         list[str] | None,

@@ -38,7 +38,7 @@ def step(
     ],
     settings_file: SettingsFile = None,
 ) -> None:
-    """Step through a video or a recorded run, forth and back, and look into the agent's mind.
+    """Step back and forth through a video or a recorded run, and look into the agent's mind.
 
     Commands are read from the terminal, or from a pipe: one a line, see `help`. Exit code: 0; from a pipe 2
     when a command could not be obeyed.

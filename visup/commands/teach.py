@@ -33,7 +33,7 @@ def teach(
         typer.Argument(metavar="[CLIP]", help="Video, folder of images, or picture."),
     ] = None,
     models: Annotated[
-        Path | None, typer.Option(metavar="DB", help="Model database; begun if there is none.")
+        Path | None, typer.Option(metavar="DB", help="Model database; created if there is none.")
     ] = None,
     frame: Annotated[int, typer.Option(min=0, help="Number of the frame, from 0.")] = 0,
     outline: Annotated[
@@ -58,9 +58,9 @@ def teach(
     """
     if models is None:
         raise SettingsError(
-            "it is not said where to store what is taught",
+            "there is no model database to store what is taught in",
             expected="--models DB",
-            hint="a database that does not exist yet is begun",
+            hint="a database that does not exist yet is created",
         )
     lesson = _lesson(clip, models, frame, outline or [], brief, browser)
     if lesson is None:
@@ -85,7 +85,7 @@ def _lesson(
 
     if brief is not None and (outlines or clip is not None):
         raise SettingsError(
-            "a brief says itself what is outlined in which clip",
+            "a brief already says what is outlined, and in which clip",
             expected="--brief FILE --models DB, without CLIP and --outline",
         )
     if brief is not None:

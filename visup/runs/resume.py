@@ -58,7 +58,7 @@ class InterruptedRun:
         """
         if self.recording.count() != self.steps:
             raise OutputError(
-                "somebody else has gone on with this run meanwhile",
+                "another process has gone on with this run meanwhile",
                 where=str(self.recording.path.parent),
                 hint="resume it again, if it is not over",
             )

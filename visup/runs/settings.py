@@ -116,7 +116,7 @@ class WatchSettings:
     bystanders: Annotated[
         tuple[str, ...],
         Option(
-            "A model, or a taught thing, that has no part in the task and is let be.",
+            "A model, or a taught thing, that plays no part in the task and is left alone.",
             "--bystander",
             "NAME",
         ),

@@ -73,7 +73,7 @@ def learn(
 
     Args:
         run: A run folder, or the journal in it.
-        models: The model database; one that does not exist yet is begun.
+        models: The model database; one that does not exist yet is created.
         things: Name -> number of the object that it was, besides what the operator answered.
         source: The video of the run, where it has moved.
         views: How many views of each thing at most.
@@ -264,7 +264,7 @@ def _video(recording: Recording, source: str | None) -> ClipFrames:
         raise SourceError(
             "this run watched a camera, whose frames are gone",
             where=where,
-            hint="where it was filmed besides, say so: --source FILE",
+            hint="if it was filmed as well, name the film: --source FILE",
         )
     named = source or recorded_settings(facts, where).source
     try:
@@ -273,5 +273,5 @@ def _video(recording: Recording, source: str | None) -> ClipFrames:
         raise SourceError(
             f"the video of this run cannot be opened: {fault.what}",
             where=named,
-            hint="where it has moved, say so: --source FILE",
+            hint="if it has moved, name it: --source FILE",
         ) from fault

@@ -67,7 +67,7 @@ def teach(
     Args:
         source: A video, a folder of images, a picture file, or a picture (H, W, 3) uint8, BGR.
         outlines: Name -> corners (x, y) in pixels of the picture, y down; or a mask (H, W) bool.
-        models: The model database; one that does not exist yet is begun.
+        models: The model database; one that does not exist yet is created.
         frame: Number of the frame in which they are outlined, from 0.
 
     Returns:

@@ -12,23 +12,23 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "Watch": {
             "watch": "watch a video and say whether the work goes well",
-            "demo": "the same with the shipped clip: a capture that fails",
-            "check": "say beforehand whether a run could come to anything",
+            "demo": "watch the shipped clip, a capture that fails",
+            "check": "say beforehand whether a run can lead to anything",
             "presets": "what --preset traffic, cell, orbit, bench choose",
         },
         "Prepare": {
-            "teach": "show things once, to have them known from then on",
+            "teach": "show things once, so that they are known from then on",
             "models": "build, extend, list and query model databases",
             "task": "check, show, simulate and learn task files",
             "rules": "check, list and explain safety rules",
         },
         "Look into a run": {
-            "step": "step through it, forth and back, and ask why",
+            "step": "step through it, back and forth, and ask why",
             "replay": "reason again, with other tasks or rules",
             "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",
         },
         "Extend and measure": {
-            "behaviours": "list, check and begin plug-ins",
+            "behaviours": "list, check and create plug-ins",
             "render": "render a scene with masks and truth",
             "eval": "compute figures against ground truth",
             "train": "learn from labelled sequences what moves by itself",

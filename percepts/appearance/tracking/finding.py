@@ -54,10 +54,8 @@ def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
         view: What the thing looked like when it was taught.
         number: Of the view.
     """
-    it = view.appearance
-    by = max(scene.size) / max(view.size)
-    unit = view.pose.scale * by
-    home = PatchPose(view.pose.x * by, view.pose.y * by, unit)
+    it, home = view.appearance, home_of(scene, view)
+    unit = home.scale
     poses = [PatchPose(0, 0, unit * s) for s in SIZES] + [PatchPose(0, 0, unit, a) for a in TURNS]
     matches = [verify(scene, it, home), *search(scene, it, poses)]
     near = 6 * unit
@@ -65,6 +63,12 @@ def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
         ThingPlace(view.name, number, it, m, m.score + AT_HOME * (m.pose.apart(home, 10) < near))
         for m in _outstanding(matches, it)
     ]
+
+
+def home_of(scene: Scene, view: ViewModel) -> PatchPose:
+    """Where a thing was when it was taught, in the frame."""
+    by = max(scene.size) / max(view.size)
+    return PatchPose(view.pose.x * by, view.pose.y * by, view.pose.scale * by)
 
 
 def moving_places(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from visup.percepts.appearance.tracking.finding import (
     ThingPlace,
     assigned,
     candidates,
+    footprint,
     lost_places,
     moving_places,
 )
@@ -30,6 +31,7 @@ from visup.percepts.appearance.tracking.following import (
     noted,
 )
 from visup.percepts.appearance.tracking.learning import learned, rested
+from visup.percepts.appearance.tracking.look_alikes import look_alikes, settled
 from visup.percepts.appearance.tracking.points import (
     NO_POINTS,
     STILL,
@@ -77,6 +79,7 @@ class ThingTracker:
         self._static = True
         self._camera: Doubles | None = STILL
         self._scenery = CameraTrack()
+        self._alike = look_alikes(self.views)
 
     @property
     def camera(self) -> Doubles | None:
@@ -93,7 +96,7 @@ class ThingTracker:
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far."""
-        return {k: v for k, v in vars(self).items() if k != "views"}
+        return {k: v for k, v in vars(self).items() if k not in ("views", "_alike")}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a tracker of the same views remembered."""
@@ -184,10 +187,16 @@ class ThingTracker:
                 if view.name in names - {f.name for f in found}
                 for c in moving_places(scene, view, number, lately)
             ]
-        taken = [t.visible for t in self.tracks if t.state in IN_VIEW and t.visible is not None]
-        placed = assigned(scene, found, taken)
+        taken = [b for t in self.tracks if t.state in IN_VIEW for b in _occupied(t, scene)]
+        placed = self._settled(assigned(scene, found, taken), scene)
         asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
         self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
+
+    def _settled(self, placed: Mapping[str, ThingPlace], scene: Scene) -> dict[str, ThingPlace]:
+        """Whose the places are, where things that look alike are not all looked for at once."""
+        sought = {t.name for t in self.tracks if t.state not in IN_VIEW} - set(placed)
+        found = (settled(scene, p, self.views, self._alike, sought) for p in placed.values())
+        return {place.name: place for place in found}
 
     def _share_pixels(self, scene: Scene, same: Mapping[str, Mask]) -> None:
         claims = [_claim(t, scene, same) for t in self.tracks]
@@ -263,6 +272,16 @@ def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> Mask:
             left, top, right, bottom = t.visible.window
             out[top:bottom, left:right] |= t.visible.mask
     return out
+
+
+def _occupied(track: ThingTrack, scene: Scene) -> Iterator[Blob]:
+    """Where a thing in view is; what has only just come into view again has no pixels of its own yet."""
+    if track.visible is not None:
+        yield track.visible
+    elif track.seen == scene.time and track.pose is not None and track.looks is not None:
+        covered = footprint(scene, track.pose, track.looks)
+        if covered is not None:
+            yield covered
 
 
 def _points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:

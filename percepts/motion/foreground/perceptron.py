@@ -85,7 +85,7 @@ def read_model(path: Path) -> ForegroundModel:
         return _model(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, TypeError) as fault:
         raise SourceError(
-            "this is no model of moving foreground",
+            "this is not a model of moving foreground",
             where=str(path),
             expected="a file that 'visup train motion' wrote",
         ) from fault

@@ -1,6 +1,6 @@
 """Building a model database: views of meshes, exemplars of silhouettes, masks of a video.
 
-Models are called as their mesh files. Nothing here depends on the order in which processes finish.
+Models are named after their mesh files. Nothing here depends on the order in which processes finish.
 """
 
 from __future__ import annotations
@@ -270,7 +270,7 @@ def _check_names(meshes: Sequence[Path]) -> None:
         raise SettingsError(
             f"several meshes would be named {twice[0]!r}",
             expected="mesh files with different stems",
-            hint="rename one of them: a model is called as its file",
+            hint="rename one of them: a model is named after its file",
         )
 
 

@@ -13,8 +13,13 @@ from visup.percepts.taught.view import TaughtView, taught_mask
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 240, 180
-COLOURS = {"part": (40, 60, 200), "tray": (70, 160, 60), "tool": (190, 90, 40)}
-SIZES = {"part": (30, 24), "tray": (64, 40), "tool": (26, 60)}
+COLOURS = {
+    "part": (40, 60, 200),
+    "twin": (40, 60, 200),
+    "tray": (70, 160, 60),
+    "tool": (190, 90, 40),
+}
+SIZES = {"part": (30, 24), "twin": (30, 24), "tray": (64, 40), "tool": (26, 60)}
 
 
 def table(seed: int = 1) -> Image:

@@ -132,7 +132,7 @@ def test_zones_are_read_from_a_file(tmp_path: Path) -> None:
         ("", "there is no zone in it"),
         ("zone = 3", "there is no zone in it"),
         ("[[zone]\n", "this is not TOML"),
-        ("[[area]]\n", "'area' means nothing here"),
+        ("[[area]]\n", "'area' is not known here"),
         ("[[zone]]\npolygon = [[0, 0], [9, 0], [9, 9]]", "the zone has no name"),
         ('[[zone]]\nname = "a b"\npolygon = [[0, 0], [9, 0], [9, 9]]', "the name is 'a b'"),
         ('[[zone]]\nname = "a"\npolygon = [[0, 0], [9, 0]]', "the polygon has 2 corners"),
@@ -140,7 +140,10 @@ def test_zones_are_read_from_a_file(tmp_path: Path) -> None:
         ('[[zone]]\nname = "a"\npolygon = [[0, 0], [5, "x"], [9, 9]]', "not a list of corners"),
         ('[[zone]]\nname = "a"', "not a list of corners"),
         ('[[zone]]\nname = "a"\npolygon = [[0, 0], [9, 0], [9, nan]]', "not a list of corners"),
-        ('[[zone]]\nname = "a"\ncolor = 1\npolygon = [[0, 0], [9, 0], [9, 9]]', "'color' means"),
+        (
+            '[[zone]]\nname = "a"\ncolor = 1\npolygon = [[0, 0], [9, 0], [9, 9]]',
+            "'color' is not known",
+        ),
         ('[[zone]]\nname = "a"\ndepth = [9, 5]\npolygon = [[0, 0], [9, 0], [9, 9]]', "[9, 5]"),
     ],
 )

@@ -129,7 +129,7 @@ def test_the_nearest_word_is_named_whatever_its_case() -> None:
 
 
 def test_whatever_stands_in_a_file_is_read_or_told_with_its_place() -> None:
-    found = fuzz(400, seed=7)
+    found = fuzz(150, seed=7)
     assert (found.raised, found.placeless, found.unstable, found.slow) == ([], [], [], [])
     assert found.good > 0
     assert len(found.codes) > 30

@@ -8,7 +8,7 @@ from visup.tasks.grammar.conditions import actors_of
 from visup.tasks.grammar.nodes import Action, Name, Sequence, Task, children, walk
 from visup.tasks.grammar.parser import read
 
-LAW = settings(max_examples=150, deadline=None)
+LAW = settings(max_examples=50, deadline=None)
 
 
 @LAW

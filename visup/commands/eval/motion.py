@@ -32,7 +32,7 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
     for option, name in (alone | {"--train": "train", "--also": "also"}).items():
         if options[name]:
             raise SettingsError(
-                f"{option} says nothing without folds", expected="--folds N beside it"
+                f"{option} means nothing without folds", expected="--folds N beside it"
             )
     return evaluate_motion(folder, limit=options["limit"], progress=progress)
 

@@ -187,7 +187,7 @@ def tried_changes(text: str) -> dict[str, Any]:
             given[name] = float(value) if known[name] == "float" else int(value)
         except ValueError:
             raise SettingsError(
-                f"{value!r} is no value for {name}", where="--try", expected="a number"
+                f"{value!r} is not a value for {name}", where="--try", expected="a number"
             ) from None
     return given
 

@@ -37,5 +37,7 @@ def read_json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError) as fault:
         raise SettingsError(f"this cannot be read: {fault}", where=str(path)) from fault
     if not isinstance(data, dict):
-        raise SettingsError("this is no mission's file", where=str(path), expected="a JSON object")
+        raise SettingsError(
+            "this is not the file of a mission", where=str(path), expected="a JSON object"
+        )
     return data

@@ -205,7 +205,7 @@ class Scenario(ScenarioModel):
             while at in to:
                 at = to[at]
                 if at in seen:
-                    raise ValueError(f"{start!r} is attached to itself, at last")
+                    raise ValueError(f"{start!r} is attached to itself, through others")
                 seen.add(at)
 
 

@@ -57,20 +57,20 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
                 "outlines of those who pass each other meet all the time, and mean nothing; zones that are "
                 "to be kept free, and the camera, are watched",
                 ObjectSettings(forget_left_s=5.0, forget_hidden_s=60.0, forget_nameless_s=5.0),
-                "who is gone does not come back, and another one comes in its place",
+                "whoever has left does not come back; somebody else comes instead",
                 15.0,
-                "who crosses the picture in two seconds is seen thirty times",
+                "whatever crosses the picture in two seconds is seen thirty times",
             ),
             Preset(
                 "cell",
-                "a robot at work on parts, people may come near",
+                "a robot at work on parts; people may come near",
                 frozenset({"doubtful_collision", "excessive_spin"}),
-                "what is known is watched for contact that no task wants; what is not known is left to tasks "
+                "known things are watched for contact that no task wants; unknown ones are left to tasks "
                 "and zones",
                 ObjectSettings(forget_nameless_s=60.0),
-                "a gripper hides a part for a minute, and it is the same part",
+                "a gripper may hide a part for a minute, and it is still the same part",
                 None,
-                "contact is told by single frames",
+                "contact shows in single frames",
             ),
             Preset(
                 "orbit",
@@ -78,9 +78,9 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
                 frozenset(),
                 "whatever comes near, turns or enters matters",
                 ObjectSettings(forget_nameless_s=120.0),
-                "what an arm or a panel hides comes out again minutes later",
+                "what an arm or a panel hides reappears minutes later",
                 10.0,
-                "bodies drift by a tenth of a pixel a frame: fewer frames show the motion as well",
+                "bodies drift by a tenth of a pixel a frame: fewer frames show the motion just as well",
             ),
             Preset(
                 "bench",
@@ -90,7 +90,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
                 ObjectSettings(forget_nameless_s=30.0),
                 "a hand hides what it holds for half a minute",
                 15.0,
-                "hands at work are followed at fifteen frames a second",
+                "fifteen frames a second are enough to follow hands at work",
             ),
         )
     }

@@ -101,7 +101,7 @@ def _entries(path: Path) -> tuple[list[Any], object]:
     entries, ground = found.pop("zone", None), found.pop("ground", None)
     if found:
         raise SettingsError(
-            f"'{next(iter(found))}' means nothing here", where=str(path), expected="[[zone]]"
+            f"'{next(iter(found))}' is not known here", where=str(path), expected="[[zone]]"
         )
     if entries is None and ground is not None:
         return [], ground
@@ -116,7 +116,7 @@ def _zone(entry: object, where: str, h: Floats | None) -> Zone:
     strange = next((key for key in entry if key not in _KEYS), None)
     if strange is not None:
         raise SettingsError(
-            f"'{strange}' means nothing here", where=where, expected=f"one of: {', '.join(_KEYS)}"
+            f"'{strange}' is not known here", where=where, expected=f"one of: {', '.join(_KEYS)}"
         )
     name = entry.get("name")
     if not isinstance(name, str) or not _NAME.fullmatch(name):

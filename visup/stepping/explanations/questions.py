@@ -100,7 +100,7 @@ def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestio
             return ParsedQuestion(kind, about, ids)
     tables = (*known, *stage_names(mind), *rule_names(mind), *RELATION_NAMES)
     raise SettingsError(
-        f"nothing is asked by '{text}'",
+        f"this is not a question: '{text}'",
         expected=f"{', '.join(known)}, or the name of a stage, rule or relation with ids of objects",
         hint=did_you_mean(about, tables),
     )

@@ -63,7 +63,7 @@ def save(frames: ClipFrames, models: Path, asked: Mapping[str, Any]) -> Lesson:
 def _number(asked: object) -> int:
     number = asked.get("frame") if isinstance(asked, Mapping) else None
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 1 << 31:
-        raise SettingsError(f"{number!r} is no frame's number")
+        raise SettingsError(f"{number!r} is not the number of a frame")
     return number
 
 
@@ -80,4 +80,4 @@ def _corner(name: str, corner: object) -> tuple[float, float]:
     sound = isinstance(corner, list) and len(corner) == 2
     if sound and all(isinstance(n, int | float) and math.isfinite(n) for n in corner):  # type: ignore[attr-defined]
         return float(corner[0]), float(corner[1])  # type: ignore[index]
-    raise SettingsError(f"the outline of '{name}' has a corner that is none: {corner!r}")
+    raise SettingsError(f"the outline of '{name}' has a corner that is not two numbers: {corner!r}")
