@@ -2,7 +2,8 @@
 
 Read `boxes.py` (a box), `files.py` (MOT and COCO files), `yolo.py` and `network.py` (ONNX files of the YOLO
 family), `supervision.py` (the boxes of that library, in and out), `numbering.py` (the same thing keeps its
-number) and `behaviour.py` (boxes as regions, their names as hypotheses).
+number), `behaviour.py` (boxes as regions, their names as hypotheses) and `people.py` (people, by what OpenCV
+carries with it).
 """
 
 from visup.percepts.detections.behaviour import (
@@ -13,6 +14,7 @@ from visup.percepts.detections.behaviour import (
 from visup.percepts.detections.boxes import Detection
 from visup.percepts.detections.files import read_detections
 from visup.percepts.detections.network import YoloNetwork
+from visup.percepts.detections.people import PeopleBehaviour
 from visup.percepts.detections.supervision import from_supervision, to_supervision
 from visup.percepts.detections.yolo import decode_yolo, letterbox
 
@@ -21,6 +23,7 @@ __all__ = [
     "DetectionsBehaviour",
     "DetectorBehaviour",
     "NetworkBehaviour",
+    "PeopleBehaviour",
     "YoloNetwork",
     "decode_yolo",
     "from_supervision",

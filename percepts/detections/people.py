@@ -1,0 +1,77 @@
+"""People who stand or walk, by the detector that OpenCV carries with it: nothing is fetched.
+
+Histograms of oriented gradients, weighed by the linear machine that was learnt from the pictures of Dalal and
+Triggs, "Histograms of Oriented Gradients for Human Detection" (2005). It knows people seen whole, upright and
+roughly from the side; neither hands nor who sits or is half hidden.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+from pydantic import BaseModel, Field
+
+from visup.agent import Contract, Frame
+from visup.percepts.detections.behaviour import DetectorBehaviour
+from visup.percepts.detections.boxes import Box, Detection
+
+WINDOW = (64, 128)
+"""Width and height of what it looks at, pixels; a person fills some three quarters of the height."""
+
+PERSON_PX = 96.0
+
+LARGEST_PX = 1600
+"""Pictures are not made wider or higher than that to be looked at, which bounds the time of a frame."""
+
+MARGIN = (0.15, 0.06)
+"""What a box found leaves round the person on each side, shares of its width and height."""
+
+
+class PeopleBehaviour(DetectorBehaviour):
+    """Boxes of people, called `person`.
+
+    Args:
+        settings: What to look for.
+    """
+
+    contract = Contract("people", gives=("region", "hypothesis"), cost_ms=1000)
+    names = ("person",)
+
+    class Settings(BaseModel):
+        """What can be set by `--set people.NAME=VALUE`."""
+
+        least_px: float = Field(
+            default=60.0, ge=24, description="height of the smallest person, pixels"
+        )
+        least: float = Field(
+            default=0.6, ge=0, description="boxes found with less than that are left out"
+        )
+
+    def __init__(self, settings: Settings | None = None) -> None:
+        super().__init__()
+        self.settings = settings or self.Settings()
+        self._detector = cv2.HOGDescriptor()
+        weights = np.array(cv2.HOGDescriptor.getDefaultPeopleDetector(), np.float32)
+        self._detector.setSVMDetector(weights)
+
+    def find(self, frame: Frame) -> Iterable[Detection]:
+        """The people of a frame, from left to right."""
+        scale = min(PERSON_PX / self.settings.least_px, LARGEST_PX / max(frame.size))
+        picture = cv2.resize(frame.image, None, fx=scale, fy=scale)
+        if picture.shape[1] < WINDOW[0] or picture.shape[0] < WINDOW[1]:
+            return
+        boxes, weights = self._detector.detectMultiScale(picture, winStride=(8, 8), scale=1.05)
+        found = zip(map(tuple, np.reshape(boxes, (-1, 4)).tolist()), np.ravel(weights), strict=True)
+        for box, weight in sorted(found):
+            if weight >= self.settings.least:
+                yield Detection(0, person_in(box, scale), 1.0 - math.exp(-weight), "person")
+
+
+def person_in(box: Box, scale: float) -> Box:
+    """The person in a box that was found in a picture of another scale, without the margin round it."""
+    x, y, w, h = (value / scale for value in box)
+    across, along = MARGIN
+    return (x + across * w, y + along * h, (1 - 2 * across) * w, (1 - 2 * along) * h)
