@@ -10,8 +10,6 @@ from typing import Any
 from typer import BadParameter
 from typer.core import TyperGroup
 
-from visup.wording import printable
-
 PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "Watch": {
@@ -70,6 +68,8 @@ def _printable_refusals() -> Iterator[None]:
         yield
     except Exception as refusal:
         if isinstance(refusal, _REFUSAL):
+            from visup.wording import printable
+
             refusal.message = printable(refusal.message)
         raise
 
