@@ -9,10 +9,15 @@ from run to run where several processes share the tests. Ordinary runs do withou
 from __future__ import annotations
 
 import os
+import tempfile
+from pathlib import Path
 
 from hypothesis import settings
 from hypothesis.internal.conjecture.providers import AVAILABLE_PROVIDERS, HypothesisProvider
 from hypothesis.internal.constants_ast import Constants
+
+# States of runs are sealed with a key of the user; tests make their own, and leave his alone.
+os.environ.setdefault("VISUP_STATE_KEY", str(Path(tempfile.mkdtemp()) / "state.key"))
 
 
 class SameProvider(HypothesisProvider):

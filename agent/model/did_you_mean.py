@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import lru_cache
 
 
 def closest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
@@ -17,6 +18,11 @@ def closest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
         known: What there is.
         cutoff: How alike they must be, from 0 to 1.
     """
+    return _closest(word, tuple(known), cutoff)
+
+
+@lru_cache(maxsize=256)  # the same slip is often made, and each trial of a repair meets it again
+def _closest(word: str, known: tuple[str, ...], cutoff: float) -> str | None:
     by_folded = {k.casefold(): k for k in known}
     near = get_close_matches(word.casefold(), by_folded, n=1, cutoff=cutoff)
     return by_folded[near[0]] if near else None

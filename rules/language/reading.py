@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
@@ -14,7 +15,7 @@ from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SourceLocation
 from visup.rules.language.diagnostics import Diagnostic, Source, either
 from visup.rules.language.edits import Repair, edits, hint_of
-from visup.rules.language.fixes import fix_of
+from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.repair import (
     MOST_REPAIRS,
     WORDS,
@@ -211,10 +212,10 @@ def weight(text: str, patience: Patience) -> Weight:
     patience.left -= len(text)
     if patience.left < 0:
         return UNTRIED
-    fault = _syntax_fault(text, "start")
-    if fault is not None:
+    try:
+        return 0, len(_semantic(text, "start", "", RULES)[1])
+    except UnexpectedInput as fault:
         return 1, len(text) - place_of(text, fault)[0]
-    return 0, len(_semantic(text, "start", "", RULES)[1])
 
 
 def with_tried_edits(
@@ -227,23 +228,37 @@ def with_tried_edits(
         faults: What is wrong with it.
         weigh: How bad a text is.
     """
+    told = list(faults)
     before = weigh(block)
     if before == UNTRIED:
-        return list(faults)
-    return [_with_edit(block, f, before, weigh) for f in faults]
+        return told
+    with suppress(_OutOfPatienceError):
+        for n, fault in enumerate(faults):
+            told[n] = _with_edit(block, fault, before, weigh)
+    return told
+
+
+class _OutOfPatienceError(Exception):
+    """Nothing may be tried any more: to look for further edits would be in vain, and takes long."""
 
 
 def _with_edit(
     block: str, fault: Diagnostic, before: Weight, weigh: Callable[[str], Weight]
 ) -> Diagnostic:
+    def tried(fix: TextFix) -> Weight:
+        found = weigh(fix.applied(block))
+        if found == UNTRIED:
+            raise _OutOfPatienceError
+        return found
+
     place = fault.place
     own = fix_of(block, place, fault.hint)
-    if own is not None and weigh(own.applied(block)) <= before:
+    if own is not None and tried(own) <= before:
         return fault
     for repair in edits(place.text, place.column - 1, place.length, EDIT_WORDS):
         hint = hint_of(place.text, repair)
         fix = None if hint is None else fix_of(block, place, hint)
-        if fix is not None and weigh(fix.applied(block)) < before:
+        if fix is not None and tried(fix) < before:
             said = hint if fault.hint is None else f"{fault.hint}; {hint}"
             return replace(fault, hint=said)
     return fault

@@ -16,6 +16,7 @@ from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
+from visup.rules.predicates import outline_quantities as outline
 from visup.rules.predicates import signals as signal_words
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
@@ -224,13 +225,7 @@ def spin(facts: Snapshot) -> Floats:
 
 def _since(moment: str) -> Callable[[Snapshot], Floats]:
     read = attrgetter(moment)
-
-    def look(facts: Snapshot) -> Floats:
-        now = facts.mind.time
-        seconds = [now - read(b) for b in facts.beliefs]
-        return np.array((seconds, seconds))
-
-    return look
+    return lambda facts: np.array(([facts.mind.time - read(b) for b in facts.beliefs],) * 2)
 
 
 def _presence(wanted: Presence) -> Callable[[Snapshot], Codes]:
@@ -264,7 +259,7 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         **{name: _relation(name) for name in RELATION_NAMES},
         **{
             name: PredicateDefinition(_TWO, look, meaning)
-            for name, (look, meaning) in COARSE_RELATIONS.items()
+            for name, (look, meaning) in {**COARSE_RELATIONS, **outline.OUTLINE_RELATIONS}.items()
         },
         "expected": PredicateDefinition(
             ("relation", "object", "object"), expected, "an active task expects the relation"
@@ -367,6 +362,9 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
         "height": QuantityDefinition(_ONE, LENGTH, image.height, "of the box"),
         "area": QuantityDefinition(_ONE, SHARE, image.area_share, "share of the image"),
         "heading": QuantityDefinition(_ONE, ANGLE, image.heading, "0 to the right, 90 up"),
+        "orientation": QuantityDefinition(_ONE, ANGLE, outline.orientation, "of the long axis"),
+        "axis_angle": QuantityDefinition(_TWO, ANGLE, outline.axis_angle, "between the long axes"),
+        "openness": QuantityDefinition(_ONE, SHARE, outline.openness, "of the hull, left free"),
         "confidence": QuantityDefinition(_ONE, SHARE, image.confidence, "of the identity"),
         "centre_distance": QuantityDefinition(
             _TWO, LENGTH, image.centre_distance, "between the centres"

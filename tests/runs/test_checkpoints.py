@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from tests.agent.scripted import Scripted, frames
 from visup.agent.cycle.agent import Agent
 from visup.agent.storage.checkpoint import dump_state
+from visup.agent.storage.seal import KEY_FILE, own_key, seal
 from visup.runs import checkpoints
 from visup.runs.checkpoints import CHECKPOINT, PACKED, CheckpointWriter, read_checkpoint
 from visup.version import __version__
@@ -38,10 +40,62 @@ def test_states_write_no_more_than_they_may_in_an_hour(
     assert written[-1] >= min(240 * size, 2 * 16_000 - size)  # all that there is room for
 
 
+def write_state(folder: Path, packed: bytes) -> None:
+    (folder / CHECKPOINT).write_bytes(seal(packed, own_key()))
+
+
+SOUND = PACKED + zlib.compress(
+    dump_state({"visup": __version__, "frame_index": 7, "agent": {}, "kept": {}})
+)
+
+
+@pytest.mark.parametrize("change", [lambda data: data[40:], lambda data: data[:-1] + b"x", None])
+def test_a_state_of_somebody_else_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: Any
+) -> None:
+    """Its numbers would go to compiled loops unchecked."""
+    data = seal(SOUND, own_key())
+    (tmp_path / CHECKPOINT).write_bytes(change(data) if change else data)
+    if change is None:
+        assert read_checkpoint(tmp_path)[0] is not None
+        monkeypatch.setenv(KEY_FILE, str(tmp_path / "other"))
+        assert read_checkpoint(tmp_path) == (
+            None, "this user has no key to know it by, and it is not read",
+        )  # fmt: skip
+        assert len(own_key()) == 32
+    monkeypatch.setattr(checkpoints, "load_state", lambda _: pytest.fail("it was read"))
+    found, why = read_checkpoint(tmp_path)
+    assert (found, "another user" in str(why)) == (None, True)
+
+
+def test_whoever_begins_at_once_has_one_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(KEY_FILE, str(tmp_path / "deep" / "key"))
+    with ThreadPoolExecutor(8) as pool:
+        keys = set(pool.map(lambda _: own_key(), range(8)))
+    assert len(keys) == 1
+    assert (tmp_path / "deep" / "key").stat().st_mode & 0o777 == 0o600
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["key"]
+
+
+def test_where_no_key_can_be_kept_no_state_is_and_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv(KEY_FILE, str(tmp_path / "file" / "key"))
+    writer = CheckpointWriter(tmp_path, every_s=0.1)
+    for step in Agent([Scripted("eye", ("x",))]).steps(frames(5, fps=1.0)):
+        writer.offer(None, step, dict)  # type: ignore[arg-type]
+    writer.close()
+    assert KEY_FILE in (writer.note or "")
+    assert not (tmp_path / CHECKPOINT).exists()
+
+
 def test_a_state_is_compressed_and_reads_back(tmp_path: Path) -> None:
     state = {"visup": __version__, "frame_index": 7, "agent": {}, "kept": {"a": [1, 2]}}
     data = dump_state(state)
-    (tmp_path / CHECKPOINT).write_bytes(PACKED + zlib.compress(data))
+    write_state(tmp_path, PACKED + zlib.compress(data))
     found, why = read_checkpoint(tmp_path)
     assert why is None
     assert found is not None
@@ -59,7 +113,7 @@ def _flipped(data: bytes) -> bytes:
 @pytest.mark.parametrize("damage", [_cut, _flipped, lambda data: PACKED, lambda data: data[:3]])
 def test_a_damaged_state_is_none_and_says_why(tmp_path: Path, damage: Any) -> None:
     data = dump_state({"visup": __version__, "frame_index": 7, "agent": {}, "kept": {}})
-    (tmp_path / CHECKPOINT).write_bytes(damage(PACKED + zlib.compress(data)))
+    write_state(tmp_path, damage(PACKED + zlib.compress(data)))
     found, why = read_checkpoint(tmp_path)
     assert found is None
     assert why
@@ -69,5 +123,5 @@ def test_a_state_that_would_fill_the_memory_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checkpoints, "LARGEST_STATE_BYTES", 10**6)
-    (tmp_path / CHECKPOINT).write_bytes(PACKED + zlib.compress(bytes(10**8)))
+    write_state(tmp_path, PACKED + zlib.compress(bytes(10**8)))
     assert read_checkpoint(tmp_path) == (None, "it is cut off or too large")

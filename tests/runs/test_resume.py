@@ -85,7 +85,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     result = supervise(past.settings, parts, options=options, past=past)
     assert outcome(parts) == outcome(whole)
     assert any("perceived again" in n for n in result.notes) == (state != "kept")
-    assert any("check sum" in n for n in result.notes) == (state == "damaged")
+    assert any("it was changed" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is over"):
         interrupted_run(parts)
 

@@ -15,6 +15,7 @@ from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
 from visup.agent.storage.atomic import write_whole
 from visup.agent.storage.checkpoint import StateError, dump_state, load_state
+from visup.agent.storage.seal import SealError, own_key, seal, unsealed
 from visup.agent.storage.text_file import read_bounded
 from visup.version import __version__
 
@@ -58,7 +59,7 @@ class CheckpointWriter:
     """
 
     def __init__(self, folder: Path, every_s: float) -> None:
-        self.note: str | None = None
+        self.note, self._key = _key_to_seal_with() if every_s else (None, b"")
         self.largest = 0
         self.written = 0
         self._path = folder / CHECKPOINT
@@ -93,13 +94,13 @@ class CheckpointWriter:
         try:
             data = self._frozen(agent, step, kept())
         except StateError as fault:
-            self.note = f"no checkpoint of this run is kept ({fault}): resuming it perceives all frames again"
+            self.note = _none_kept(fault)
             return
         self.largest = max(self.largest, len(data))
         self._writing = self._disk.submit(self._write, data)
 
     def _write(self, data: bytes) -> None:
-        packed = PACKED + zlib.compress(data, 1)
+        packed = seal(PACKED + zlib.compress(data, 1), self._key)
         # Where it cannot be written the older state stays; the disk's trouble is told of the journal.
         with suppress(OSError):
             write_whole(self._path, packed)
@@ -125,14 +126,27 @@ class CheckpointWriter:
         )
 
 
+def _key_to_seal_with() -> tuple[str | None, bytes]:
+    """Why no state can be kept, or None; and the key."""
+    try:
+        return None, own_key()
+    except SealError as fault:
+        return _none_kept(fault), b""
+
+
+def _none_kept(fault: Exception) -> str:
+    return f"no checkpoint of this run is kept ({fault}): resuming it perceives all frames again"
+
+
 def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
-    """The state in a run folder.
+    """The state in a run folder, if this user's visup wrote it: what it holds is taken up as it is.
 
     Returns:
         It, or None when there is none that can be used, and then why, when there is one.
     """
     try:
-        told = load_state(_unpacked(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES)))
+        packed = unsealed(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES))
+        told = load_state(_unpacked(packed))
         if told["visup"] != __version__:
             return None, f"its checkpoint is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None

@@ -20,6 +20,7 @@ from tests.oracles.hardening.media import media
 from tests.oracles.hardening.mutations import mutated
 from visup.agent.model.errors import VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording
+from visup.agent.storage.seal import own_key, seal, unsealed
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.signals import read_signals
 from visup.percepts.taught.view import taught_view
@@ -67,7 +68,7 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         kind: Subject(_damaging(name, [f.read_bytes() for f in files]), read)
         for kind, (name, files, read) in texts.items()
     }
-    journal, state = (run / JOURNAL).read_bytes(), (run / CHECKPOINT).read_bytes()
+    journal, state = (run / JOURNAL).read_bytes(), unsealed((run / CHECKPOINT).read_bytes())
     return kinds | {
         "zones": Subject(_damaging("zones.toml", [ZONES]), _zones),
         "settings": Subject(_damaging("settings.toml", [SETTINGS]), _settings),
@@ -77,7 +78,7 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         "journals": Subject(_damaging(JOURNAL, [journal]), _journal),
         "journals of other content": Subject(lambda f, rng: _rewritten(f, rng, journal), _journal),
         "resumed journals": Subject(_resumable(journal, state), _resumed),
-        "states": Subject(_damaging(CHECKPOINT, [state]), _state),
+        "states": Subject(_damaging_state(state), _state),
         "signals": Subject(_damaging("signals.csv", [SIGNALS]), _signals),
         **{n: Subject(make, read) for n, (make, read) in (documents() | media(clip)).items()},
     }
@@ -129,16 +130,26 @@ def _damaging(name: str, seeds: list[bytes]) -> Callable[[Path, random.Random], 
     return make
 
 
+def _damaging_state(state: bytes) -> Callable[[Path, random.Random], None]:
+    """A state that is damaged, mostly under a seal that is right: without one nothing of it is read."""
+
+    def make(folder: Path, rng: random.Random) -> None:
+        data = mutated([state], rng)
+        (folder / CHECKPOINT).write_bytes(data if rng.random() < 0.1 else seal(data, own_key()))
+
+    return make
+
+
 def _resumable(journal: bytes, state: bytes) -> Callable[[Path, random.Random], None]:
     """A journal and a state, either of them damaged."""
 
     def make(folder: Path, rng: random.Random) -> None:
         (folder / JOURNAL).write_bytes(journal)
-        (folder / CHECKPOINT).write_bytes(state)
+        (folder / CHECKPOINT).write_bytes(seal(state, own_key()))
         if rng.random() < 0.5:
             _rewritten(folder, rng, journal)
         else:
-            (folder / CHECKPOINT).write_bytes(mutated([state], rng))
+            _damaging_state(state)(folder, rng)
 
     return make
 

@@ -6,7 +6,7 @@ import pytest
 
 from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
 from visup.rules.language import reading
-from visup.rules.language.fixes import fix_of
+from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.vocabulary import RULES as VOCABULARY
 
@@ -141,3 +141,25 @@ def test_what_more_slips_cost_is_bounded(monkeypatch: pytest.MonkeyPatch) -> Non
     weigh = partial(reading.weight, patience=spent)
     assert told == reading.with_tried_edits(slip, told, weigh)
     assert not looked
+
+
+def test_once_nothing_may_be_tried_any_more_no_further_hint_is_looked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Hundreds of slips on a long line took minutes: each looked for edits that were then not tried."""
+    looked: list[str | None] = []
+
+    def counted(text: str, where: SourceLocation, hint: str | None) -> TextFix | None:
+        looked.append(hint)
+        return fix_of(text, where, hint)
+
+    monkeypatch.setattr(reading, "fix_of", counted)
+    slips = " and ".join(f"standalon{n}(b)" for n in range(60))
+    rule = f'rule r(a, b): info\n    when {slips}\n    say "x"\n'
+    told = reading.read_repaired(rule, "start", "r.rules", VOCABULARY, reading.Patience()).told(
+        rule
+    )
+    assert len(told) == 60
+    left = reading.Patience(left=4 * len(rule))
+    assert len(reading.with_tried_edits(rule, told, partial(reading.weight, patience=left))) == 60
+    assert len(looked) <= 10

@@ -1,0 +1,84 @@
+"""Quantities read off the outlines of objects: which way they lie, and how open they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import ObjectBelief, Presence
+from visup.rules.formula.truth import MAYBE, NO, YES
+from visup.rules.predicates.snapshot import Codes, Floats, Snapshot, exact
+
+LONG = 1.3
+"""How many times as long as wide an outline must be for its long axis to mean anything."""
+
+ALIGNED_DEG = 10.0
+"""Axes that differ by less are in line; by more than `APART_DEG` they are not; between is unknown."""
+APART_DEG = 15.0
+
+
+def orientation(facts: Snapshot) -> Floats:
+    """Along which line each object lies, degrees from 0 to 180: 0 across, 90 upright; unknown when round."""
+    return exact(_axes(facts))
+
+
+def axis_angle(facts: Snapshot) -> Floats:
+    """Between the long axes of all pairs, degrees from 0 to 90; unknown with one that is round."""
+    between = _between(_axes(facts))
+    known = np.isfinite(between)
+    return np.array((np.where(known, between, -np.inf), np.where(known, between, np.inf)))
+
+
+def aligned(facts: Snapshot) -> Codes:
+    """Whether the long axes of two objects point the same way."""
+    between = _between(_axes(facts))
+    with np.errstate(invalid="ignore"):
+        codes = np.where(between <= ALIGNED_DEG, YES, np.where(between >= APART_DEG, NO, MAYBE))
+    return codes.astype(np.int8)
+
+
+OUTLINE_RELATIONS: Mapping[str, tuple[Callable[[Snapshot], Codes], str]] = MappingProxyType(
+    {"aligned": (aligned, "their long axes point the same way in the image")}
+)
+"""Word -> what it looks at, and one clause for people."""
+
+
+def openness(facts: Snapshot) -> Floats:
+    """The share of its convex hull that each outline leaves free, 0 to 1: of jaws, a door, scissors."""
+    return exact(np.array([_free(b) for b in facts.beliefs], dtype=float))
+
+
+def _axes(facts: Snapshot) -> NDArray[np.float64]:
+    """(n,) degrees of the long axis of each object in sight; NaN where there is none."""
+    return np.array([_axis(b) for b in facts.beliefs], dtype=float)
+
+
+def _axis(belief: ObjectBelief) -> float:
+    if belief.presence is not Presence.SEEN or len(belief.region.contour) < 3:
+        return np.nan
+    m = cv2.moments(np.asarray(belief.region.contour, dtype=np.float32))
+    if m["m00"] <= 0:
+        return np.nan
+    xx, xy, yy = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
+    mean, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    if mean + spread < LONG**2 * max(mean - spread, 1e-9):
+        return np.nan
+    return float(np.degrees(0.5 * np.arctan2(-2 * xy, xx - yy)) % 180.0)
+
+
+def _between(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    turn = np.abs(axes[:, None] - axes[None]) % 180.0
+    between: NDArray[np.float64] = np.minimum(turn, 180.0 - turn)
+    return between
+
+
+def _free(belief: ObjectBelief) -> float:
+    if belief.presence is not Presence.SEEN or len(belief.region.contour) < 3:
+        return np.nan
+    outline = np.asarray(belief.region.contour, dtype=np.float32)
+    hull = float(cv2.contourArea(cv2.convexHull(outline)))
+    return 1.0 - float(cv2.contourArea(outline)) / hull if hull > 0 else np.nan

@@ -1,0 +1,70 @@
+"""Which way outlines lie, and how open they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.rules.predicates.test_certainty import mind_of
+from visup.agent import Mind, Presence
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
+
+JAWS = [(0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (60, 40), (60, 50), (0, 50)]
+CLOSED = [(0, 0), (60, 0), (60, 50), (0, 50)]
+
+
+def bar(degrees: float, length: float = 80.0, width: float = 20.0) -> np.ndarray:
+    """The corners of a bar that lies along a direction, 90 up."""
+    along = np.array([np.cos(np.radians(degrees)), -np.sin(np.radians(degrees))])
+    across = np.array([-along[1], along[0]])
+    ends = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return np.array([200 + a * length / 2 * along + b * width / 2 * across for a, b in ends])
+
+
+def outlined(*contours: np.ndarray) -> Mind:
+    mind = mind_of(*[(100, 100, 90, 90)] * len(contours))
+    for number, contour in enumerate(contours, 1):
+        belief = mind.objects[number]
+        region = replace(belief.region, contour=np.asarray(contour, dtype=np.float32))
+        mind = mind.with_objects(replace(belief, region=region))
+    return mind
+
+
+def asked(mind: Mind, name: str) -> np.ndarray:
+    return QUANTITIES[name].look(Snapshot(mind))
+
+
+@given(st.floats(0.0, 179.0), st.floats(0.0, 179.0))
+def test_bars_lie_as_they_were_laid_and_are_as_far_apart_in_angle(a: float, b: float) -> None:
+    mind = outlined(bar(a), bar(b))
+    found = asked(mind, "orientation")[0]
+    assert np.allclose((found - [a, b] + 90) % 180, 90, atol=0.2)
+    turn = abs(a - b)
+    between = min(turn, 180 - turn)
+    assert asked(mind, "axis_angle")[:, 0, 1] == pytest.approx([between] * 2, abs=0.3)
+    truth = PREDICATES["aligned"].look(Snapshot(mind))[0, 1]
+    if between < 9.5 or between > 15.5:
+        assert truth == (1 if between < 12 else -1)
+    elif 10.5 < between < 14.5:
+        assert truth == 0
+
+
+def test_what_is_round_or_out_of_sight_lies_no_way() -> None:
+    mind = outlined(bar(30, 40, 40), bar(30))
+    assert asked(mind, "orientation")[:, 0].tolist() == [-inf, inf]
+    assert asked(mind, "axis_angle")[:, 0, 1].tolist() == [-inf, inf]
+    assert PREDICATES["aligned"].look(Snapshot(mind))[0, 1] == 0
+    hidden = mind.with_objects(replace(mind.objects[2], presence=Presence.HIDDEN))
+    assert asked(hidden, "orientation")[:, 1].tolist() == [-inf, inf]
+    assert asked(hidden, "openness")[:, 1].tolist() == [-inf, inf]
+
+
+def test_open_jaws_leave_more_of_their_hull_free_than_closed_ones() -> None:
+    mind = outlined(np.array(JAWS), np.array(CLOSED))
+    assert asked(mind, "openness")[0] == pytest.approx([0.5, 0.0], abs=0.01)
