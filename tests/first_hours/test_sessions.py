@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import io
 import sys
+import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from tests.cli import Call
+from tests.percepts.video.test_realtime import Steps
+from visup.commands.step import _live
 from visup.runs.demo import demo_settings
+from visup.runs.settings import WatchSettings
 
 TASK = ("--task", "dock", "--models", demo_settings().models, "--actor", "satellite=spartan")
 
@@ -66,3 +71,19 @@ def test_what_is_read_from_a_pipe_is_whole(
     assert reasons
     assert all(line.rstrip().endswith(" s]") and len(line) > 80 for line in reasons), reasons
     assert "motion ran, 1 percept\n" in done.out
+
+
+def test_a_step_of_a_camera_is_of_what_it_sees_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While one looks at a step the camera goes on; what nobody saw is not stepped through."""
+    camera = Steps(9)
+    monkeypatch.setattr("visup.runs.wiring.open_video", lambda settings: camera)
+    with ExitStack() as stack:
+        _, frames = _live(WatchSettings("0"), stack)
+        camera.let.release()
+        assert next(iter(frames)).index == 0
+        camera.let.release(6)
+        while camera.at < 7:
+            time.sleep(0.01)
+        time.sleep(0.05)
+        assert next(iter(frames)).index >= 5
+        camera.let.release(9)

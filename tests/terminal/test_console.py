@@ -17,6 +17,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from tests.cli import caller
 from tests.paths import ROOT
 from visup.terminal.console import make_console
 from visup.wording import escaped_json, printable
@@ -94,3 +95,24 @@ def test_the_report_runs_its_own_scripts_and_no_other() -> None:
 
 def test_the_path_of_a_file_that_is_no_text_is_printed(tmp_path: Path) -> None:
     assert printable(str(tmp_path) + "/\udcff").endswith("/")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("watch", "a.avi", "--every", EVIL),
+        ("watch", f"--{EVIL}"),
+        (EVIL,),
+        ("task", EVIL),
+        ("watch", f"{EVIL}.avi"),
+        ("presets", EVIL),
+        ("task", "check", f"{EVIL}.task"),
+    ],
+)
+def test_what_the_command_refuses_is_quoted_printable(
+    words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    result = caller(monkeypatch, capfd)(*(w.replace("\ud800", "") for w in words))
+    assert result.code == 2
+    assert result.err
+    assert not OBEYED.search(result.err + result.out)

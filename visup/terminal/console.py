@@ -17,10 +17,15 @@ if TYPE_CHECKING:
     from rich.measure import Measurement
 
 
-def make_console(**options: Any) -> Console:
+WIDE = 1000
+"""Columns of what is read by a program."""
+
+
+def make_console(*, whole: bool = False, **options: Any) -> Console:
     """A console of rich that prints only what `printable` lets through.
 
     Args:
+        whole: A pipe has no width: nothing is wrapped or cut there.
         options: As of `rich.console.Console`; nothing is highlighted unless asked for.
     """
     from rich.console import Console, RenderHook
@@ -38,6 +43,8 @@ def make_console(**options: Any) -> Console:
 
     console = Patient(**{"highlight": False, **options})
     console.push_render_hook(Printable())
+    if whole and not console.is_terminal:
+        console.width = WIDE
     return console
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any
 
+from typer import BadParameter
 from typer.core import TyperGroup
 
 PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -47,3 +49,30 @@ class Overview(TyperGroup):
         for purpose, commands in PURPOSES.items():
             with formatter.section(purpose):
                 formatter.write_dl(list(commands.items()))
+
+    def make_context(self, *given: Any, **named: Any) -> Any:
+        """As any command; what is said of words that make no sense is printable."""
+        with _printable_refusals():
+            return super().make_context(*given, **named)
+
+    def invoke(self, ctx: Any) -> Any:
+        """As any command; what is said of words that make no sense is printable."""
+        with _printable_refusals():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _printable_refusals() -> Iterator[None]:
+    """Names and values may come from strangers, and are quoted in refusals, which typer prints itself."""
+    try:
+        yield
+    except Exception as refusal:
+        if isinstance(refusal, _REFUSAL):
+            from visup.wording import printable
+
+            refusal.message = printable(refusal.message)
+        raise
+
+
+_REFUSAL: Any = BadParameter.__mro__[2]
+"""What all refusals of typer are; older ones have it from click, newer ones of their own."""

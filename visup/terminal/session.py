@@ -31,7 +31,6 @@ from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
 from visup.wording import prose, worded_once
 
 Answer = RenderableType | None
-WIDE = 1000
 PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -57,9 +56,7 @@ class Session:
     ) -> None:
         self._picture = picture
         self.timelines = [Stepper(agent, frames)]
-        self.console = console or make_console()
-        if not (console or self.console.is_terminal):
-            self.console.width = WIDE  # a pipe has no width: nothing is cut
+        self.console = console or make_console(whole=True)
         self._marks: dict[str, Bookmark] = {}
 
     @property
@@ -169,7 +166,8 @@ class Session:
             told = ", ".join(values) or "no object matches"
             lines.append(Text(f"watch {watch.id}  {watch.text}: {told}", style="cyan"))
         seen = sum(b.last_seen == mind.time for b in mind.objects.values())
-        where = f"frame {mind.frame_index}, {mind.time:.2f} s, {seen} regions"
+        regions = "1 region" if seen == 1 else f"{seen} regions"
+        where = f"frame {mind.frame_index}, {mind.time:.2f} s, {regions}"
         lines.append(Text(f"{where}{self._aside()}", style="dim"))
         return Group(*lines)
 

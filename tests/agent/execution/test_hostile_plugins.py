@@ -222,4 +222,4 @@ def test_what_it_started_ends_with_it(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.geteuid() == 0, reason="the system does not count the processes of root")
 def test_it_cannot_fork_without_end(tmp_path: Path) -> None:
     body = "for n in range(3000):\n    if os.fork() == 0:\n        time.sleep(60)\nreturn n"
-    assert "BlockingIOError" in reports(plug(tmp_path, body), 1)[0].error
+    assert "BlockingIOError" in reports(plug(tmp_path, body), 1, PATIENT)[0].error

@@ -291,6 +291,13 @@ def failures_closing(form: str) -> Callable[[Figures], Iterator[str]]:
     return closing
 
 
+def hardening_closing(figures: Figures) -> Iterator[str]:
+    """Races and cuts of power, then the first failures."""
+    total = figures["total"]
+    yield f"{total['races']} races and {total['cuts']} cuts of power: {total['lost']} lost something."
+    yield from failures_closing("{text}")(figures)
+
+
 def any_failures(figures: Figures) -> bool:
     """Whether there were failures."""
     return bool(figures.get("failed", figures.get("failures")))

@@ -40,7 +40,7 @@ MACHINERY_EVALUATIONS = (
             count("cuts", 1000, "How often the power is lost.", 0),
             Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
         ),
-        closing=adapters.failures_closing("{text}"),
+        closing=adapters.hardening_closing,
         failed=adapters.any_failures,
     ),
     EvaluationCommand(
