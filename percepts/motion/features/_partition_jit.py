@@ -12,82 +12,89 @@ Labels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
 
 
+LINE, WAITS = -1, -2  # marks of pixels that part cells, and of those in a queue
 LEVELS = 256
-NEAR = 8
-"""Steps by which how far a pixel is from the seeds is told, pixels; what is farther counts as the last."""
 
 
 @compiled
-def watershed(right: Bytes, down: Bytes, distance: Bytes, marks: Labels) -> None:
-    """The watershed of seeds as a minimum spanning forest (Cousty et al. 2009): each pixel goes to a seed.
+def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
+    """The watershed of seeds, pixel for pixel as `cv2.watershed` has it, in two thirds of its time.
 
-    Neighbouring pixels are joined in the order of how little they differ, and on a plateau in the order
-    of how near they are to the seeds, so that what is flat is shared out evenly; trees that have each a
-    seed are not joined. It takes a third of the time of flooding by queues, which visits pixels in an
-    order that no cache foresees, and leaves no lines between the cells.
+    Pixels beside the cells wait in a queue for each height of an edge, first come, first served; the
+    lowest is emptied first. A pixel between two cells parts them.
 
     Args:
         right: (h, w) how far each pixel differs from the next one; the last in a row is not used.
         down: (h - 1, w) how far each differs from the one below.
-        distance: (h, w) of each pixel from the next seed, pixels, below `NEAR`.
-        marks: (h, w) int32, seeds from 1 and 0 elsewhere; becomes the cells. Without a seed all stay 0.
+        marks: (h, w) int32, seeds from 1 and 0 elsewhere; becomes the cells, -1 between them and at
+            the border of the image. What no seed reaches stays 0.
     """
-    width, flat = marks.shape[1], marks.ravel()
-    order = _edges_in_order(right, down, distance.ravel())
-    parent = np.arange(marks.size).astype(np.int32)
-    for edge in order:
-        p = edge >> 1
-        one = _root(parent, p)
-        other = _root(parent, p + (width if edge & 1 else 1))
-        if one == other or (flat[one] > 0 and flat[other] > 0):
+    height, width = marks.shape
+    flat, east, south = marks.ravel(), right.ravel(), down.ravel()
+    one, row = np.uint64(1), np.uint64(width)
+    first, last = np.full(LEVELS, -1, np.int32), np.full(LEVELS, -1, np.int32)
+    marks[0], marks[height - 1] = LINE, LINE
+    marks[:, 0], marks[:, width - 1] = LINE, LINE
+    # In a function of its own, called for each pixel, this loop makes the whole take 28 ms instead of 20
+    # (512 x 288 pixels, both in one process).
+    for y in range(1, height - 1):
+        for x in range(1, width - 1):
+            p = np.uint64(y * width + x)
+            if flat[p] != 0:
+                continue
+            edge = np.uint8(LEVELS - 1)
+            west, right_of = flat[p - one] > 0, flat[p + one] > 0
+            above, below = flat[p - row] > 0, flat[p + row] > 0
+            if west:
+                edge = min(edge, east[p - one])
+            if right_of:
+                edge = min(edge, east[p])
+            if above:
+                edge = min(edge, south[p - row])
+            if below:
+                edge = min(edge, south[p])
+            if west or right_of or above or below:
+                _queue(flat, first, last, p, np.uint64(edge))
+    lowest = np.uint64(0)
+    while True:
+        while lowest < np.uint64(LEVELS) and first[lowest] < 0:
+            lowest += one
+        if lowest == np.uint64(LEVELS):
+            break
+        p = np.uint64(first[lowest])
+        first[lowest] = WAITS - 1 - flat[p]
+        a, b, c, d = flat[p - one], flat[p + one], flat[p - row], flat[p + row]
+        cell = max(max(a, b), max(c, d))
+        if (0 < a != cell) or (0 < b != cell) or (0 < c != cell) or (0 < d != cell):
+            flat[p] = LINE
             continue
-        if flat[one] > 0:
-            parent[other] = one
-        else:
-            parent[one] = other
-    for p in range(marks.size):
-        flat[p] = flat[_root(parent, p)]
+        flat[p] = cell
+        lowest = _come_to(flat, first, last, p - one, east[p - one], lowest)
+        lowest = _come_to(flat, first, last, p + one, east[p], lowest)
+        lowest = _come_to(flat, first, last, p - row, south[p - row], lowest)
+        lowest = _come_to(flat, first, last, p + row, south[p], lowest)
 
 
 @compiled
-def _edges_in_order(right: Bytes, down: Bytes, near: Bytes) -> Labels:
-    """All edges between neighbours, weak ones first: 2 p of pixel p and the next, 2 p + 1 and that below."""
-    height, width = right.shape
-    along, below = right.ravel(), down.ravel()
-    last = np.int32(NEAR - 1)
-    keys = np.empty(2 * right.size, np.int16)
-    place = np.zeros(LEVELS * NEAR + 1, np.int32)
-    for y in range(height):
-        for x in range(width):
-            p = y * width + x
-            if x < width - 1:
-                keys[2 * p] = along[p] * NEAR + min(last, min(near[p], near[p + 1]))
-                place[keys[2 * p] + 1] += 1
-            if y < height - 1:
-                keys[2 * p + 1] = below[p] * NEAR + min(last, min(near[p], near[p + width]))
-                place[keys[2 * p + 1] + 1] += 1
-    for key in range(LEVELS * NEAR):
-        place[key + 1] += place[key]
-    order = np.empty(place[-1], np.int32)
-    for y in range(height):
-        for x in range(width):
-            p = y * width + x
-            if x < width - 1:
-                order[place[keys[2 * p]]] = 2 * p
-                place[keys[2 * p]] += 1
-            if y < height - 1:
-                order[place[keys[2 * p + 1]]] = 2 * p + 1
-                place[keys[2 * p + 1]] += 1
-    return order
+def _come_to(
+    flat: Labels, first: Labels, last: Labels, p: np.uint64, edge: int, lowest: np.uint64
+) -> np.uint64:
+    """Queue a pixel that nobody has come to; the lowest level at which some wait."""
+    if flat[p] != 0:
+        return lowest
+    level = np.uint64(edge)
+    _queue(flat, first, last, p, level)
+    return min(lowest, level)
 
 
 @compiled
-def _root(parent: Labels, p: int) -> int:
-    """The root of a pixel's tree; the way there is halved."""
-    while parent[p] != p:
-        parent[p] = parent[parent[p]]
-        p = parent[p]
-    return p
+def _queue(flat: Labels, first: Labels, last: Labels, p: np.uint64, level: np.uint64) -> None:
+    """Put a pixel behind those that wait at a level; each that waits holds the number of the next."""
+    if first[level] < 0:
+        first[level] = p
+    else:
+        flat[np.uint64(last[level])] = WAITS - 1 - np.int32(p)
+    last[level], flat[p] = p, WAITS
 
 
 @compiled
