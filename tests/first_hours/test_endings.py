@@ -20,6 +20,8 @@ from visup.runs.result import ExitCode, RunResult
 from visup.runs.runner import Audience, supervise
 from visup.runs.settings import WatchSettings
 
+BOTTLES = str(ROOT / "examples" / "data" / "bottles.mp4")
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -117,17 +119,23 @@ def test_a_reader_that_goes_away_does_not_end_the_run(clip: Path, tmp_path: Path
     assert (run / "report.html").is_file()
 
 
+def hear_ctrl_c() -> None:
+    """Tests that run in the background are deaf to it, and so would be what they start."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_signal_ends_a_run_with_its_own_code_and_a_report(
     tmp_path: Path, how: signal.Signals
 ) -> None:
-    run, clip = tmp_path / "run", ROOT / "examples" / "data" / "bottles.mp4"
-    words = ["watch", str(clip), "--no-video", "--json", "--out", str(run)]
+    run = tmp_path / "run"
+    words = ["watch", BOTTLES, "--no-video", "--json", "--out", str(run)]
     process = subprocess.Popen(
         [sys.executable, "-m", "visup.cli", *words],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
+        preexec_fn=hear_ctrl_c,
     )
     assert process.stdout
     process.stdout.readline()  # the first event: it is under way
@@ -147,8 +155,28 @@ def test_a_stop_signal_that_is_swallowed_still_ends_the_run() -> None:
             with suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
 
-    settings = WatchSettings(str(ROOT / "examples" / "data" / "bottles.mp4"))
-    result = supervise(settings, None, audience=Audience((swallow,)))
-    assert result.stopped
-    assert result.steps == 4
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        result = supervise(WatchSettings(BOTTLES), None, audience=Audience((swallow,)))
+        assert result.stopped
+        assert result.steps == 4
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_a_run_in_the_background_stays_deaf_to_ctrl_c() -> None:
+    """As the shell that started it wants: Ctrl-C is meant for what runs in the foreground."""
+    heard = []
+
+    def ask(step: Step, frame: Frame) -> None:
+        heard.append(signal.getsignal(signal.SIGINT))
+        if step.frame_index == 3:
+            signal.raise_signal(signal.SIGTERM)
+
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert supervise(WatchSettings(BOTTLES), None, audience=Audience((ask,))).stopped
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert heard == [signal.SIG_IGN] * 4

@@ -56,7 +56,7 @@ def test_a_model_is_read_as_it_was_written(tmp_path: Path) -> None:
 def test_what_is_no_model_is_refused(tmp_path: Path, text: str) -> None:
     file = tmp_path / "model.json"
     file.write_text(text)
-    with pytest.raises(SourceError, match="no model"):
+    with pytest.raises(SourceError, match="not a model"):
         read_model(file)
 
 
@@ -66,7 +66,7 @@ def test_parts_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     record = json.loads(file.read_text())
     record["alone"]["offset"].append(0.0)
     file.write_text(json.dumps(record))
-    with pytest.raises(SourceError, match="no model"):
+    with pytest.raises(SourceError, match="not a model"):
         read_model(file)
 
 
