@@ -11,7 +11,7 @@ from tests.oracles.peers.temporal import outcome_of
 from tests.paths import SHARED
 from visup.agent.model.errors import SourceError
 
-PEERS = SHARED / "data" / "peers"
+PEERS = SHARED / "peers"
 
 
 def variable(name: str) -> dict[str, Any]:
