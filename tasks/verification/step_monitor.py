@@ -61,7 +61,7 @@ class StepMonitor:
         early: Whether it had been so since before its turn, and has not ceased to be since: what a
             stage asks for must happen in it.
         parted_s: How long it has been seen not to be so, since its turn.
-        after: When what comes before it was over.
+        after: When what comes before it was over; of what the task begins with, when that was.
         hasty_s: How long after that it began, where its course asks for a longer delay; else None.
         fulfilled_at: When it was first fulfilled, or None.
     """
@@ -104,7 +104,7 @@ class StepMonitor:
 
 def entered(now: float) -> StepMonitor:
     """What is kept about a step that begins now."""
-    return StepMonitor(entered=now, since=now)
+    return StepMonitor(entered=now, since=now, after=now)
 
 
 def update(

@@ -47,6 +47,19 @@ def test_a_stage_begins_neither_sooner_nor_later_than_its_delay(
     assert (verdict is Verdict.SUCCEEDED) == (least <= begins - OVER_S <= most)
 
 
+@pytest.mark.parametrize(("begins", "good"), [(3.0, False), (7.0, True), (13.0, False)])
+def test_a_delay_of_the_first_stage_counts_from_the_beginning(begins: float, good: bool) -> None:
+    text = "<wash> ::= touching(hose, car) for 2 s {}"
+    script = Script(
+        (Spell("touching", begins, 1e9, (CAR, HOSE)),),
+        objects=dict.fromkeys(NAMES, (0.0, 1e9)),
+        identities=NAMES,
+    )
+    reasoner = task_reasoner([parse_task(text.format("after 5 s to 10 s"))])
+    played = play(reasoner, script, 20.0, fps=5.0)
+    assert (finish(task_of(played)) is Verdict.SUCCEEDED) == good
+
+
 @pytest.mark.parametrize(
     ("begins", "why"),
     [
