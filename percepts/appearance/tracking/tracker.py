@@ -195,8 +195,11 @@ class ThingTracker:
     def _settled(self, placed: Mapping[str, ThingPlace], scene: Scene) -> dict[str, ThingPlace]:
         """Whose the places are, where things that look alike are not all looked for at once."""
         sought = {t.name for t in self.tracks if t.state not in IN_VIEW} - set(placed)
-        found = (settled(scene, p, self.views, self._alike, sought) for p in placed.values())
-        return {place.name: place for place in found}
+        found: dict[str, ThingPlace] = {}
+        for place in placed.values():
+            own = settled(scene, place, self.views, self._alike, sought - set(found))
+            found[own.name] = own
+        return found
 
     def _share_pixels(self, scene: Scene, same: Mapping[str, Mask]) -> None:
         claims = [_claim(t, scene, same) for t in self.tracks]
