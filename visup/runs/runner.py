@@ -18,7 +18,7 @@ from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.inputs.preflight import check_cast
-from visup.runs.inputs.stop_signals import StopSignals
+from visup.runs.inputs.stop_signals import stop_signals
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
 from visup.runs.result import RunResult
@@ -131,7 +131,7 @@ def supervise(
         VisupError: Something given is not as it should be.
     """
     run = supervised(settings, folder, audience or Audience(), options, past)
-    with StopSignals() as stop:
+    with stop_signals() as stop:
         try:
             with suppress(KeyboardInterrupt):  # it may come between two steps
                 while not stop.received:

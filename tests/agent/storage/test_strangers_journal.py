@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from tests.agent.scripted import Scripted, frames
+from tests.oracles.hardening.attack_files import change_seen
 from visup.agent import Percept, Region
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
@@ -119,15 +120,7 @@ CHANGES: dict[str, Change] = {
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
 def test_what_no_behaviour_could_report_is_refused(run: Path, change: Change) -> None:
-    db = sqlite3.connect(run / JOURNAL)
-    (seen,) = db.execute("SELECT seen FROM steps WHERE frame_index = 2").fetchone()
-    document = json.loads(zlib.decompress(seen))
-    change(document)
-    packed = zlib.compress(json.dumps(document).encode())
-    row = (packed, zlib.crc32(packed))
-    db.execute("UPDATE steps SET seen = ?, crc = ? WHERE frame_index = 2", row)
-    db.commit()
-    db.close()
+    change_seen(run, 2, change)
     given: list[object] = []
     with pytest.raises(OutputError):
         given.extend(Recording.open(run).observations())

@@ -81,17 +81,19 @@ def run_after(*statements: str) -> Make:
 def run_seeing(change: Callable[[dict[str, Any]], object]) -> Make:
     """A run of which one step was perceived otherwise; its check sum is right."""
 
-    def make(folder: Path) -> None:
-        with closing(sqlite3.connect(run(folder) / JOURNAL)) as db:
-            (seen,) = db.execute("SELECT seen FROM steps WHERE frame_index = 5").fetchone()
-            document = json.loads(zlib.decompress(seen))
-            change(document)
-            packed = zlib.compress(json.dumps(document).encode())
-            row = (packed, zlib.crc32(packed))
-            db.execute("UPDATE steps SET seen = ?, crc = ? WHERE frame_index = 5", row)
-            db.commit()
+    return lambda folder: change_seen(run(folder), 5, change)
 
-    return make
+
+def change_seen(folder: Path, frame: int, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change what was perceived in one frame of a recorded run, with the check sum that goes with it."""
+    with closing(sqlite3.connect(folder / JOURNAL)) as db:
+        (seen,) = db.execute("SELECT seen FROM steps WHERE frame_index = ?", (frame,)).fetchone()
+        document = json.loads(zlib.decompress(seen))
+        change(document)
+        packed = zlib.compress(json.dumps(document).encode())
+        row = (packed, zlib.crc32(packed), frame)
+        db.execute("UPDATE steps SET seen = ?, crc = ? WHERE frame_index = ?", row)
+        db.commit()
 
 
 def giant_png(path: Path, side: int = 30_000) -> Path:

@@ -8,38 +8,39 @@ from __future__ import annotations
 
 import signal
 import threading
-from types import FrameType, TracebackType
-from typing import Self
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-class StopSignals:
-    """While it is entered, a stop signal raises KeyboardInterrupt and stays known as `received`.
+@dataclass(slots=True)
+class StopRequest:
+    """Whether a stop signal was received."""
 
-    Only the main thread can receive signals; elsewhere nothing is changed.
+    received: bool = False
+
+
+@contextmanager
+def stop_signals() -> Iterator[StopRequest]:
+    """A stop signal raises KeyboardInterrupt here, and stays known.
+
+    Only the main thread can receive signals; elsewhere nothing is changed. What is ignored stays so: a shell
+    starts what runs in the background deaf to Ctrl-C.
     """
+    request = StopRequest()
 
-    def __init__(self) -> None:
-        self.received = False
-        self._before: dict[signal.Signals, object] = {}
-
-    def __enter__(self) -> Self:
-        if threading.current_thread() is threading.main_thread():
-            # What is ignored stays so: a shell starts what runs in the background deaf to Ctrl-C.
-            heard = [n for n in SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
-            self._before = {number: signal.signal(number, self._receive) for number in heard}
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)  # type: ignore[arg-type]
-
-    def _receive(self, number: int, frame: FrameType | None) -> None:
-        self.received = True
+    def receive(number: int, frame: FrameType | None) -> None:
+        request.received = True
         raise KeyboardInterrupt
+
+    here = threading.current_thread() is threading.main_thread()
+    heard = [n for n in SIGNALS if here and signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, receive) for number in heard}
+    try:
+        yield request
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
