@@ -145,10 +145,10 @@ class _Output:
             while part := os.read(stream.fileno(), 2**16):
                 total += len(part)
                 self._kept = (self._kept + part)[-KEPT_OUTPUT_BYTES:]
-                if total > LARGEST_OUTPUT_BYTES:
+                if total > LARGEST_OUTPUT_BYTES and not self.exceeded:
+                    # Read on until it is gone: a pipe that breaks first would be told as its fault.
                     self.exceeded = True
                     lifeline.cut()
-                    break
         stream.close()
 
 
