@@ -88,6 +88,7 @@ def _hypothesis(h: Hypothesis, size: tuple[int, int]) -> None:
     for name, value in (("rotation", h.rotation), ("scale", h.scale)):
         fine = value is None or is_finite(value)
         expect(fine, f"{who} has {name} {brief(value)}", "a finite number, or None")
+    expect(isinstance(h.of_kind, bool), f"{who} has of_kind {brief(h.of_kind)}", "true or false")
     if h.direction is not None:
         _array(h.direction, f"{who}: direction", (3,))
 

@@ -139,6 +139,7 @@ class Hypothesis:
         direction: Unit vector from the object to the viewer in the model's frame, or None.
         fitted: Whether direction and rotation were fitted to the picture; else they are those of a stored
             view, some ten degrees away.
+        of_kind: Whether the name is that of a kind, as detectors have it: several things may bear it at once.
     """
 
     region_id: int
@@ -149,6 +150,7 @@ class Hypothesis:
     scale: float | None = None
     direction: tuple[float, float, float] | None = None
     fitted: bool = False
+    of_kind: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,7 +76,7 @@ class DetectorBehaviour:
                 continue
             yield Percept("region", region, frame.time, source, region.confidence)
             if detection.name:
-                named = Hypothesis(region.id, detection.name, 0, detection.score)
+                named = Hypothesis(region.id, detection.name, 0, detection.score, of_kind=True)
                 yield Percept("hypothesis", named, frame.time, source, detection.score)
 
     def _region(self, detection: Detection, frame: Frame) -> Region | None:

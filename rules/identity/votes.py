@@ -29,7 +29,7 @@ the operator answers is no evidence but a fact, and settles the vote.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
@@ -51,7 +51,14 @@ from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
-from visup.rules.wording.sentences import TOLD_NAMES, called, seems, spaced
+from visup.rules.wording.sentences import (
+    KIND_NAMES,
+    TOLD_NAMES,
+    called,
+    indefinite,
+    seems,
+    spaced,
+)
 
 VoteCounts = tuple[tuple[str, float], ...]
 
@@ -274,6 +281,7 @@ class IdentityReasoner:
         old = mind.recall(VOTES) or VoteMemory(observation.time)
         dt = max(0.0, observation.time - old.time)
         hypotheses = hypotheses_by_object(mind, observation)
+        mind = _with_kinds(mind, hypotheses)
         every: dict[int, ObjectVotes] = {}
         events: list[Event] = []
         beliefs: list[ObjectBelief] = []
@@ -360,16 +368,32 @@ class IdentityReasoner:
         return replace(votes, leader=leader, leads_since=since)
 
 
+def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> Mind:
+    """The mind that knows which names are those of kinds."""
+    heard = {h.name for said in hypotheses.values() for h in said if h.of_kind}
+    known = mind.recall(KIND_NAMES)
+    return (
+        mind if heard <= set(known) else mind.remember(KIND_NAMES, (*sorted(heard | set(known)),))
+    )
+
+
+def _with_article(mind: Mind, model: str) -> str:
+    """What an object of a model is called, with its article."""
+    name = called(mind, model)
+    of_kind = name == model and model in mind.recall(KIND_NAMES)
+    return indefinite(spaced(name)) if of_kind else f"the {spaced(name)}"
+
+
 def _identified(
     mind: Mind, belief: ObjectBelief, before: str | None, observation: Observation
 ) -> Event:
     # By its model alone: the part that it plays in a task may be another's, and lags behind.
-    words = spaced(called(mind, belief.name))
+    words, how = _with_article(mind, belief.name), seems(belief.confidence)
     if before is None:
-        text = f"Object {belief.id} {seems(belief.confidence)} the {words}."
+        text = f"Object {belief.id} {how} {words}."
     else:
-        was = spaced(called(mind, before))
-        text = f"Object {belief.id}, taken for the {was}, {seems(belief.confidence)} the {words}."
+        was = _with_article(mind, before)
+        text = f"Object {belief.id}, taken for {was}, {how} {words}."
     data = MappingProxyType({"name": belief.name, "before": before})
     return Event(
         "identified",

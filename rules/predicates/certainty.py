@@ -20,6 +20,7 @@ from visup.rules.predicates.snapshot import Codes, Snapshot, code
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.presence.settings import PresenceSettings
+from visup.rules.wording.sentences import is_of_kind
 
 PART = FragmentSettings()
 LEAST_SHARE = 2 * PresenceSettings().least_share
@@ -96,6 +97,11 @@ def identified(facts: Snapshot) -> Codes:
         return code(likely or b.id in facts.mind.answers)
 
     return facts.each(look)
+
+
+def of_kind(facts: Snapshot) -> Codes:
+    """Whether of an object only its kind is known: a detector names it, and no task casts it."""
+    return facts.each(lambda b: code(is_of_kind(facts.mind, b.id)))
 
 
 def at_home(facts: Snapshot) -> Codes:

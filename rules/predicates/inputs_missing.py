@@ -12,7 +12,9 @@ from types import MappingProxyType
 from visup.agent import Mind
 from visup.rules.formula.nodes import SIGNAL_WORDS
 
-REMEMBERED = frozenset({"expected", "engaged", "unexpected", "actor", "named", "identified"})
+REMEMBERED = frozenset(
+    {"expected", "engaged", "unexpected", "actor", "named", "identified", "of_kind"}
+)
 """Words about beliefs that outlive what they came from."""
 
 _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(

@@ -280,6 +280,9 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "identified": PredicateDefinition(
             _ONE, certainty.identified, "it is likelier a model known than none of them"
         ),
+        "of_kind": PredicateDefinition(
+            _ONE, certainty.of_kind, "only its kind is known, as a detector tells it"
+        ),
         "seen": PredicateDefinition(_ONE, _presence(Presence.SEEN), "the object is seen"),
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
         "lost": PredicateDefinition(_ONE, lost, "it is out of sight and nothing tells why"),

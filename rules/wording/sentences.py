@@ -17,6 +17,9 @@ TOLD_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", 
 """Object id -> the model that it was last told to be; None where nobody tells names. Who counts the votes
 remembers it."""
 
+KIND_NAMES: MemoryKey[tuple[str, ...]] = MemoryKey("rules.kind_names", ())
+"""Names that detectors give to all things of a kind, in order; who counts the votes remembers them."""
+
 SURE, LIKELY = 0.95, 0.5
 """Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
 
@@ -75,6 +78,22 @@ def spoken_name(mind: Mind, object_id: int) -> str | None:
     return called(mind, told[object_id]) if object_id in told else None
 
 
+def is_of_kind(mind: Mind, object_id: int) -> bool:
+    """Whether of an object only its kind is known, as a detector tells it, and no task casts it.
+
+    Of a kind there may be several: each is 'a person', and none is 'the person'.
+    """
+    belief, kinds = mind.objects.get(object_id), mind.recall(KIND_NAMES)
+    if belief is None or belief.name not in kinds:
+        return False
+    return all(b.object_id != object_id for task in mind.tasks for b in task.bindings)
+
+
+def individual_name(mind: Mind, object_id: int) -> str | None:
+    """What an object alone is called: its spoken name, but no name of a kind."""
+    return None if is_of_kind(mind, object_id) else spoken_name(mind, object_id)
+
+
 def called(mind: Mind, model: str) -> str:
     """What an object of a model is called: the actor that is bound to the model, else the model."""
     return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
@@ -88,12 +107,15 @@ def describe(mind: Mind, object_id: int) -> str:
         object_id: Any object id.
 
     Returns:
-        Such as 'object 2, believed to be the satellite', 'object 2, in the part of the gripper' when a task
-        takes it for that though it does not look so, or 'object 3' when nobody knows what it is.
+        Such as 'object 2, believed to be the satellite' ('a person', where only its kind is known),
+        'object 2, in the part of the gripper' when a task takes it for that though it does not look so, or
+        'object 3' when nobody knows what it is.
     """
     name = spoken_name(mind, object_id)
     if name is None:
         return f"object {object_id}"
+    if is_of_kind(mind, object_id):
+        return f"object {object_id}, believed to be {indefinite(spaced(name))}"
     how = "believed to be" if _looks_like(mind, object_id, name) else "in the part of"
     return f"object {object_id}, {how} the {spaced(name)}"
 
@@ -114,7 +136,7 @@ def _looks_like(mind: Mind, object_id: int, name: str) -> bool:
 
 def short(mind: Mind, object_id: int) -> str:
     """An object in two words, for lists and evidence: 'the satellite' or 'object 3'."""
-    name = spoken_name(mind, object_id)
+    name = individual_name(mind, object_id)
     return f"the {spaced(name)}" if name is not None else f"object {object_id}"
 
 
@@ -195,6 +217,15 @@ def tidy(text: str) -> str:
 def spaced(name: str) -> str:
     """A name as people write it: underscores become blanks."""
     return name.replace("_", " ")
+
+
+def indefinite(noun: str) -> str:
+    """A noun with its article.
+
+    >>> indefinite("person"), indefinite("elephant")
+    ('a person', 'an elephant')
+    """
+    return f"{'an' if noun[:1].lower() in 'aeiou' and noun else 'a'} {noun}"
 
 
 def _mention(mind: Mind, object_id: int, mentioned: list[int]) -> str:

@@ -55,7 +55,7 @@ def window(folder: Path) -> NDArray[np.uint8]:
             "document.getElementById('clip').textContent = 'bottles.mp4, into cell.models'"
         )
         for name, corners in outlines().items():
-            wanted = corners if name != "right" else corners[:4]
+            wanted = corners if name != "right_bottle" else corners[:4]
             for x, y in wanted:
                 spot = "const r = canvas.getBoundingClientRect(); const p = toScreen"
                 browser.click(
@@ -63,7 +63,7 @@ def window(folder: Path) -> NDArray[np.uint8]:
                         f"(() => {{ {spot}([{x}, {y}]); return [r.x + p[0], r.y + p[1]]; }})()"
                     )
                 )
-            if name != "right":
+            if name != "right_bottle":
                 browser.press("Enter")
                 browser.type(name)
         time.sleep(0.2)

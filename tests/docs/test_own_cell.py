@@ -44,12 +44,12 @@ def test_teaching_tells_what_the_page_says(tmp_path: Path, monkeypatch: pytest.M
     assert done.exit_code == 0, done.output
     assert done.output in BLOCKS
     views = {v.name: v for v in visup.ModelDatabase.open("cell.models").taught}
-    assert set(views) == {"left", "middle", "right"}
+    assert set(views) == {"left_bottle", "middle_bottle", "right_bottle"}
 
 
 def test_the_example_teaches_the_same_outlines() -> None:
     code = (ROOT / "examples" / "12_your_own_cell.py").read_text()
-    drawn = dict(re.findall(r'"(\w+)": \[(.*?)\],\n', code))
+    drawn = dict(re.findall(r'"(\w+)": \[(.*?)\],\n', code, re.DOTALL))
     numbers = {name: [float(n) for n in re.findall(r"\d+", text)] for name, text in drawn.items()}
     assert numbers == {n: list(np.ravel(corners)) for n, corners in outlines().items()}
     assert len(code.splitlines()) <= 40

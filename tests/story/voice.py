@@ -19,8 +19,8 @@ from visup.runs.replay import replay, settings_for
 from visup.story import Narrative
 
 MENTION = re.compile(
-    r"[Oo]bject (\d+)(?:, taken for the [a-z0-9_ ]+)?,? "
-    r"(believed to be|in the part of|is|appears to be|may be) the ([a-z0-9_ ]+?)(?=[,.]| is\b)"
+    r"[Oo]bject (\d+)(?:, taken for (?:the|an?) [a-z0-9_ ]+)?,? "
+    r"(believed to be|in the part of|is|appears to be|may be) (?:the|an?) ([a-z0-9_ ]+?)(?=[,.]| is\b)"
 )
 """Id, how it is called so, and what."""
 SPAN = re.compile(r"(?:^|: )(the .+?) (?:has|have) been ([a-z ]+?) since ([\d.]+) s")

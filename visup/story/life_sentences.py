@@ -18,10 +18,10 @@ MOST_NAMED = 4
 
 
 def who(life: ObjectLife) -> str:
-    """An object with its id, and what else is known of it: `object 4 (blue)`, `the arm (object 2)`."""
+    """An object with its id, and what else is known of it: `object 4 (blue person)`, `the arm (object 2)`."""
     if life.name is not None:
         return f"the {spaced(life.name)} (object {life.id})"
-    return f"object {_with_colour(life)}"
+    return f"object {_with_traits(life)}"
 
 
 def course(life: ObjectLife, was: str = "was") -> str:
@@ -74,7 +74,7 @@ def lives_sentence(lives: Sequence[ObjectLife]) -> str:
         return life_sentence(lives[0])
     shortest, longest = min(x.seconds for x in lives), max(x.seconds for x in lives)
     lasted = f"{shortest:.1f} to {longest:.1f} s each" if shortest < longest else f"{longest:.1f} s"
-    shown = [_with_colour(x) for x in lives[:MOST_NAMED]]
+    shown = [_with_traits(x) for x in lives[:MOST_NAMED]]
     rest = len(lives) - len(shown)
     last = f"{rest} more" if rest else shown.pop()
     return f"Objects {', '.join(shown)} and {last} {course(lives[0], 'were')}, {lasted}."
@@ -87,8 +87,9 @@ def stay_sentence(life: ObjectLife) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _with_colour(life: ObjectLife) -> str:
-    return f"{life.id} ({life.colour})" if life.colour else str(life.id)
+def _with_traits(life: ObjectLife) -> str:
+    traits = " ".join(x for x in (life.colour, life.kind and spaced(life.kind)) if x)
+    return f"{life.id} ({traits})" if traits else str(life.id)
 
 
 def _place(words: str) -> str:

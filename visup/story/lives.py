@@ -10,7 +10,7 @@ from visup.agent import Frame, Mind, ObjectBelief, Presence
 from visup.agent.model.step import Step
 from visup.percepts.colour import palette
 from visup.rules.geometry.outlines import outline_gap
-from visup.rules.wording.sentences import spoken_name
+from visup.rules.wording.sentences import individual_name, spoken_name
 from visup.story.colour_words import colour_word
 from visup.story.places import Box, place_of, sides_of
 
@@ -42,7 +42,8 @@ class ObjectLife:
         first: Its box then.
         last: Its box when it was seen last.
         area: Pixels it showed at the most.
-        name: What it is believed to be, or None.
+        name: What it alone is called, or None.
+        kind: What kind of thing it is, where a detector tells that and no more, or None.
         colour: A word for its colour, or None.
         near: Object id -> least gap in pixels, of those that came near it.
         left: Whether it went over the border.
@@ -58,6 +59,7 @@ class ObjectLife:
     last: Box
     area: float = 0.0
     name: str | None = None
+    kind: str | None = None
     colour: str | None = None
     near: dict[int, float] = field(default_factory=dict)
     left: bool = False
@@ -223,7 +225,8 @@ class LifeLog:
             )
             self.alive[belief.id] = life
         life.until, life.last, life.left = self._now, box, False
-        life.name = spoken_name(mind, belief.id)
+        life.name = individual_name(mind, belief.id)
+        life.kind = spoken_name(mind, belief.id) if life.name is None else None
         life.area = max(life.area, belief.region.area)
         life.colour = self._looked.get(belief.id, (0.0, None))[1]
 

@@ -1,5 +1,7 @@
 """What of a run is worth a line: what tasks and alerts say, named objects sparingly, a line a life of others.
 
+Others are those that nobody knows, and those of which a detector tells only the kind.
+
 Events are recorded whatever is told of them; this is what people read.
 """
 
@@ -11,7 +13,7 @@ from enum import StrEnum
 
 from visup.agent import Event, Frame, Mind, Severity
 from visup.agent.model.step import Step
-from visup.rules.wording.sentences import spoken_name
+from visup.rules.wording.sentences import individual_name
 from visup.story.life_sentences import course, lives_sentence, stay_sentence
 from visup.story.line_budget import LineBudget
 from visup.story.lives import LifeLog, ObjectLife
@@ -125,7 +127,7 @@ class Narrative:
             return True
         if event.kind == "alert_closed":
             return event.data.get("alert") in self._alerts
-        if not event.objects or any(spoken_name(mind, i) is None for i in event.objects):
+        if not event.objects or any(individual_name(mind, i) is None for i in event.objects):
             return False
         if not self._seldom(event):
             return False

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import visup
 from tests.clips import moving_disc, write_clip
-from visup.agent import Frame, Observation
+from visup.agent import Frame, Observation, Severity
 from visup.agent.model.errors import SettingsError
 from visup.api.exports import export
 from visup.percepts.detections import Detection, DetectionsBehaviour, read_detections
@@ -127,6 +127,30 @@ def test_names_of_a_detector_play_the_actors_of_a_task(tmp_path: Path) -> None:
     run = visup.watch(clip, task=task, detections=written(tmp_path, told), fps=10).finish()
     assert [e.text for e in run.events if "cup" in e.text]
     assert run.steps[-1].mind.tasks[0].bindings[0].object_id is not None
+
+
+def test_people_of_a_detector_are_told_in_a_line_each_and_set_off_no_alarm(tmp_path: Path) -> None:
+    """They meet half-way: nothing of that is told of kinds, but where each came from and went."""
+    clip = write_clip(tmp_path / "clip.avi", moving_disc(50))
+    rows = [
+        {"image_id": k, "bbox": box, "track_id": i, "category_id": 1}
+        for k in range(50)
+        for i, box in ((1, [2 * k - 4, 10, 14, 20]), (2, [88 - 2 * k, 34, 14, 20]))
+        if -10 < box[0] < 90
+    ]
+    told = {
+        "images": [{"id": k} for k in range(50)],
+        "categories": [{"id": 1, "name": "person"}],
+        "annotations": rows,
+    }
+    run = visup.watch(clip, detections=written(tmp_path, told), fps=10, out=tmp_path / "run")
+    lines = [e.text for e in run.narrate()]
+    assert lines  # five seconds have room for one or two
+    assert all(line.startswith("Object") and " person)" in line for line in lines)
+    identified = [e.text for e in visup.open_run(tmp_path / "run").events if e.kind == "identified"]
+    assert identified
+    assert all(text.endswith("is a person.") for text in identified)
+    assert not [e for e in visup.open_run(tmp_path / "run").events if e.severity > Severity.INFO]
 
 
 def test_boxes_without_numbers_are_numbered_while_they_are_watched(tmp_path: Path) -> None:
