@@ -6,7 +6,9 @@ import os
 import stat
 from errno import EFBIG, EINVAL
 from pathlib import Path
+from typing import IO
 
+PIECE_BYTES = 2**20
 LARGEST_TEXT_BYTES = 2**20
 """No task, rules, zones or settings are larger; the largest that ship take a hundredth of it."""
 
@@ -30,12 +32,22 @@ def read_bounded(path: Path, most: int) -> bytes:
     # What is no file may never come to an end, or to a beginning.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     with open(handle, "rb") as file:  # noqa: PTH123  # of a descriptor
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
+        facts = os.fstat(handle)
+        if not stat.S_ISREG(facts.st_mode):
             raise OSError(EINVAL, "it is not a file", str(path))
-        data = file.read(most + 1)
-    if len(data) > most:
+        data = b"" if facts.st_size > most else _read_at_most(file, most + 1)
+    if max(len(data), facts.st_size) > most:
         raise OSError(EFBIG, f"it is larger than {_size(most)}", str(path))
     return data
+
+
+def _read_at_most(file: IO[bytes], most: int) -> bytes:
+    """So many bytes or fewer; memory is taken for what is there, not for what may be asked for."""
+    pieces, left = [], most
+    while left and (piece := file.read(min(left, PIECE_BYTES))):
+        pieces.append(piece)
+        left -= len(piece)
+    return b"".join(pieces)
 
 
 MOST_VALUES = 4_000_000

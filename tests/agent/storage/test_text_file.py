@@ -1,0 +1,60 @@
+"""Files of others are read within bounds, and cost what they hold rather than what they might."""
+
+from __future__ import annotations
+
+import os
+import tracemalloc
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.agent.storage.text_file import PIECE_BYTES, read_bounded
+
+
+@given(size=st.integers(0, 3 * PIECE_BYTES), most=st.integers(0, 3 * PIECE_BYTES))
+def test_a_file_is_read_whole_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, size: int, most: int
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "some file"
+    content = bytes(size)
+    path.write_bytes(content)
+    if size > most:
+        with pytest.raises(OSError, match="larger than"):
+            read_bounded(path, most)
+    else:
+        assert read_bounded(path, most) == content
+
+
+def test_memory_is_taken_for_what_is_there(tmp_path: Path) -> None:
+    path = tmp_path / "small"
+    path.write_bytes(b"small")
+    tracemalloc.start()
+    try:
+        read_bounded(path, 2**32)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 4 * PIECE_BYTES
+
+
+def test_what_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "large"
+    with path.open("wb") as file:
+        file.truncate(2**33)  # takes no room on the disk
+    tracemalloc.start()
+    try:
+        with pytest.raises(OSError, match="larger than 1024 MB"):
+            read_bounded(path, 2**30)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 4 * PIECE_BYTES
+
+
+def test_a_pipe_is_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(OSError, match="not a file"):
+        read_bounded(path, 10)
