@@ -54,10 +54,8 @@ from visup.rules.wording.conditions import Condition, DecisionLog, at_least, dec
 from visup.rules.wording.sentences import (
     KIND_NAMES,
     TOLD_NAMES,
-    called,
-    indefinite,
     seems,
-    spaced,
+    with_article,
 )
 
 VoteCounts = tuple[tuple[str, float], ...]
@@ -377,22 +375,15 @@ def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> M
     )
 
 
-def _with_article(mind: Mind, model: str) -> str:
-    """What an object of a model is called, with its article."""
-    name = called(mind, model)
-    of_kind = name == model and model in mind.recall(KIND_NAMES)
-    return indefinite(spaced(name)) if of_kind else f"the {spaced(name)}"
-
-
 def _identified(
     mind: Mind, belief: ObjectBelief, before: str | None, observation: Observation
 ) -> Event:
     # By its model alone: the part that it plays in a task may be another's, and lags behind.
-    words, how = _with_article(mind, belief.name), seems(belief.confidence)
+    words, how = with_article(mind, belief.name), seems(belief.confidence)
     if before is None:
         text = f"Object {belief.id} {how} {words}."
     else:
-        was = _with_article(mind, before)
+        was = with_article(mind, before)
         text = f"Object {belief.id}, taken for {was}, {how} {words}."
     data = MappingProxyType({"name": belief.name, "before": before})
     return Event(

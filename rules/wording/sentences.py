@@ -228,6 +228,13 @@ def indefinite(noun: str) -> str:
     return f"{'an' if noun[:1].lower() in 'aeiou' and noun else 'a'} {noun}"
 
 
+def with_article(mind: Mind, model: str) -> str:
+    """What an object of a model is called, with its article."""
+    name = called(mind, model)
+    of_kind = name == model and model in mind.recall(KIND_NAMES)
+    return indefinite(spaced(name)) if of_kind else f"the {spaced(name)}"
+
+
 def _mention(mind: Mind, object_id: int, mentioned: list[int]) -> str:
     if object_id in mentioned:
         return "it" if len(mentioned) == 1 else short(mind, object_id)
