@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,30 +28,32 @@ def test_a_file_is_read_whole_or_refused(
         assert read_bounded(path, most) == content
 
 
+def peak_memory(read: Callable[[], object]) -> int:
+    """Bytes that reading takes at most."""
+    tracemalloc.start()
+    try:
+        read()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
 def test_memory_is_taken_for_what_is_there(tmp_path: Path) -> None:
     path = tmp_path / "small"
     path.write_bytes(b"small")
-    tracemalloc.start()
-    try:
-        read_bounded(path, 2**32)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert peak < 4 * PIECE_BYTES
+    assert peak_memory(lambda: read_bounded(path, 2**32)) < 4 * PIECE_BYTES
 
 
 def test_what_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "large"
     with path.open("wb") as file:
         file.truncate(2**33)  # takes no room on the disk
-    tracemalloc.start()
-    try:
+
+    def refused() -> None:
         with pytest.raises(OSError, match="larger than 1024 MB"):
             read_bounded(path, 2**30)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert peak < 4 * PIECE_BYTES
+
+    assert peak_memory(refused) < 4 * PIECE_BYTES
 
 
 def test_a_pipe_is_no_file(tmp_path: Path) -> None:
