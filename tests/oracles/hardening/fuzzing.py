@@ -128,8 +128,8 @@ CODE = frozenset(
 
 
 def _read(subject: Subject, folder: Path) -> tuple[str, str]:
-    held, begin = _writable(), time.monotonic()
-    resource.setrlimit(resource.RLIMIT_DATA, (held + MEMORY, resource.RLIM_INFINITY))
+    held, begin = _address_space(), time.monotonic()
+    resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, resource.RLIM_INFINITY))
     signal.setitimer(signal.ITIMER_REAL, SLOW_S)
     try:
         subject.read(folder)
@@ -145,13 +145,12 @@ def _read(subject: Subject, folder: Path) -> tuple[str, str]:
         return "raised", " ".join(said.split())[:300]
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        resource.setrlimit(resource.RLIMIT_DATA, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     return ("slow", "") if time.monotonic() - begin > SLOW_S else ("read", "")
 
 
-def _writable() -> int:
-    """Bytes that this process may write to; addresses that are merely set aside for threads are none."""
-    pages = int(Path("/proc/self/statm").read_text().split()[5])
+def _address_space() -> int:
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
     return pages * resource.getpagesize()
 
 
