@@ -64,7 +64,7 @@ def outcome(
     meaning: ActionDefinition,
     monitor: StepMonitor,
     now: float,
-    followed: float | None = None,
+    followed: Sequence[float] = (),
 ) -> tuple[Status, str]:
     """How a step that has been left ended, and why.
 
@@ -73,8 +73,8 @@ def outcome(
         meaning: Its action.
         monitor: What is kept about it.
         now: Seconds.
-        followed: Since when what comes next has been seen, where that is told: what goes on until then is not
-            told to have gone on for longer.
+        followed: Since when each thing that comes next has been seen: what goes on until then is not told to
+            have gone on for longer.
 
     Returns:
         DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
@@ -104,7 +104,7 @@ def _held(
     meaning: ActionDefinition,
     monitor: StepMonitor,
     now: float,
-    followed: float | None,
+    followed: Sequence[float],
 ) -> str:
     """From or until when a step that is done was what it should be."""
     was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
@@ -114,8 +114,8 @@ def _held(
     over = now if monitor.helped_at is None else monitor.helped_at
     if not meaning.lasts and monitor.broken_since is not None:
         over = monitor.broken_since
-    if followed is not None and (monitor.begun is None or followed > monitor.begun):
-        over = min(over, followed)
+    after = (since for since in followed if monitor.begun is None or since > monitor.begun)
+    over = min((over, *after))
     return f"{was} {meaning.text} until {over:.1f} s"
 
 
