@@ -264,7 +264,9 @@ class Advance:
     def _ending(self, leaf: Leaf[StepMonitor], followed: Sequence[float]) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
         meaning = self.steps.actions[leaf.step.action]
-        status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed)
+        contrary = self.observe(leaf.step).contrary
+        denied = None if contrary is None else contrary.since
+        status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed, denied)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
 

@@ -27,6 +27,7 @@ EXCLUDING = (
     frozenset({"converging", "coupled"}),
     frozenset({"diverging", "coupled"}),
 )
+UNDONE = "is no longer complete"
 TOLERANCE_S = 0.11
 """Times are told to a tenth of a second."""
 
@@ -94,7 +95,7 @@ def what_is_done_is_not_failing(told: Told) -> Iterator[str]:
         stage = line.data.get("task"), line.data.get("stage")
         if line.kind == "stage_done":
             done.add(stage)
-        elif line.kind in ("stage_started", "stage_revised"):
+        elif line.kind in ("stage_started", "stage_revised") or UNDONE in line.text:
             done.discard(stage)
         elif line.kind in ("stage_failing", "stage_failed", "stage_progressing") and stage in done:
             yield f"{line.time:.2f} s: {line.text}"
