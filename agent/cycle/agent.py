@@ -20,6 +20,7 @@ from visup.agent.execution.runners import error_line
 from visup.agent.model.events import AlertCondition, Directive, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.mind import Mind, Zone
+from visup.agent.model.own_troubles import REASONING_FAILED
 from visup.agent.model.records import Frame, Observation
 from visup.agent.model.step import Observer, Step
 
@@ -279,7 +280,7 @@ def _failed_outcome(
 ) -> Outcome:
     name = getattr(reasoner, "__name__", type(reasoner).__name__)
     condition = AlertCondition(
-        "reasoning_failed",
+        REASONING_FAILED,
         (),
         Severity.CRITICAL,
         f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",

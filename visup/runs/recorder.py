@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from visup.agent import AlertCondition, Frame, Severity, TaskBelief
 from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.model.own_troubles import NOT_RECORDED
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
@@ -124,7 +125,7 @@ class Recorder:
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
             yield AlertCondition(
-                "not_recorded",
+                NOT_RECORDED,
                 (),
                 Severity.WARNING,
                 "The run is not being recorded; supervision goes on.",

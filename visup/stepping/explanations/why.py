@@ -22,6 +22,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.errors import SettingsError
+from visup.agent.model.own_troubles import BEHAVIOUR_FAILED
 from visup.rules.coupling.evidence import COUPLING
 from visup.rules.safety.queries import explain
 from visup.rules.safety.reasoner import rule_memory
@@ -125,7 +126,7 @@ class ReasonFinder:
             failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
             if failing:  # which tell of their actors
                 return Why("because", (*stated, *failing))
-        if kind == "behaviour_failed":
+        if kind == BEHAVIOUR_FAILED:
             stated += self._failed()
         return Why("because", (*stated, *self._objects(event.objects)))
 
