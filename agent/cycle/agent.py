@@ -14,13 +14,13 @@ from visup.agent.contract.saving import Saveable
 from visup.agent.cycle.alerts import alert_events, fault_conditions, update_alerts
 from visup.agent.cycle.answers import apply_answers, resolve_answer
 from visup.agent.cycle.outcomes import merge_outcomes
+from visup.agent.cycle.own_troubles import REASONING_FAILED
 from visup.agent.execution.behaviour_slot import BehaviourSlot
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.execution.runners import error_line
 from visup.agent.model.events import AlertCondition, Directive, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.mind import Mind, Zone
-from visup.agent.model.own_troubles import REASONING_FAILED
 from visup.agent.model.records import Frame, Observation
 from visup.agent.model.step import Observer, Step
 

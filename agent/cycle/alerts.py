@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from visup.agent.cycle.own_troubles import BEHAVIOUR_FAILED
 from visup.agent.model.events import Alert, AlertCondition, Event, Severity
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.own_troubles import BEHAVIOUR_FAILED
 from visup.agent.model.records import FAULT_STATES, Observation, ReportState
 
 GRACE_S = 1.0

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from visup.agent import AlertCondition, Frame, Severity
+from visup.agent.cycle.own_troubles import SOURCE_DROPPED
 from visup.agent.model.errors import SourceError
-from visup.agent.model.own_troubles import SOURCE_DROPPED
 from visup.percepts.video.capture import Capture, frame_rate, take
 from visup.percepts.video.source import Ending, VideoSource
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+from visup.agent.cycle.own_troubles import OWN_TROUBLES
 from visup.agent.model.did_you_mean import closest, did_you_mean
-from visup.agent.model.own_troubles import OWN_TROUBLES
 from visup.rules.formula.nodes import (
     ZERO,
     Comparison,

@@ -12,10 +12,10 @@ from typing import Self, Unpack
 
 from rich.console import RenderableType
 
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Alert, Event
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import Verdict

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from visup.agent import AlertCondition, Frame, Severity
-from visup.agent.model.own_troubles import CLOCK_JUMPED
+from visup.agent.cycle.own_troubles import CLOCK_JUMPED
 
 NAME = "clock"
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from visup.agent import AlertCondition, Frame, Severity, TaskBelief
+from visup.agent.cycle.own_troubles import NOT_RECORDED
 from visup.agent.model.errors import ExtraMissingError, OutputError
-from visup.agent.model.own_troubles import NOT_RECORDED
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import Verdict
-from visup.agent.model.own_troubles import grave_kinds, verdict_without_task
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events

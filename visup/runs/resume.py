@@ -17,8 +17,8 @@ from typing import Any
 
 from visup.agent import Frame, Observation, Severity, Verdict
 from visup.agent.cycle.agent import Agent
+from visup.agent.cycle.own_troubles import verdict_without_task
 from visup.agent.model.errors import OutputError, SettingsError, SourceError
-from visup.agent.model.own_troubles import verdict_without_task
 from visup.agent.model.step import Step
 from visup.agent.plugins.factory import MODULE_PATH
 from visup.agent.storage.codec import pack_observation

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
 from visup.agent import Frame, Verdict
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import OutputError
-from visup.agent.model.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.atomic import sync
 from visup.compiled import cache_note

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from visup.agent import Behaviour, Contract, Mind, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.step import Observer
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
-from visup.agent.model.own_troubles import grave_kinds, verdict_without_task
 from visup.report.records import KeyFrame, ReportedObject, RunData, StateSpan
 
 VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {

@@ -21,8 +21,8 @@ from visup.agent import (
     TaskBelief,
     Truth,
 )
+from visup.agent.cycle.own_troubles import BEHAVIOUR_FAILED
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.own_troubles import BEHAVIOUR_FAILED
 from visup.rules.coupling.evidence import COUPLING
 from visup.rules.safety.queries import explain
 from visup.rules.safety.reasoner import rule_memory
