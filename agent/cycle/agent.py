@@ -14,6 +14,7 @@ from visup.agent.contract.saving import Saveable
 from visup.agent.cycle.alerts import alert_events, fault_conditions, update_alerts
 from visup.agent.cycle.answers import apply_answers, resolve_answer
 from visup.agent.cycle.outcomes import merge_outcomes
+from visup.agent.cycle.own_troubles import REASONING_FAILED
 from visup.agent.execution.behaviour_slot import BehaviourSlot
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.execution.runners import error_line
@@ -279,7 +280,7 @@ def _failed_outcome(
 ) -> Outcome:
     name = getattr(reasoner, "__name__", type(reasoner).__name__)
     condition = AlertCondition(
-        "reasoning_failed",
+        REASONING_FAILED,
         (),
         Severity.CRITICAL,
         f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",

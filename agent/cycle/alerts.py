@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from visup.agent.cycle.own_troubles import BEHAVIOUR_FAILED
 from visup.agent.model.events import Alert, AlertCondition, Event, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import FAULT_STATES, Observation, ReportState
@@ -22,7 +23,7 @@ def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
     """Concerns about behaviours that failed, are late or suspended: their part of the mind is unknown."""
     return tuple(
         AlertCondition(
-            "behaviour_failed",
+            BEHAVIOUR_FAILED,
             (),
             Severity.WARNING,
             f"The behaviour '{r.behaviour}' {_failure(r.state)}; its output is unavailable.",

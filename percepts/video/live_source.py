@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from visup.agent import AlertCondition, Frame, Severity
+from visup.agent.cycle.own_troubles import SOURCE_DROPPED
 from visup.agent.model.errors import SourceError
 from visup.percepts.video.capture import Capture, frame_rate, take
 from visup.percepts.video.source import Ending, VideoSource
@@ -107,7 +108,7 @@ class LiveSource(VideoSource):
         while self._came_back:
             said = self._came_back.popleft()
             yield AlertCondition(
-                "source_dropped", (), Severity.WARNING, said, key=self.name, needs=()
+                SOURCE_DROPPED, (), Severity.WARNING, said, key=self.name, needs=()
             )
 
     def _grab(self) -> bool:

@@ -20,9 +20,9 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 
 from visup.agent import AlertCondition, Frame, Severity
+from visup.agent.cycle.own_troubles import FRAMES_DROPPED
 from visup.percepts.video.source import VideoSource
 
-NAME = "frames_dropped"
 WINDOW_S = 5.0
 SHARE = 0.1
 """From this share of the frames of the window on, it is told that frames are dropped."""
@@ -85,7 +85,7 @@ class RealTimeFrames(Iterator[Frame], ABC):
             f"{lost + len(times)} were dropped; for up to {longest:.1f} s nobody looked."
         )
         severity = Severity.WARNING if longest >= LONG_S else Severity.INFO
-        yield AlertCondition(NAME, (), severity, text, key=self.name, needs=())
+        yield AlertCondition(FRAMES_DROPPED, (), severity, text, key=self.name, needs=())
 
     def note(self) -> str | None:
         """One sentence for the end of a run; None when nothing was dropped."""

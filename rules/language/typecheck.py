@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+from visup.agent.cycle.own_troubles import OWN_TROUBLES
 from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.nodes import (
     ZERO,
@@ -127,6 +128,10 @@ class TypeChecker:
         for word in (rule.name, *rule.variables):
             if word in KEYWORDS:
                 yield rule.span, f"'{word}' is a reserved word", "another name", None
+        if rule.name in OWN_TROUBLES:
+            what = f"'{rule.name}' is an alert of visup about itself"
+            own = f"write `my_{rule.name}` in place of `{rule.name}`"
+            yield rule.span, what, "another name", own
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
                 what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"

@@ -20,6 +20,7 @@ WRONG = {
     "verdict": Verdict.FAILED,
     "problem": "it is cut off",
     "recorded": False,
+    "delivered": False,
     "stopped": True,
 }
 
@@ -31,6 +32,7 @@ WRONG = {
         (("problem", "recorded"), ExitCode.SOURCE_BROKE_OFF),
         (("recorded", "stopped"), ExitCode.NOT_RECORDED),
         (("recorded",), ExitCode.NOT_RECORDED),
+        (("delivered", "stopped"), ExitCode.NOT_RECORDED),
         (("problem", "stopped"), ExitCode.STOPPED),
         ((), ExitCode.GOOD),
     ],

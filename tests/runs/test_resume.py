@@ -27,6 +27,7 @@ from visup.runs.checkpoints import CHECKPOINT
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.operator import HumanOperator
 from visup.runs.replay import recorded_transcript, replay, settings_for, transcript_diff
+from visup.runs.result import ExitCode
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import Audience, fresh_folder, supervise
 from visup.runs.settings import RunOptions, WatchSettings
@@ -235,7 +236,7 @@ def test_a_disk_that_is_full_for_a_while_is_told_and_nothing_is_lost(
     assert not transcript_diff(recorded_transcript(run), again)
 
 
-def test_a_disk_that_stays_full_does_not_hide_the_verdict(
+def test_a_disk_that_stays_full_is_neither_what_was_seen_nor_a_good_end(
     clip: WatchSettings, tmp_path: Path
 ) -> None:
     def fill(step: Step, frame: Frame) -> None:
@@ -249,7 +250,7 @@ def test_a_disk_that_stays_full_does_not_hide_the_verdict(
         clip, fresh_folder(tmp_path / "run", ""), audience=Audience([fill]), options=BARE
     )
     assert result.steps == 40
-    assert result.verdict is not None
+    assert (result.verdict, result.exit_code) == (None, ExitCode.NOT_RECORDED)
     assert any("could not be recorded" in n for n in result.notes)
     assert any("no such table" in n for n in result.notes)
 

@@ -23,13 +23,16 @@ MOST_EVENTS = 12
 MOST_ROWS = 10
 
 
-def story(title: str, events: Iterable[Event], verdict: Verdict | None) -> RenderableType:
+def story(
+    title: str, events: Iterable[Event], verdict: Verdict | None, *, has_task: bool
+) -> RenderableType:
     """A run as text: what it is about, the latest of what was told, the verdict so far.
 
     Args:
         title: What it is about.
         events: All of its events.
         verdict: As it stands.
+        has_task: Whether there is a task to judge.
     """
     told = worded_once(tuple(events))
     head = [Text(f"{len(told) - MOST_EVENTS} earlier events", style="dim")]
@@ -37,7 +40,7 @@ def story(title: str, events: Iterable[Event], verdict: Verdict | None) -> Rende
         Text(title, style="bold"),
         *(head if len(told) > MOST_EVENTS else ()),
         *(event_row(e) for e in told[-MOST_EVENTS:]),
-        Text.from_markup(verdict_line(verdict)),
+        Text.from_markup(verdict_line(verdict, has_task=has_task)),
     )
 
 

@@ -142,10 +142,14 @@ class RecordedRun:
         return f"RecordedRun({str(self.folder)!r})"
 
     def __rich__(self) -> RenderableType:
-        return story(str(self.folder), self.events, self.verdict)
+        return self._story()
 
     def _repr_html_(self) -> str:
-        return html_of(story(str(self.folder), self.events, self.verdict))
+        return html_of(self._story())
+
+    def _story(self) -> RenderableType:
+        has_task = bool(self.settings.tasks)
+        return story(str(self.folder), self.events, self.verdict, has_task=has_task)
 
     def _records(
         self, kind: type[Record], made: Callable[[Any], Record], lines: Iterable[Any]

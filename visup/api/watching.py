@@ -12,8 +12,9 @@ from typing import Self, Unpack
 
 from rich.console import RenderableType
 
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.events import Alert, Event, Severity
+from visup.agent.model.events import Alert, Event
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
@@ -201,7 +202,12 @@ class Run(Iterator[Step]):
     def _story(self) -> RenderableType:
         state = "" if self.result else "; the run is under way" if self._begun else "; not begun"
         verdict = self.result.verdict if self.result else self._verdict_so_far()
-        return story(f"{self.settings.source}{state}", self._events, verdict)
+        return story(
+            f"{self.settings.source}{state}",
+            self._events,
+            verdict,
+            has_task=bool(self.settings.tasks),
+        )
 
     def _note(self, step: Step, frame: Frame) -> None:
         self._frame = frame
@@ -219,5 +225,4 @@ class Run(Iterator[Step]):
         mind = self._steps[-1].mind
         if mind.tasks:
             return final_verdict(mind)
-        grave = any(e.severity >= Severity.WARNING for e in self._events)
-        return Verdict.INTERRUPTED if grave else None
+        return verdict_without_task(grave_kinds(self._events))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from visup.agent import AlertCondition, Frame, Severity
+from visup.agent.cycle.own_troubles import CLOCK_JUMPED
 
 NAME = "clock"
 
@@ -45,4 +46,4 @@ class MonotonicFrames:
         """Once after a jump: that there was one."""
         said, self._said = self._said, None
         if said:
-            yield AlertCondition("clock_jumped", (), Severity.WARNING, said, key=NAME, needs=())
+            yield AlertCondition(CLOCK_JUMPED, (), Severity.WARNING, said, key=NAME, needs=())

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from visup.agent import AlertCondition, Frame, Severity, TaskBelief
+from visup.agent.cycle.own_troubles import NOT_RECORDED
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, JournalLimits
@@ -124,7 +125,7 @@ class Recorder:
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
             yield AlertCondition(
-                "not_recorded",
+                NOT_RECORDED,
                 (),
                 Severity.WARNING,
                 "The run is not being recorded; supervision goes on.",

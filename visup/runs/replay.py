@@ -14,7 +14,8 @@ from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 
-from visup.agent import Severity, Verdict
+from visup.agent import Verdict
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
@@ -82,13 +83,13 @@ class _EventCollector:
 
     events: list[Line] = field(default_factory=list)
     steps: int = 0
-    grave: bool = False
+    alarms: Verdict | None = None
 
     def __call__(self, step: Step) -> None:
         self.steps += 1
         for event in step.events:
             self.events.append(event_record(event))
-            self.grave |= event.severity >= Severity.WARNING
+        self.alarms = verdict_without_task(grave_kinds(step.events), self.alarms)
 
 
 def settings_for(recording: Recording, **changed: Any) -> WatchSettings:
@@ -139,7 +140,8 @@ def replay(
             if tell:
                 tell(step)
         seconds = time.perf_counter() - begin
-        verdict = _verdict(final_verdict(agent.mind) if agent.mind.tasks else None, listener.grave)
+        of_run = final_verdict(agent.mind) if agent.mind.tasks else listener.alarms
+        verdict = of_run.value if of_run else None
         if journal:
             journal.note(verdict=verdict, steps=listener.steps, tasks=agent.mind.tasks)
             export_events(journal.path, journal.path.with_name("events.jsonl"))
@@ -181,12 +183,6 @@ def group_of(event: Line) -> str:
 
 def _count(events: Sequence[Line], group: str) -> int:
     return sum(group_of(e) == group for e in events)
-
-
-def _verdict(of_tasks: Verdict | None, grave: bool) -> str | None:
-    if of_tasks:
-        return of_tasks.value
-    return Verdict.INTERRUPTED.value if grave else None
 
 
 def _journal(recording: Recording, settings: WatchSettings, out: Path, stack: ExitStack) -> Journal:

@@ -15,7 +15,7 @@ class ExitCode(IntEnum):
     GOOD = 0
     """It went well; without a task: nothing unsafe was seen, from the first frame to the last."""
     BAD = 1
-    """It failed, was unsafe, or could not be followed."""
+    """It failed, was unsafe, or could not be followed or watched whole."""
     BAD_INPUT = 2
     """Something given is not as it should be; nothing was watched."""
     UNFINISHED = 3
@@ -23,7 +23,7 @@ class ExitCode(IntEnum):
     SOURCE_BROKE_OFF = 4
     """The source is cut off or damaged; nothing was wrong in the part that was seen."""
     NOT_RECORDED = 5
-    """The run or its report could not be written whole, as on a full disk; nothing was wrong else."""
+    """The run, its report or its alerts could not be written or delivered whole; nothing was wrong else."""
     STOPPED = 130
     """The user stopped it (Ctrl-C); nothing was wrong until then."""
 
@@ -33,7 +33,8 @@ class RunResult:
     """How a run ended.
 
     Attributes:
-        verdict: Of the tasks; without a task 'interrupted' if something grave was told, else None.
+        verdict: Of the tasks; without a task 'interrupted' if something grave was seen, else 'unknown' if
+            a part was not watched, else None.
         steps: Frames supervised.
         problem: What was wrong with the source, or None.
         folder: The run folder, or None.
@@ -43,6 +44,7 @@ class RunResult:
         stopped: Whether the user stopped it.
         seconds: Time of the last frame.
         recorded: Whether all that was to be written was written.
+        delivered: Whether every sink for alerts took all that it was sent.
     """
 
     verdict: Verdict | None
@@ -55,6 +57,7 @@ class RunResult:
     stopped: bool = False
     seconds: float = 0.0
     recorded: bool = True
+    delivered: bool = True
 
     @property
     def exit_code(self) -> ExitCode:
@@ -63,7 +66,7 @@ class RunResult:
             return ExitCode.BAD
         if self.problem and not self.stopped:
             return ExitCode.SOURCE_BROKE_OFF
-        if not self.recorded:
+        if not (self.recorded and self.delivered):
             return ExitCode.NOT_RECORDED
         if self.stopped:
             return ExitCode.STOPPED

@@ -15,8 +15,9 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from visup.agent import Frame, Observation, Severity
+from visup.agent import Frame, Observation, Severity, Verdict
 from visup.agent.cycle.agent import Agent
+from visup.agent.cycle.own_troubles import verdict_without_task
 from visup.agent.model.errors import OutputError, SettingsError, SourceError
 from visup.agent.model.step import Step
 from visup.agent.plugins.factory import MODULE_PATH
@@ -38,7 +39,7 @@ class InterruptedRun:
         state: The latest state, or None.
         why_none: Why the state that there is cannot be used, or None.
         steps: How many steps are recorded.
-        grave: Whether anything grave was told.
+        verdict: What its events came to, if it has no task.
         answers: What the operator said beforehand: object id -> name.
     """
 
@@ -47,7 +48,7 @@ class InterruptedRun:
     state: Checkpoint | None
     why_none: str | None
     steps: int
-    grave: bool
+    verdict: Verdict | None
     answers: Mapping[int, str]
 
     def check_unchanged(self) -> None:
@@ -101,11 +102,10 @@ def interrupted_run(
             where=str(run),
             hint="begin a new run",
         )
-    told = recording.events()
-    grave = any(e.get("severity") != Severity.INFO.name.lower() for e in told)
+    verdict = verdict_without_task(map(_kind, filter(_is_grave, recording.events())))
     settings = _with_named_code(recorded_settings(facts, str(run)), run, behaviours, plugins)
     answers = _answers(facts, str(run))
-    return InterruptedRun(recording, settings, state, why_none, recording.count(), grave, answers)
+    return InterruptedRun(recording, settings, state, why_none, recording.count(), verdict, answers)
 
 
 def _with_named_code(
@@ -132,6 +132,17 @@ def _with_named_code(
 def _code_name(where: Path | str) -> str:
     """By what code is told to be that of the run: a module's path, or a file's name, wherever it is now."""
     return str(where) if MODULE_PATH.fullmatch(str(where)) else Path(where).name
+
+
+def _is_grave(event: Mapping[str, Any]) -> bool:
+    return event.get("severity") != Severity.INFO.name.lower()
+
+
+def _kind(event: Mapping[str, Any]) -> str:
+    """What a recorded event is about; a journal may be a stranger's, and say anything."""
+    data = event.get("data")
+    said = data.get("alert_kind") if isinstance(data, dict) else None
+    return str(said or event.get("kind"))
 
 
 def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-from visup.agent import Frame, Severity, Verdict
+from visup.agent import Frame, Verdict
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
@@ -213,7 +214,7 @@ class _Run:
         self._sinks = Sinks(options.sinks, settings.source)
         stack.callback(self._sinks.close)
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
-        self._severity = _SeverityMonitor(past.grave if past else False)
+        self._alarms = _VerdictMonitor(past.verdict if past else None)
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
         self._stopped = False
@@ -253,7 +254,7 @@ class _Run:
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         others = (*audience.observers, self._sinks, *answering)
-        self._agent.observers = (self._severity, *recording, *others)
+        self._agent.observers = (self._alarms, *recording, *others)
         for warning in self._warnings:
             self._warn(warning, audience.notice)
         if self._recorder:
@@ -305,7 +306,7 @@ class _Run:
         if self._checkpoints:
             self._checkpoints.close()
         mind = self._agent.mind
-        verdict = final_verdict(mind) if mind.tasks else self._severity.verdict
+        verdict = final_verdict(mind) if mind.tasks else self._alarms.verdict
         problem = "stopped by the user" if self._stopped else self.source.problem
         told = (
             cache_note(),
@@ -322,6 +323,7 @@ class _Run:
             has_task=bool(mind.tasks),
             stopped=self._stopped,
             seconds=mind.time,
+            delivered=self._sinks.delivered,
         )
         if self._recorder is None:
             return result
@@ -367,15 +369,11 @@ def _told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[st
     )
 
 
-class _SeverityMonitor:
-    """Whether anything grave was told, for runs without a task."""
+class _VerdictMonitor:
+    """What comes of the events of a run without a task."""
 
-    def __init__(self, grave: bool) -> None:
-        self._grave = grave
+    def __init__(self, verdict: Verdict | None) -> None:
+        self.verdict = verdict
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        self._grave |= any(e.severity >= Severity.WARNING for e in step.events)
-
-    @property
-    def verdict(self) -> Verdict | None:
-        return Verdict.INTERRUPTED if self._grave else None
+        self.verdict = verdict_without_task(grave_kinds(step.events), self.verdict)

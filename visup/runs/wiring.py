@@ -6,9 +6,10 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from visup.agent import Behaviour, Contract, Mind, Severity, Verdict, Zone
+from visup.agent import Behaviour, Contract, Mind, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
@@ -190,15 +191,14 @@ def _cast(tasks: Sequence[Task]) -> dict[str, tuple[str, ...]]:
 def final_verdict(mind: Mind) -> Verdict:
     """The verdict of a run that is over.
 
-    With tasks it is the gravest of those that were seen to go on, unknown when none was; without, a
-    warning that is still open interrupts.
+    With tasks it is the gravest of those that were seen to go on, unknown when none was; without, what
+    comes of the alerts that are still open.
     """
     if mind.tasks:
         verdicts = [finish(t) for t in mind.tasks]
         seen = [v for v in verdicts if v is not Verdict.UNKNOWN]
         return max(seen or verdicts, key=_GRAVITY.index)
-    grave = any(a.severity >= Severity.WARNING for a in mind.alerts)
-    return Verdict.INTERRUPTED if grave else Verdict.SUCCEEDED
+    return verdict_without_task(grave_kinds(mind.alerts)) or Verdict.SUCCEEDED
 
 
 _GRAVITY = (

@@ -12,6 +12,7 @@ from queue import Empty, Full, Queue
 from typing import Any, Protocol
 
 from visup.agent import AlertCondition, Severity
+from visup.agent.cycle.own_troubles import SINK_FAILED
 
 MOST_WAITING = 1000
 CLOSING_S = 5.0
@@ -82,13 +83,14 @@ class Outbox:
         if not (self.dropped or self.failed):
             return None
         why = f": {self.fault}" if self.fault else ""
-        return f"sink {self.sink.name}: {self.failed} records failed, {self.dropped} dropped{why}"
+        counts = f"{self.failed} failed, {self.dropped} dropped"
+        return f"Not all could be delivered to the sink {self.sink.name}: {counts}{why}"
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with the sink now."""
         if self.fault or self.dropped:
             yield AlertCondition(
-                "sink_failed",
+                SINK_FAILED,
                 (),
                 Severity.WARNING,
                 f"The sink '{self.sink.name}' does not accept everything that is sent to it.",

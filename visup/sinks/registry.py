@@ -51,7 +51,8 @@ class Sinks:
     def __init__(self, wanted: Sequence[str], source: str) -> None:
         made = [open_sink(w) for w in wanted]
         self.outboxes = [Outbox(s, _room(s)) for s in made]
-        self._alerts = AlertSender([o for o in self.outboxes if _kind(o) not in _OF_STEPS], source)
+        self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
+        self._alerts = AlertSender(self._of_alerts, source)
         self._observers: list[Observer] = [
             _sender(o, _OF_STEPS[_kind(o)]) for o in self.outboxes if _kind(o) in _OF_STEPS
         ]
@@ -75,6 +76,11 @@ class Sinks:
         self._alerts.end(verdict, steps)
         self.close()
         return tuple(o.note for o in self.outboxes if o.note)
+
+    @property
+    def delivered(self) -> bool:
+        """Whether every sink for alerts took all; those of whole steps may miss some."""
+        return not any(o.note for o in self._of_alerts)
 
     def close(self) -> None:
         """Close all sinks; once is enough."""

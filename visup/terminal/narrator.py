@@ -96,7 +96,7 @@ def verdict_line(verdict: Verdict | None, *, has_task: bool = True, part: str = 
     """The verdict as a line of rich markup.
 
     Args:
-        verdict: None stands for a run without a task in which nothing grave was told.
+        verdict: None stands for a run without a task, watched whole, in which nothing grave was seen.
         has_task: Whether there was a task to judge.
         part: What was seen, where that is not the whole source: ` in the first 2.0 s`.
     """
@@ -105,6 +105,9 @@ def verdict_line(verdict: Verdict | None, *, has_task: bool = True, part: str = 
             f"Verdict: [bold green]nothing unsafe was seen[/bold green]{part} (no task was given)"
         )
     style = VERDICT_STYLE[verdict]
+    if not has_task and verdict is Verdict.UNKNOWN:
+        unsure = f"[{style}]but not all could be watched[/{style}]"
+        return f"Verdict: nothing unsafe was seen{part}, {unsure} (no task was given)"
     if not has_task:
         return f"Verdict: [{style}]something grave was seen[/{style}]{part} (no task was given)"
     return f"Verdict: [{style}]{verdict.value}[/{style}]{part} ({VERDICT_TEXT[verdict]})"

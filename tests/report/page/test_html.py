@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.scene import TOLD, run
-from visup.agent import Event, Severity, Verdict
+from visup.agent import Alert, Event, Severity, Verdict
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report.collector import Collector
 from visup.report.page.distance_figures import distance_figures, fitted_lines
@@ -347,6 +347,17 @@ def test_a_run_that_was_not_judged_claims_nothing() -> None:
     assert verdict_words(replace(judged, verdict=None))[0] == "No verdict"
     quiet = replace(judged, verdict=None, tasks=(), alerts=())
     assert verdict_words(quiet)[0] == "Nothing to report"
+
+
+def test_a_report_without_a_task_tells_own_troubles_from_what_was_seen() -> None:
+    alert = Alert(1, "sink_failed", Severity.WARNING, 1.0, 1.0, (), "The sink fails.")
+    run = replace(data(), tasks=(), alerts=(alert,), verdict=None)
+    assert verdict_words(run)[0] == "Nothing to report"
+    seen = replace(run, verdict=Verdict.INTERRUPTED)
+    assert verdict_words(seen)[1].endswith("something grave was seen.")
+    unsure = verdict_words(replace(run, verdict=Verdict.UNKNOWN))[1]
+    assert "task could not" not in unsure
+    assert unsure.endswith("not all could be watched.")
 
 
 def test_the_summary_is_made_of_sentences() -> None:

@@ -76,6 +76,7 @@ RULES = [
     'rule r(a, b): INFO\n when touching(a, b)\n say "{a}"',
     'rule r(a, b): info\n when touching(a, b);\n say "{a}"',
     'rule r-1(a, b): info\n when touching(a, b)\n say "{a}"',
+    'rule sink_failed(a, b): info\n when touching(a, b)\n say "{a}"',
 ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
+from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.report.records import KeyFrame, ReportedObject, RunData, StateSpan
 
@@ -17,7 +18,17 @@ VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {
         "The task was still under way at the end, and nothing was wrong.",
     ),
     Verdict.UNKNOWN: ("Unknown", "The task could not be followed."),
+}
+WITHOUT_TASK: dict[Verdict | None, tuple[str, str]] = {
     None: ("Nothing to report", "There was no task to judge, and nothing grave was seen."),
+    Verdict.INTERRUPTED: (
+        "Something grave",
+        "There was no task to judge, but something grave was seen.",
+    ),
+    Verdict.UNKNOWN: (
+        "Not watched whole",
+        "There was no task to judge, and nothing grave was seen, but not all could be watched.",
+    ),
 }
 SEVERITY_WORDS = {
     Severity.INFO: "info",
@@ -30,10 +41,11 @@ MOST_NAMED = 4
 
 def verdict_words(run: RunData) -> tuple[str, str]:
     """The verdict in a word, and what it means."""
-    grave = any(a.severity > Severity.INFO for a in run.alerts)
-    if run.verdict is None and (run.tasks or grave or not run.frames):
+    judged = run.verdict or verdict_without_task(grave_kinds(run.alerts))
+    if run.verdict is None and (run.tasks or judged or not run.frames):
         return "No verdict", "The run was not judged."
-    return VERDICT_WORDS[run.verdict]
+    words = VERDICT_WORDS if run.tasks else VERDICT_WORDS | WITHOUT_TASK
+    return words[run.verdict]
 
 
 def title_of(run: RunData) -> str:

@@ -21,6 +21,7 @@ from visup.agent import (
     TaskBelief,
     Truth,
 )
+from visup.agent.cycle.own_troubles import BEHAVIOUR_FAILED
 from visup.agent.model.errors import SettingsError
 from visup.rules.coupling.evidence import COUPLING
 from visup.rules.safety.queries import explain
@@ -125,7 +126,7 @@ class ReasonFinder:
             failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
             if failing:  # which tell of their actors
                 return Why("because", (*stated, *failing))
-        if kind == "behaviour_failed":
+        if kind == BEHAVIOUR_FAILED:
             stated += self._failed()
         return Why("because", (*stated, *self._objects(event.objects)))
 
