@@ -54,8 +54,8 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
                 "traffic",
                 "a road, a yard or a square, seen by a fixed camera",
                 _MEETING | {"excessive_spin", "doubtful_object"},
-                "outlines of vehicles and people that pass each other meet all the time, which means nothing; "
-                "zones that must stay empty, and the camera itself, are still watched",
+                "outlines of vehicles and people that pass each other meet all the time, which means "
+                "nothing; zones that must stay empty, and the camera itself, are still watched",
                 ObjectSettings(forget_left_s=5.0, forget_hidden_s=60.0, forget_nameless_s=5.0),
                 "whoever has left does not come back; the next one is somebody else",
                 15.0,
