@@ -256,16 +256,17 @@ class Advance:
                 found[ending.stage] = ending
         return tuple(found.values())
 
-    def _followed(self, transition: OpenTransition) -> float | None:
-        """Since when what a transition enters is seen, if it is."""
+    def _followed(self, transition: OpenTransition) -> tuple[float, ...]:
+        """Since when what a transition enters is seen, of all that is."""
         seen = (self.observe(s) for s in transition.entered)
-        since = [r.since for o in seen if (r := o.helps or o.entry) is not None]
-        return min(since, default=None)
+        return tuple(r.since for o in seen if (r := o.helps or o.entry) is not None)
 
-    def _ending(self, leaf: Leaf[StepMonitor], followed: float | None) -> StageBelief:
+    def _ending(self, leaf: Leaf[StepMonitor], followed: Sequence[float]) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
         meaning = self.steps.actions[leaf.step.action]
-        status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed)
+        contrary = self.observe(leaf.step).contrary
+        denied = None if contrary is None else contrary.since
+        status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed, denied)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
 

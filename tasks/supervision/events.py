@@ -51,10 +51,11 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
     if not changed and now.verdict is before.verdict:
         return
     mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
-    first = is_first(before.stages)
+    first, done = is_first(before.stages), done_stages(before)
     for stage in changed:
         for kind in _kinds(was.get(stage.stage), stage):
-            event = _stage_event(kind, stage, now, mind)
+            undone = stage.stage in done and stage.status in BAD
+            event = _stage_event(kind, stage, now, mind, undone)
             if first and kind == "stage_started" and event.objects:
                 event = replace(event, text=_introduction(stage, now, mind))
             if kind == "stage_started":
@@ -164,13 +165,15 @@ def _worth_telling(was: Verdict, now: Verdict) -> bool:
     return not (was is Verdict.UNKNOWN and now is Verdict.IN_PROGRESS)
 
 
-def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) -> Event:
+def _stage_event(
+    kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind, undone: bool
+) -> Event:
     bad = kind in ("stage_failing", "stage_failed") and belief.verdict is not Verdict.INTERRUPTED
     return Event(
         kind,
         mind.time,
         mind.frame_index,
-        stage_sentence(kind, stage.stage, belief.task, stage.evidence),
+        stage_sentence(kind, stage.stage, belief.task, stage.evidence, undone),
         _objects(belief),
         stage.confidence,
         Severity.WARNING if bad else Severity.INFO,

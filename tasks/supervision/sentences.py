@@ -64,7 +64,8 @@ def outcome(
     meaning: ActionDefinition,
     monitor: StepMonitor,
     now: float,
-    followed: float | None = None,
+    followed: Sequence[float] = (),
+    denied: float | None = None,
 ) -> tuple[Status, str]:
     """How a step that has been left ended, and why.
 
@@ -73,8 +74,9 @@ def outcome(
         meaning: Its action.
         monitor: What is kept about it.
         now: Seconds.
-        followed: Since when what comes next has been seen, where that is told: what goes on until then is not
-            told to have gone on for longer.
+        followed: Since when each thing that comes next has been seen: what goes on until then is not told to
+            have gone on for longer.
+        denied: Since when something is seen that says that the action does not hold, or None.
 
     Returns:
         DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
@@ -93,7 +95,7 @@ def outcome(
     if meaning.lasts and monitor.begun is None:
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
     if meaning.lasts or monitor.held:
-        return Status.DONE, f"{who} {_held(step, meaning, monitor, now, followed)}"
+        return Status.DONE, f"{who} {_held(step, meaning, monitor, now, followed, denied)}"
     if monitor.broken_since is not None:
         return Status.FAILED, f"{who} should be {meaning.text}, and {was} not"
     return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"
@@ -104,18 +106,21 @@ def _held(
     meaning: ActionDefinition,
     monitor: StepMonitor,
     now: float,
-    followed: float | None,
+    followed: Sequence[float],
+    denied: float | None,
 ) -> str:
     """From or until when a step that is done was what it should be."""
     was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
     if not meaning.lasts and monitor.held_s > 0.0:
         since = max(0.0, now - monitor.held_s, monitor.helped_since or 0.0)
+        if denied is not None and denied > since:
+            return f"{was} {meaning.text} until {denied:.1f} s"
         return f"{have} been {meaning.text} since {since:.1f} s"
     over = now if monitor.helped_at is None else monitor.helped_at
     if not meaning.lasts and monitor.broken_since is not None:
         over = monitor.broken_since
-    if followed is not None and (monitor.begun is None or followed > monitor.begun):
-        over = min(over, followed)
+    after = (since for since in followed if monitor.begun is None or since > monitor.begun)
+    over = min((over, *after))
     return f"{was} {meaning.text} until {over:.1f} s"
 
 
@@ -145,9 +150,10 @@ def _late(step: TaskStep, now: float) -> str:
     )
 
 
-def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
-    """The sentence of an event of a stage."""
-    return f"{STAGE_WORDS[kind].format(stage=stage, task=task)}: {why}."
+def stage_sentence(kind: str, stage: str, task: str, why: str, undone: bool = False) -> str:
+    """The sentence of an event of a stage; `undone` when it was told complete, and is not."""
+    said = UNDONE if undone else STAGE_WORDS[kind]
+    return f"{said.format(stage=stage, task=task)}: {why}."
 
 
 def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
@@ -158,6 +164,9 @@ def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
 
 
 Words = Mapping[str, ActionDefinition]
+
+UNDONE = "Stage `{stage}` is no longer complete"
+"""Of a stage that was told complete and is failing, or has failed."""
 
 STAGE_WORDS = {
     "stage_started": "Stage `{stage}` of task `{task}` has begun",

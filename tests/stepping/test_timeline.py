@@ -167,7 +167,7 @@ def test_the_end_is_told_and_the_beginning_can_be_reached() -> None:
         it.back()
     with pytest.raises(SettingsError, match="there is no step 9"):
         it.go(9)
-    assert it.at == 4
+    assert it.at == 0
 
 
 def test_an_answer_stays_when_going_back_over_it() -> None:
@@ -198,6 +198,9 @@ def test_a_time_can_be_gone_to() -> None:
     for seconds, frame in ((2.0, 20), (0.45, 5), (0.0, 0), (3.3, 33)):
         it.go_to_time(seconds)
         assert it.mind.frame_index == frame
+    with pytest.raises(SettingsError, match="the source ends before 99 s"):
+        it.go_to_time(99.0)
+    assert it.mind.frame_index == 33
 
 
 def test_what_the_journal_cannot_hold_is_kept_as_it_is() -> None:

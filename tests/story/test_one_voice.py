@@ -1,8 +1,6 @@
-"""One voice: what is told together agrees, on the shared missions with percepts that are often wrong."""
+"""One voice: what is told together agrees, on shared missions with percepts often wrong, and on worlds."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import pytest
 
@@ -15,44 +13,34 @@ from tests.story.voice import (
     nothing_is_told_twice_at_once,
     prospects_agree_with_the_verdict,
     times_that_are_told_exclude_each_other_rightly,
-    told_of,
     what_is_done_is_not_failing,
     who_has_left_does_nothing,
 )
+from tests.story.watched import told_of_mission, told_of_world
 from visup.agent import Event, Mind, Observation, Severity, TaskBelief, Verdict
-from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import Prospect, StageBelief, Status
-from visup.evaluation.simulation.percepts import PerceptNoise, behaviours_of, frames_of
-from visup.evaluation.simulation.truth_masks import load_mission
-from visup.rules.reasoners import default_reasoners
-from visup.tasks import load_task
-from visup.tasks.supervision.supervise import task_reasoner
+from visup.evaluation.simulation.percepts import PerceptNoise
 
-MISSIONS = SHARED / "missions"
+MISSIONS, WORLDS = SHARED / "missions", SHARED / "worlds"
 EVERY = 6
 NOISE = PerceptNoise(seed=47, wrong=0.35)
 """Names are a little more often wrong than `visup eval reasoning` has them."""
 
 
-def seen(folder: Path, noise: PerceptNoise) -> Told:
-    """What is told of a mission on percepts made from its truth."""
-    mission = load_mission(folder)
-    behaviours, _ = behaviours_of(mission, noise)
-    rules = default_reasoners()
-    task = task_reasoner([load_task("dock")])
-    agent = Agent(
-        behaviours=behaviours,
-        reasoners=Reasoners(rules.update, rules.cogitate, (task,)),
-        actors={a: (m,) for a, m in mission.description["actors"].items()},
-    )
-    return told_of(agent.steps(frames_of(mission, every=EVERY)))
-
-
 @pytest.mark.skipif(not MISSIONS.is_dir(), reason="the shared missions are not beside the repo")
 @pytest.mark.parametrize("name", [p.name for p in sorted(MISSIONS.glob("*")) if p.is_dir()])
 def test_what_is_told_of_a_mission_agrees_with_itself(name: str) -> None:
-    told = seen(MISSIONS / name, NOISE)
+    told = told_of_mission(MISSIONS / name, NOISE, EVERY)
+    assert any(line.kind == "stage_started" for line in told.lines)
+    assert breaches(told) == []
+
+
+@pytest.mark.skipif(not WORLDS.is_dir(), reason="the shared worlds are not beside the repo")
+@pytest.mark.parametrize("name", ["pick_ok", "drone_touch"])
+def test_what_is_told_of_a_world_agrees_with_itself(name: str) -> None:
+    """Two of them; `python -m tests.story` looks at all, and at clips of machines."""
+    told = told_of_world(WORLDS / name, every=2)
     assert any(line.kind == "stage_started" for line in told.lines)
     assert breaches(told) == []
 

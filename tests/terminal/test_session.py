@@ -50,6 +50,26 @@ def test_commands_move_the_agent(commands: list[str], frame: int) -> None:
     assert it.agent.mind.frame_index == frame
 
 
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("back x", "back [N]"),
+        ("back -1", "back [N]"),
+        ("back 9999", "there are no 9999 steps to go back\n  expected: at most 5"),
+        ("go 99", "there is no step 99\n  expected: at most 30"),
+        ("go 99s", "the source ends before 99 s\n  expected: at most 2.90 s"),
+        ("go -5", "go PLACE"),
+        ("events x", "events [N]"),
+        ("relations x", "relations [ID]"),
+    ],
+)
+def test_what_is_refused_leaves_the_session_where_it_was(command: str, told: str) -> None:
+    it, out = session()
+    assert it.run(["step 5", command]) == 2
+    assert told in out.getvalue()
+    assert it.agent.mind.frame_index == 4
+
+
 def test_every_command_answers_before_and_after_the_first_step() -> None:
     it, out = session()
     looks = [w for w in it.words() if w not in ("until", "quit", "run", "step")]

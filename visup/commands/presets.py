@@ -19,8 +19,8 @@ def presets() -> None:
         echo(f"{preset.name}: {preset.about}")
         echo(f"  rules   {without}: {preset.rules_because}")
         echo(
-            f"  memory  what has left {objects.forget_left_s:g} s, what is hidden "
-            f"{objects.forget_nameless_s:g} s (when it is known what it is {objects.forget_hidden_s:g} s): "
+            f"  memory  an object that left is forgotten after {objects.forget_left_s:g} s, a hidden one "
+            f"after {objects.forget_nameless_s:g} s ({objects.forget_hidden_s:g} s once it is identified): "
             f"{preset.memory_because}"
         )
         echo(f"  pace    {pace}: {preset.pace_because}")

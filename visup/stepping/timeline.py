@@ -164,15 +164,17 @@ class Timeline:
         """Be after step `number`; later ones are made if need be, and breakpoints are not looked at.
 
         Raises:
-            SettingsError: There is no such step.
+            SettingsError: There is no such step; the place stays.
         """
         if number < self.begin:
             raise SettingsError(
                 f"there is no step {number}", expected=f"at least {self.begin}, where this began"
             )
+        place = self.snapshot()
         self._arrive(self._history.go(min(number, self.made)))
         while self.at < number:
             if self._cycle(frozenset()) is None:
+                self.restore(place)
                 raise SettingsError(f"there is no step {number}", expected=f"at most {self.made}")
         self._look_again()
         return self._last
@@ -181,14 +183,21 @@ class Timeline:
         """Be after the first step that is not before a time; later ones are made if need be.
 
         Raises:
-            SettingsError: The source ends before.
+            SettingsError: The source ends before; the place stays.
         """
+        before = self.snapshot()
         made = range(self.begin + 1, self.made + 1)
         place = bisect_left(made, seconds, key=lambda n: self.observation_at(n).time)
-        step = self.go(made[place] if place < len(made) else self.made)
+        self.go(made[place] if place < len(made) else self.made)
         while self.mind.time < seconds or self.at == self.begin:
-            step = self.go(self.at + 1)
-        return step
+            if self._cycle(frozenset()) is None:
+                end = self.mind.time
+                self.restore(before)
+                raise SettingsError(
+                    f"the source ends before {seconds:g} s", expected=f"at most {end:.2f} s"
+                )
+        self._look_again()
+        return self._last
 
     def snapshot(self) -> Bookmark:
         """This place, to come back to with `restore`; a few references, no copy."""

@@ -182,8 +182,10 @@ class Session:
         return "".join(told)
 
     def _back(self, words: Sequence[str]) -> Answer:
-        count = number_in(words)
-        self.stepper.back(1 if count is None else count)
+        count = number_in(words) if words else 1
+        if count is None:
+            return refusal(usage("back"))
+        self.stepper.back(count)
         return self._place()
 
     def _go(self, words: Sequence[str]) -> Answer:

@@ -102,12 +102,21 @@ def _candidates(stepper: Stepper, words: Words) -> RenderableType:
 
 
 def _events(stepper: Stepper, words: Words) -> RenderableType:
-    most = number_in(words) or 10
+    most = number_in(words) if words else 10
+    if not most:
+        return refusal(usage("events"))
     latest = list(stepper.told(last=stepper.at))[-most:]
     rows = Table.grid(padding=(0, 1))
     for number, event in latest:
         rows.add_row(Text(f"step {number}", style="dim"), event_row(event))
     return rows if latest else Text("none yet")
+
+
+def _relations(stepper: Stepper, words: Words) -> RenderableType:
+    number = number_in(words)
+    if words and number is None:
+        return refusal(usage("relations"))
+    return relations_table(stepper.mind.relations, number)
 
 
 def _directives(stepper: Stepper, words: Words) -> RenderableType:
@@ -125,9 +134,7 @@ VIEWS: Mapping[str, View] = MappingProxyType(
         "objects": lambda stepper, _: objects_table(stepper.mind.objects.values()),
         "candidates": _candidates,
         "questions": lambda stepper, _: questions_list(stepper.mind.questions),
-        "relations": lambda stepper, words: relations_table(
-            stepper.mind.relations, number_in(words)
-        ),
+        "relations": _relations,
         "tasks": lambda stepper, _: tasks_tree(stepper.mind),
         "alerts": lambda stepper, _: alerts_list(stepper.mind.alerts),
         "events": _events,

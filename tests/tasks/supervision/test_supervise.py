@@ -73,6 +73,18 @@ def test_capture_succeeds() -> None:
     assert task_of(played, 10.0).verdict is Verdict.IN_PROGRESS
 
 
+def test_what_was_told_complete_and_is_not_is_told_so() -> None:
+    let_go = Spell("coupled", 13.0, 15.0), Spell("moving_together", 12.6, 15.0)
+    played = watch(
+        Script(
+            (*SUCCEEDS[:1], Spell("touching", 12.0, 15.0), *let_go, Spell("diverging", 15.0, 30))
+        ),
+        18.0,
+    )
+    told = [e.text.partition(":")[0] for e in played.events if e.data.get("stage") == "captured"]
+    assert told[-2:] == ["Stage `captured` is complete", "Stage `captured` is no longer complete"]
+
+
 def test_an_aborted_approach_fails_and_never_comes_to_capture() -> None:
     played = watch(Script(ABORTED), 24.0)
     assert status(played, "captured") is Status.PENDING
