@@ -12,12 +12,17 @@ from importlib import import_module
 from typing import Any
 
 
-def lazy_names(package: str, homes: Mapping[str, tuple[str, ...]]) -> Callable[[str], Any]:
+def lazy_names(
+    package: str,
+    homes: Mapping[str, tuple[str, ...]],
+    before: Callable[[str], object] | None = None,
+) -> Callable[[str], Any]:
     """A package's `__getattr__` (PEP 562).
 
     Args:
         package: Name of the package.
         homes: For each module the names that are found there; `Name as Other` gives one another name.
+        before: Called with the name of a module before that is imported.
 
     Returns:
         What gives a name's object and keeps it in the package; a name without a home is an AttributeError.
@@ -32,6 +37,8 @@ def lazy_names(package: str, homes: Mapping[str, tuple[str, ...]]) -> Callable[[
         if name not in home_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module, there = home_of[name]
+        if before is not None:
+            before(module)
         found = getattr(import_module(module), there)
         setattr(sys.modules[package], name, found)
         return found

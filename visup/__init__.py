@@ -95,7 +95,18 @@ _HOMES = {
     "visup.teaching": ("learn", "teach"),
     "visup.version": ("__version__",),
 }
-__getattr__ = lazy_names(__name__, _HOMES)
+
+
+def _check_room(module: str) -> None:
+    """A process without memory for the libraries is told so before they are loaded."""
+    if module not in _LIGHT:
+        from visup.agent.memory_limit import check_memory
+
+        check_memory()
+
+
+_LIGHT = frozenset({"visup.agent", "visup.version"})
+__getattr__ = lazy_names(__name__, _HOMES, _check_room)
 
 
 def __dir__() -> list[str]:

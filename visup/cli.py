@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from visup.agent.model.errors import SettingsError, VisupError
+from visup.agent.memory_limit import check_memory
+from visup.agent.model.errors import VisupError
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.check import check
 from visup.commands.debug import app as debug_app
@@ -29,11 +30,6 @@ from visup.terminal.console import complain, echo
 from visup.terminal.overview import Overview
 
 BAD_INPUT = 2
-
-LEAST_MEMORY_MB = 1200
-MEMORY_A_CORE_MB = 100
-"""Address space that libraries take when they are loaded: measured with 2 cores at 1.2 GB; each core has
-threads, which have stacks."""
 
 # Small matrices are many here: threads of the linear algebra library cost more than they bring.
 # Set before NumPy is imported; whoever set it otherwise is obeyed.
@@ -88,7 +84,7 @@ def main() -> None:
     """Run the command; every error that is the user's to mend is one message and exit code 2."""
     try:
         if not {"-h", "--help", "--version"} & set(sys.argv):
-            _check_memory()
+            check_memory()
         app()
     except VisupError as error:
         complain(str(error))
@@ -97,27 +93,6 @@ def main() -> None:
         # The reader (such as `head`) went away; nothing more can be said to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
-
-
-def _check_memory() -> None:
-    """Libraries that cannot have the memory that they take end the program without a word.
-
-    Raises:
-        SettingsError: A limit is set (`ulimit -v`), and it is too low.
-    """
-    try:
-        import resource
-
-        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    except (ImportError, OSError):
-        return
-    least = LEAST_MEMORY_MB + MEMORY_A_CORE_MB * (os.cpu_count() or 1)
-    if limit != resource.RLIM_INFINITY and limit < least * 2**20:
-        raise SettingsError(
-            f"this process may use {limit >> 20} MB of memory, which visup cannot work with",
-            expected=f"{least} MB or more",
-            hint="raise the limit: ulimit -v unlimited",
-        )
 
 
 if __name__ == "__main__":

@@ -260,11 +260,26 @@ def bare(requirement: str) -> str:
     return re.split(r"[\[>=]", requirement)[0]
 
 
-@pytest.mark.parametrize("megabytes", [400, 800, 1200])
-def test_too_little_memory_is_told_and_not_died_of(megabytes: int, tmp_path: Path) -> None:
+ASKED_FROM_PYTHON = """
+import visup
+try:
+    visup.watch("clip.mp4")
+except visup.VisupError as error:
+    raise SystemExit(f"error: {error}")
+"""
+
+
+@pytest.mark.parametrize("megabytes", [400, 600, 800, 1200])
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [(("-m", "visup.cli", "watch", "clip.mp4"), 2), (("-c", ASKED_FROM_PYTHON), 1)],
+)
+def test_too_little_memory_is_told_and_not_died_of(
+    words: tuple[str, ...], code: int, megabytes: int, tmp_path: Path
+) -> None:
     resource = pytest.importorskip("resource", reason="this system has no limits of memory")
     done = subprocess.run(
-        [sys.executable, "-m", "visup.cli", "watch", "clip.mp4"],
+        [sys.executable, *words],
         capture_output=True,
         text=True,
         check=False,
@@ -274,6 +289,6 @@ def test_too_little_memory_is_told_and_not_died_of(megabytes: int, tmp_path: Pat
             resource.RLIMIT_AS, (megabytes << 20, megabytes << 20)
         ),
     )
-    assert done.returncode == 2, done.stderr
+    assert done.returncode == code, done.stderr
     assert "memory" in done.stderr
     assert "Traceback" not in done.stderr
