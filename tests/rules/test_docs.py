@@ -86,7 +86,7 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
         ("seen steadily: for {} s", PresenceSettings().entry_s),
         ("out of sight for {:g} s and nothing", PresenceSettings().lost_s),
         ("measured over the last {} s", ReasonerSettings().coupling.window_s),
-        ("0.0125 D/s), and their logarithms are added up until they reach {:g}", ReasonerSettings().coupling.odds),
+        ("their logarithms are added up until they reach {:g}", ReasonerSettings().coupling.odds),
         ("came together in the {:g} s before", ReasonerSettings().coupling.approach_s),
         ("apart for {} s", ReasonerSettings().coupling.part_s),
         ("tau is {:g} s", ReasonerSettings().votes.tau_s),
