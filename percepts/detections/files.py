@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path, PurePath
 from typing import Any
 
 from visup.agent.model.errors import SettingsError
@@ -28,19 +29,25 @@ Frames = Mapping[int, tuple[Detection, ...]]
 """Index of a frame, from 0 -> its boxes."""
 
 
-def read_detections(path: Path) -> Frames:
+def read_detections(path: Path, images: Sequence[str] = ()) -> Frames:
     """The boxes of a file, by frame.
 
     Boxes are numbered by the tracker that wrote them, or have no number (0) each.
 
+    Args:
+        path: The file.
+        images: Names of the images that are watched, in order, where the source is a folder of images: those
+            of a COCO file are then known by their names.
+
     Raises:
-        SettingsError: It cannot be read, is of neither form, or some of its boxes have numbers and some not.
+        SettingsError: It cannot be read, is of neither form, tells of images that the source does not
+            have, or some of its boxes have numbers and some not.
     """
     try:
         text = read_text_file(path, MOST_BYTES)
         is_coco = text.lstrip().startswith("{")
         check_room(text.encode(), *((MOST_COCO_VALUES,) if is_coco else (MOST_MOT_LINES, b"\n")))
-        rows = _coco(json.loads(text)) if is_coco else _mot(text)
+        rows = _coco(json.loads(text), images) if is_coco else _mot(text)
         found: dict[int, list[Detection]] = {}
         for frame, detection in rows:
             _check(frame, detection)
@@ -86,13 +93,37 @@ def _mot(text: str) -> Iterator[tuple[int, Detection]]:
         yield int(float(cells[0])) - 1, Detection(track, (x, y, w, h), sure)
 
 
-def _coco(told: Any) -> Iterator[tuple[int, Detection]]:
+def _coco(told: Any, images: Sequence[str]) -> Iterator[tuple[int, Detection]]:
     names = {c["id"]: str(c["name"]) for c in told.get("categories", ())}
-    # Images are frames in the order of their ids, whatever these are.
-    order = {n: k for k, n in enumerate(sorted(i["id"] for i in told["images"]))}
+    order = _coco_frames({i["id"]: str(i.get("file_name", "")) for i in told["images"]}, images)
     for row in told["annotations"]:
         x, y, w, h = (float(v) for v in row["bbox"])
         score = min(1.0, max(0.0, float(row.get("score", 1.0))))
         name = names.get(row.get("category_id"))
         track = max(0, int(row.get("track_id", 0)))
         yield order[row["image_id"]], Detection(track, (x, y, w, h), score, name)
+
+
+def _coco_frames(files: Mapping[Any, str], images: Sequence[str]) -> Mapping[Any, int]:
+    """Which frame each image of a COCO file is.
+
+    By its frame number where visup wrote it (`clip.mp4#12`); else by its name, where images are watched; else
+    by its place in the order of ids, whatever these are.
+
+    Args:
+        files: Id of an image -> its file name, empty where there is none.
+        images: Names of the images that are watched, in order; none where a video is.
+
+    Raises:
+        ValueError: An image is none of those that are watched.
+    """
+    numbers = {n: re.search(r"#(\d+)$", file) for n, file in files.items()}
+    if all(numbers.values()):
+        return {n: int(m[1]) for n, m in numbers.items() if m}
+    if not (images and all(files.values())):
+        return {n: k for k, n in enumerate(sorted(files))}
+    index = {PurePath(name).stem: k for k, name in enumerate(images)}
+    for file in files.values():
+        if PurePath(file).stem not in index:
+            raise ValueError(f"the image '{file}' is none of those that are watched")
+    return {n: index[PurePath(file).stem] for n, file in files.items()}

@@ -180,6 +180,13 @@ def images_in(folder: Path) -> list[Path]:
     return sorted(found, key=lambda p: (natural_key(p.name), p.name))
 
 
+def image_names(source: str) -> tuple[str, ...]:
+    """Names of the images of a source, in order; none where it is no folder of images."""
+    if not Path(source).is_dir():
+        return ()
+    return tuple(p.name for p in _find_images(Path(source))[1])
+
+
 def open_folder(folder: Path, *, every: int = 1, fps: float | None = None) -> ImageFolder:
     """Open a folder of images, or a sequence folder that holds one (MOT, DAVIS).
 

@@ -35,7 +35,7 @@ CODES = {
     "E130": "an include without a file name in quotes",
     "E131": "a zone whose corners are not right",
     "E132": "a parameter that is not complete",
-    "E133": "`when` without a condition, or a sign without `when`",
+    "E133": "`when` without a condition, or a stage condition without `when`",
     "E134": "a number of times that is not complete",
     "E135": "`any order` without its list",
     "E136": "a floor whose points are not right",

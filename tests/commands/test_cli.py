@@ -242,7 +242,13 @@ def test_the_doctor_tells_what_this_machine_can_do() -> None:
     head, *rows = speeds(frames=6)
     assert "Frames a second" in head
     assert len(rows) == 2 + len(PRESETS)
-    assert all(float(row.split(",")[0].split()[-1]) > 0 for row in rows)
+    found = [
+        re.search(r"([\d.]+) of +([\d.]+) that it asks for: (keeps|drops)", row) for row in rows
+    ]
+    figures = [(float(m[1]), float(m[2]), m[3]) for m in found if m]
+    assert len(figures) == len(rows)
+    assert all((looked >= wanted) == (word == "keeps") for looked, wanted, word in figures)
+    assert [wanted for _, wanted, _ in figures] == [25.0, 25.0, 25.0, 25.0, 12.5, 25.0]
 
 
 def test_the_doctor_knows_what_visup_depends_on() -> None:

@@ -26,6 +26,14 @@ def test_a_task_without_models_is_refused_before_the_first_frame(
     assert not list((tmp_path / "runs").iterdir())
 
 
+def test_a_sink_that_cannot_be_opened_leaves_no_run_behind(
+    visup: Call, clip: Path, tmp_path: Path
+) -> None:
+    words = ["watch", clip, "--no-video", "--quiet", "--out", tmp_path / "run"]
+    assert visup(*words, "--sink", "webhook:").code == 2
+    assert visup(*words).code == 0  # the same folder will do
+
+
 def test_so_is_one_whose_actors_are_none_of_the_models(visup: Call, clip: Path) -> None:
     done = visup("watch", clip, "--task", "inspect", "--models", MODELS)
     assert done.code == 2

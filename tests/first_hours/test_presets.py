@@ -42,7 +42,7 @@ def test_no_preset_looks_at_fewer_frames_than_it_says_it_needs(name: str, fps: f
     preset = PRESETS[name]
     every = preset.every(fps)
     assert every >= 1
-    assert preset.most_fps is None or every == 1 or fps / every >= preset.most_fps - 1e-3
+    assert preset.enough_fps is None or every == 1 or fps / every >= preset.enough_fps - 1e-3
 
 
 def test_the_pace_is_that_of_the_source_unless_it_is_told(tmp_path: Path) -> None:

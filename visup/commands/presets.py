@@ -12,8 +12,8 @@ def presets() -> None:
         objects = preset.objects
         pace = (
             "all frames"
-            if preset.most_fps is None
-            else f"at most {preset.most_fps:g} frames a second"
+            if preset.enough_fps is None
+            else f"at least {preset.enough_fps:g} frames a second, others are left out"
         )
         without = f"all but {', '.join(sorted(preset.without))}" if preset.without else "all"
         echo(f"{preset.name}: {preset.about}")

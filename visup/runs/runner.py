@@ -202,6 +202,9 @@ class _Run:
         self._notes = _told_of_actors(settings.actors, actors)
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
+        # Before the journal: what is refused leaves no run behind.
+        self._sinks = Sinks(options.sinks, settings.source)
+        stack.callback(self._sinks.close)
         self._recorder = (
             Recorder(settings, self.source, folder, options, resume=past is not None)
             if folder
@@ -211,8 +214,6 @@ class _Run:
             stack.callback(self._recorder.close)
         if past:
             past.check_unchanged()  # now that nobody else may write it
-        self._sinks = Sinks(options.sinks, settings.source)
-        stack.callback(self._sinks.close)
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
         self._alarms = _VerdictMonitor(past.verdict if past else None)
         self._pace: RealTimeFrames | None = None

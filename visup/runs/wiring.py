@@ -27,6 +27,7 @@ from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.video import VideoSource, open_source
+from visup.percepts.video.image_folder import image_names
 from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
 from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
@@ -131,7 +132,7 @@ def _boxes(settings: WatchSettings) -> DetectorBehaviour | None:
         return None
     if settings.detections.suffix.lower() == ".onnx":
         return NetworkBehaviour(settings.detections)
-    return DetectionsBehaviour(read_detections(settings.detections))
+    return DetectionsBehaviour(read_detections(settings.detections, image_names(settings.source)))
 
 
 def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:

@@ -21,7 +21,12 @@ from visup.evaluation.motion.mask_scores import (
     overlaps_of,
     region_similarity,
 )
-from visup.evaluation.motion.mot_scores import box_distance, mot_scores, read_truth
+from visup.evaluation.motion.mot_scores import (
+    box_distance,
+    mot_scores,
+    read_truth,
+    truth_of_images,
+)
 from visup.evaluation.motion.runner import evaluate_motion, find_sequences
 
 masks = arrays(bool, (14, 17))
@@ -215,3 +220,25 @@ def test_a_mission_is_scored_by_object(tmp_path: Path) -> None:
     assert set(item["objects"]) == {"satellite"}
     assert item["J_object"] == item["objects"]["satellite"]["J"] > 0.7
     assert item["id_switches"] == 0
+
+
+@pytest.mark.parametrize(
+    ("images", "truth", "places"),
+    [
+        (["000001.jpg", "000002.jpg"], [0, 1], [0, 1]),
+        (["000003.jpg", "000007.jpg"], [6, 2], [1, 0]),
+        (["a.jpg", "b.jpg"], [1], [1]),
+    ],
+)
+def test_truth_of_mot_is_that_of_the_images_of_its_numbers(
+    images: list[str], truth: list[int], places: list[int]
+) -> None:
+    boxes = {frame: {1: (float(frame), 0.0, 1.0, 1.0)} for frame in truth}
+    found = truth_of_images(boxes, [Path(name) for name in images])
+    assert list(found) == places
+    assert list(found.values()) == list(boxes.values())
+
+
+def test_truth_of_mot_without_its_image_is_refused() -> None:
+    with pytest.raises(SourceError, match="there is no image of frame 3"):
+        truth_of_images({2: {}}, [Path("000001.jpg"), Path("000002.jpg")])

@@ -44,6 +44,32 @@ def test_mot_counts_frames_from_one_and_coco_by_the_order_of_its_images(tmp_path
 
 
 @pytest.mark.parametrize(
+    ("files", "frames"),
+    [
+        (["clip.avi#0", "clip.avi#4"], [0, 4]),  # as visup writes them: every fourth frame
+        (["b.png", "a.png"], [1, 0]),
+        (["left/c.jpg"], [2]),  # the truth of one image of three
+        (["", ""], [0, 1]),
+    ],
+)
+def test_images_of_coco_are_known_by_their_names(
+    tmp_path: Path, files: list[str], frames: list[int]
+) -> None:
+    told = {
+        "images": [{"id": n, "file_name": f} for n, f in enumerate(files)],
+        "annotations": [{"image_id": n, "bbox": [1, 2, 3, 4]} for n in range(len(files))],
+    }
+    found = read_detections(written(tmp_path, told), ["a.png", "b.png", "c.png"])
+    assert list(found) == frames
+
+
+def test_an_image_of_coco_that_is_not_watched_is_refused(tmp_path: Path) -> None:
+    told = {"images": [{"id": 1, "file_name": "d.png"}], "annotations": []}
+    with pytest.raises(SettingsError, match=r"'d.png' is none of those that are watched"):
+        read_detections(written(tmp_path, told), ["a.png", "b.png"])
+
+
+@pytest.mark.parametrize(
     ("told", "said"),
     [
         ("1,-1,10,20,30,40,1\n2,3,10,20,30,40,1", "some boxes have the number of a track"),
@@ -100,9 +126,15 @@ def test_velocities_are_those_of_the_boxes() -> None:
 
 def test_what_a_run_exports_can_be_watched_instead_of_seen(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc())
-    visup.watch(clip, out=tmp_path / "run").finish()
+    visup.watch(clip, out=tmp_path / "run", every=2).finish()
     count = export(tmp_path / "run", "coco", tmp_path / "boxes.json")
     assert sum(map(len, read_detections(tmp_path / "boxes.json").values())) == count
+    seen = {
+        o.frame_index
+        for o in visup.open_run(tmp_path / "run").objects
+        if o.presence == "seen" and o.confirmed
+    }
+    assert set(read_detections(tmp_path / "boxes.json")) == seen
     run = visup.watch(clip, detections=tmp_path / "boxes.json", out=tmp_path / "again").finish()
     assert run.result is not None
     assert [o.bbox for o in visup.open_run(tmp_path / "again").objects if o.presence == "seen"]

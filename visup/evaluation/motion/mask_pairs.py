@@ -32,10 +32,10 @@ def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
     names = {f.stem: index for index, f in enumerate(frames)}
     numbers: dict[int, list[int]] = {}
     for index, frame in enumerate(frames):
-        numbers.setdefault(_number(frame), []).append(index)
+        numbers.setdefault(last_number(frame), []).append(index)
     pairs: dict[int, Path] = {}
     for mask in masks:
-        of_number = numbers.get(_number(mask), []) if frames else [_number(mask)]
+        of_number = numbers.get(last_number(mask), []) if frames else [last_number(mask)]
         index = names.get(mask.stem, of_number[0] if len(of_number) == 1 else -1)
         if index < 0 or index in pairs:
             what = "a second truth of a frame" if index in pairs else "the truth of no frame"
@@ -48,7 +48,7 @@ def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
     return pairs
 
 
-def _number(path: Path) -> int:
+def last_number(path: Path) -> int:
     """The last number in a file's name; -1 where there is none."""
     found = _NUMBER.search(path.stem)
     return int(found[1]) if found else -1

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import ExtraMissingError, SourceError
+from visup.evaluation.motion.mask_pairs import last_number
 
 Box = tuple[float, float, float, float]
 Boxes = Mapping[int, Box]
@@ -44,6 +45,34 @@ def read_truth(path: Path) -> dict[int, dict[int, Box]]:
         if len(values) < 7 or values[6] != 0:
             out.setdefault(int(values[0]) - 1, {})[int(values[1])] = (x, y, w, h)
     return out
+
+
+def truth_of_images(
+    truth: Mapping[int, dict[int, Box]], images: Sequence[Path]
+) -> dict[int, dict[int, Box]]:
+    """Truth by the place of each image among those that are watched, where their names have numbers.
+
+    Args:
+        truth: Frame number from 0 -> id -> box.
+        images: The images, in the order in which they are watched.
+
+    Raises:
+        SourceError: The truth tells of a frame of which there is no image.
+    """
+    numbers = [last_number(image) - 1 for image in images]
+    if min(numbers, default=0) < -1 or len(set(numbers)) < len(
+        numbers
+    ):  # names that say nothing: by order
+        numbers = list(range(len(images)))
+    places = {number: place for place, number in enumerate(numbers)}
+    for frame in truth:
+        if frame not in places:
+            raise SourceError(
+                f"there is no image of frame {frame + 1}, of which the truth tells",
+                where=str(images[0].parent) if images else "",
+                expected="an image with the number of each frame, from 1, in its name",
+            )
+    return {places[frame]: boxes for frame, boxes in truth.items()}
 
 
 def box_distance(true: Sequence[Box], seen: Sequence[Box]) -> NDArray[np.float64]:

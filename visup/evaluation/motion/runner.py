@@ -30,12 +30,13 @@ from visup.evaluation.motion.mask_scores import (
     overlaps_of,
     region_similarity,
 )
-from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth
+from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth, truth_of_images
 from visup.evaluation.motion.variants import AS_IT_IS, Variant
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import open_source
+from visup.percepts.video.image_folder import images_in
 
 KEYS = ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
 
@@ -295,7 +296,8 @@ def _scores(sequence: LabelledSequence, tally: SequenceMeasurements) -> dict[str
             out["id_switches"] = sum(s.switches for s in objects.values())
             out["objects"] = {n: {"J": s.j, "id_switches": s.switches} for n, s in objects.items()}
     if sequence.boxes is not None:
-        out |= mot_scores(read_truth(sequence.boxes), tally.boxes)
+        truth = truth_of_images(read_truth(sequence.boxes), images_in(sequence.source / "img1"))
+        out |= mot_scores(truth, tally.boxes)
     out["ms"] = statistics.median(tally.ms)
     if tally.dis_ms:
         out["ratio"] = out["ms"] / statistics.median(tally.dis_ms)

@@ -22,7 +22,8 @@ class Preset:
         rules_because: Why.
         objects: How long things are remembered.
         memory_because: Why so long.
-        most_fps: Frames a second that are looked at at most, or None for all that there are.
+        enough_fps: Of a faster source frames are left out, but no fewer than so many a second are looked at;
+            None for all that there are.
         pace_because: Why so many.
     """
 
@@ -32,7 +33,7 @@ class Preset:
     rules_because: str
     objects: ObjectSettings
     memory_because: str
-    most_fps: float | None
+    enough_fps: float | None
     pace_because: str
 
     def every(self, fps: float) -> int:
@@ -41,7 +42,7 @@ class Preset:
         >>> PRESETS["traffic"].every(30.0), PRESETS["traffic"].every(10.0), PRESETS["cell"].every(60.0)
         (2, 1, 1)
         """
-        return 1 if self.most_fps is None else max(1, int(fps / self.most_fps + 1e-6))
+        return 1 if self.enough_fps is None else max(1, int(fps / self.enough_fps + 1e-6))
 
 
 _MEETING = frozenset({"collision_course", "doubtful_collision", "contact"})
