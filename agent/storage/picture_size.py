@@ -8,10 +8,15 @@ from io import BytesIO
 MOST_PIXELS = 2**26
 """Pixels of a picture or frame, 67 million: twice those of a video of 8K. Beyond, decoding alone takes
 seconds and gigabytes."""
+_AT_MOST = f"visup decodes at most {MOST_PIXELS / 1e6:.0f} million"
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
-    """Width and height of a picture file in pixels, or None where its header cannot be read."""
+    """Width and height of a picture file in pixels, or None where its header cannot be read.
+
+    Raises:
+        ValueError: They are so many that Pillow does not say how many.
+    """
     from PIL import Image
 
     try:
@@ -19,8 +24,8 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(BytesIO(data)) as picture:
                 return picture.size
-    except Image.DecompressionBombError:
-        return 2**31, 2**31
+    except Image.DecompressionBombError as fault:
+        raise ValueError(f"has far too many pixels; {_AT_MOST}") from fault
     except Exception:
         # Pillow raises whatever its readers do; the picture's own decoder has the last word.
         return None
@@ -44,6 +49,4 @@ def check_pixels(width: float, height: float) -> None:
         ValueError: They are too many.
     """
     if width * height > MOST_PIXELS:
-        raise ValueError(
-            f"has {width:.0f}x{height:.0f} pixels; visup decodes at most {MOST_PIXELS / 1e6:.0f} million"
-        )
+        raise ValueError(f"has {width:.0f}x{height:.0f} pixels; {_AT_MOST}")

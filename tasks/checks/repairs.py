@@ -195,6 +195,8 @@ def with_tried_hints(
     return tuple(found)
 
 
+LONGEST_HINT = 400
+"""Characters of a hint: what is longer, nobody reads."""
 NOTHING, IN_PART, WHOLLY = range(3)
 """How much a change helps: not, by what could not be read only, or by a fault and to no new one."""
 
@@ -219,6 +221,8 @@ class _HintTrial:
         """The first hint that helps wholly, else the first that helps in part."""
         partly: str | None = None
         for hint in hints:
+            if len(hint) > LONGEST_HINT:
+                continue
             self.left -= len(self.text)
             if self.left < 0:
                 break

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from visup.agent.model.errors import TaskError
+from visup.agent.model.errors import LONGEST_QUOTE, TaskError
 from visup.rules.language.diagnostics import Source
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import ParsedFile, parse
@@ -55,7 +55,8 @@ class _Joiner:
         try:
             file, text = self.read(include.path, chain[-1])
         except TaskError as e:
-            what = f"`{include.path}` cannot be included: {e.what}"
+            more = "..." if len(include.path) > LONGEST_QUOTE else ""
+            what = f"`{include.path[:LONGEST_QUOTE]}{more}` cannot be included: {e.what}"
             return self.fault("E221", what, include, e.expected, e.hint)
         if file in chain or len(chain) > DEEPEST:
             circle = " includes ".join(
