@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from visup.agent import Status, TaskBelief, Verdict
@@ -119,8 +120,10 @@ def _held(
     over = now if monitor.helped_at is None else monitor.helped_at
     if not meaning.lasts and monitor.broken_since is not None:
         over = monitor.broken_since
-    after = (since for since in followed if monitor.begun is None or since > monitor.begun)
-    over = min((over, *after))
+    # It was so since before that was noticed, which `begun` tells.
+    known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
+    start = min(known, default=-math.inf)
+    over = min((over, *(since for since in followed if since > start)))
     return f"{was} {meaning.text} until {over:.1f} s"
 
 
