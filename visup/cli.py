@@ -30,6 +30,7 @@ from visup.terminal.console import complain, echo
 from visup.terminal.overview import Overview
 
 BAD_INPUT = 2
+FAILED = 1
 
 # Small matrices are many here: threads of the linear algebra library cost more than they bring.
 # Set before NumPy is imported; whoever set it otherwise is obeyed.
@@ -89,6 +90,10 @@ def main() -> None:
     except VisupError as error:
         complain(str(error))
         sys.exit(BAD_INPUT)
+    except MemoryError as fault:
+        hint = "use smaller frames or files; a run that was begun can be resumed"
+        complain(str(VisupError(f"there is no memory left: {fault}".rstrip(": "), hint=hint)))
+        sys.exit(FAILED)
     except BrokenPipeError:
         # The reader (such as `head`) went away; nothing more can be said to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -266,6 +266,19 @@ def bare(requirement: str) -> str:
     return re.split(r"[\[>=]", requirement)[0]
 
 
+@pytest.mark.parametrize("said", ["", "Unable to allocate 9 GiB"])
+def test_memory_that_runs_out_is_told(
+    visup: Call, monkeypatch: pytest.MonkeyPatch, said: str
+) -> None:
+    def full() -> None:
+        raise MemoryError(said)
+
+    monkeypatch.setattr("visup.cli.check_memory", full)
+    told = visup("presets")
+    assert told.code == 1
+    assert told.err.startswith(f"error: there is no memory left{said and ': '}{said}\n  hint: ")
+
+
 ASKED_FROM_PYTHON = """
 import visup
 try:
