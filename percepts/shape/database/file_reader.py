@@ -52,8 +52,8 @@ def open_checked(path: Path) -> sqlite3.Connection:
         raise DatabaseError(
             "there is no such model database",
             where=str(path),
-            expected="a file made by 'visup models build'",
-            hint=BUILD_HINT,
+            expected="a file made by 'visup teach' or 'visup models build'",
+            hint="outline things in a clip of yours: visup teach CLIP --models DB",
         )
     _check_header(path)
     try:
