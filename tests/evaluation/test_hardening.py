@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import signal
 import time
 from pathlib import Path
 
@@ -57,21 +58,32 @@ def read_of(number: int) -> None:
             bytearray(2**32)
         case 5:
             os.system("true")  # noqa: S605
+        case 8:
+            os._exit(3)
 
 
 def test_whatever_goes_wrong_is_found(tmp_path: Path) -> None:
     """Without this the tests above could not fail."""
 
     def make(folder: Path, rng: random.Random) -> None:
-        (folder / "n").write_text(str(len(list(tmp_path.glob("*.n")))))
+        number = len(list(tmp_path.glob("*.n")))
+        (folder / "n").write_text(str(number))
         (tmp_path / f"{time.monotonic_ns()}.n").touch()
+        if number == 6:
+            raise OSError("it cannot be made")
+        if number == 7:
+            signal.raise_signal(signal.SIGALRM)  # the time is over when all is done
 
     subject = Subject(make, lambda folder: read_of(int((folder / "n").read_text())))
-    found = fuzz(subject, 7, 0, tmp_path)
+    found = fuzz(subject, 9, 0, tmp_path)
     assert found.outcomes == {
-        "read": 2, "refused": 1, "raised": 1, "crashed": 1, "memory": 1, "ran": 1
+        "read": 1, "refused": 1, "raised": 2, "crashed": 2, "memory": 1, "ran": 1, "slow": 1
     }  # fmt: skip
-    assert len(found.failures) == 4
+    assert len(found.failures) == 7
+    said = "\n".join(found.failures)
+    assert "3: crashed by SIGABRT" in said
+    assert "8: crashed with the exit code 3" in said
+    assert "it cannot be made" in said
 
 
 def test_the_same_seed_damages_in_the_same_way() -> None:

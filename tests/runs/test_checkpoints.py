@@ -40,6 +40,26 @@ def test_states_write_no_more_than_they_may_in_an_hour(
     assert written[-1] >= min(240 * size, 2 * 16_000 - size)  # all that there is room for
 
 
+@pytest.mark.parametrize("fault", [MemoryError(), RuntimeError("can't start new thread")])
+def test_a_state_that_there_is_no_memory_for_ends_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
+) -> None:
+    faults = [fault]
+
+    def frozen(*_: object) -> bytes:
+        if faults:
+            raise faults.pop()
+        return b"later"
+
+    monkeypatch.setattr(CheckpointWriter, "_frozen", frozen)
+    writer = CheckpointWriter(tmp_path, every_s=1.0)
+    for step in Agent([Scripted("eye", ("x",))]).steps(frames(4, fps=1.0)):
+        writer.offer(None, step, dict)  # type: ignore[arg-type]
+    writer.close()
+    assert writer.note is None
+    assert (tmp_path / CHECKPOINT).exists()
+
+
 def write_state(folder: Path, packed: bytes) -> None:
     (folder / CHECKPOINT).write_bytes(seal(packed, own_key()))
 

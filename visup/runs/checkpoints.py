@@ -93,11 +93,12 @@ class CheckpointWriter:
         self._last = step.time
         try:
             data = self._frozen(agent, step, kept())
+            self.largest = max(self.largest, len(data))
+            self._writing = self._disk.submit(self._write, data)
         except StateError as fault:
             self.note = _none_kept(fault)
-            return
-        self.largest = max(self.largest, len(data))
-        self._writing = self._disk.submit(self._write, data)
+        except (MemoryError, RuntimeError):
+            return  # no room for a copy, or for a thread: the older state stays, supervision goes on
 
     def _write(self, data: bytes) -> None:
         packed = seal(PACKED + zlib.compress(data, 1), self._key)

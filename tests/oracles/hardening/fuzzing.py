@@ -78,10 +78,16 @@ def _batch(subject: Subject, numbers: range, seed: int, place: Path, findings: F
             os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     if at in numbers:
-        killed = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGKILL
-        findings.add(at, "slow" if killed else "crashed", "")
+        code = os.waitstatus_to_exitcode(status)
+        killed = code == -signal.SIGKILL
+        findings.add(at, "slow" if killed else "crashed", "" if killed else _ending(code))
         at += 1
     return at
+
+
+def _ending(code: int) -> str:
+    """How a process ended that told nothing more."""
+    return f"by {signal.Signals(-code).name}" if code < 0 else f"with the exit code {code}"
 
 
 class _TooSlow(BaseException):
@@ -110,10 +116,15 @@ def _work(subject: Subject, numbers: range, seed: int, place: Path, told: IO[str
     for number in numbers:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        subject.make(folder, random.Random(f"{seed} {number}"))
         ran.clear()
-        watching = number > numbers.start  # the first one loads libraries
-        outcome, detail = _read(subject, folder)
+        try:
+            subject.make(folder, random.Random(f"{seed} {number}"))
+            watching = number > numbers.start  # the first one loads libraries
+            outcome, detail = _read(subject, folder)
+        except _TooSlow:  # it came just when all was done
+            outcome, detail = "slow", ""
+        except Exception as fault:
+            outcome, detail = "raised", f"{_said(fault)}, when it was made"
         watching = False
         outcome = "ran" if ran else outcome
         told.write(f"{number}\t{outcome}\t{' '.join([*ran[:3], detail])}\n")
@@ -140,13 +151,17 @@ def _read(subject: Subject, folder: Path) -> tuple[str, str]:
     except MemoryError:
         return "memory", ""
     except BaseException as fault:
-        where = traceback.extract_tb(fault.__traceback__)[-1]
-        said = f"{type(fault).__name__}: {fault} at {Path(where.filename).name}:{where.lineno}"
-        return "raised", " ".join(said.split())[:300]
+        return "raised", _said(fault)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     return ("slow", "") if time.monotonic() - begin > SLOW_S else ("read", "")
+
+
+def _said(fault: BaseException) -> str:
+    where = traceback.extract_tb(fault.__traceback__)[-1]
+    said = f"{type(fault).__name__}: {fault} at {Path(where.filename).name}:{where.lineno}"
+    return " ".join(said.split())[:300]
 
 
 def _address_space() -> int:
