@@ -130,6 +130,12 @@ def test_a_state_is_compressed_and_reads_back(tmp_path: Path) -> None:
     assert (found.frame_index, found.kept) == (7, {"a": [1, 2]})
 
 
+def test_a_state_of_another_version_is_none_and_says_which(tmp_path: Path) -> None:
+    state = {"visup": "0.0.9", "frame_index": 7, "agent": {}, "kept": {}}
+    write_state(tmp_path, PACKED + zlib.compress(dump_state(state)))
+    assert read_checkpoint(tmp_path) == (None, "its checkpoint is of visup 0.0.9")
+
+
 def _cut(data: bytes) -> bytes:
     return data[:-5]
 
