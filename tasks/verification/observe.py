@@ -121,6 +121,17 @@ class RelationLookup:
         rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
         return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
 
+    def explains_away(self, trend: str, action: str, objects: tuple[int, ...]) -> bool:
+        """Whether a trend speaks against an action only in appearance.
+
+        Who passes over or round another draws away from it a little; and of two that have met, fingers that
+        close or a body that turns move the outlines, while the bodies are in contact.
+        """
+        if trend not in TRENDS:
+            return False
+        met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
+        return met or self.goes_round(trend, objects)
+
     @property
     def time(self) -> float:
         """Seconds of this moment."""
@@ -194,12 +205,8 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
-    if (
-        contrary is not None
-        and contrary.name in TRENDS
-        and relations.goes_round(contrary.name, ids)
-    ):
-        contrary = None  # who passes over or round another draws away from it a little
+    if contrary is not None and relations.explains_away(contrary.name, meaning.name, ids):
+        contrary = None
     known = (*meaning.helps, *meaning.contrary)
     entry = relations.first_true(meaning.begins, ids)
     return ActionObservation(

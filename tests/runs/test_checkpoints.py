@@ -40,18 +40,26 @@ def test_states_write_no_more_than_they_may_in_an_hour(
     assert written[-1] >= min(240 * size, 2 * 16_000 - size)  # all that there is room for
 
 
-@pytest.mark.parametrize("fault", [MemoryError(), RuntimeError("can't start new thread")])
+@pytest.mark.parametrize(
+    ("holder", "name", "fault"),
+    [
+        (CheckpointWriter, "_frozen", MemoryError()),
+        (ThreadPoolExecutor, "submit", RuntimeError("can't start new thread")),
+    ],
+)
 def test_a_state_that_there_is_no_memory_for_ends_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, holder: type, name: str, fault: Exception
 ) -> None:
     faults = [fault]
+    monkeypatch.setattr(CheckpointWriter, "_frozen", lambda *_: b"later")
+    usual = getattr(holder, name)
 
-    def frozen(*_: object) -> bytes:
+    def fails_once(*words: object) -> object:
         if faults:
             raise faults.pop()
-        return b"later"
+        return usual(*words)
 
-    monkeypatch.setattr(CheckpointWriter, "_frozen", frozen)
+    monkeypatch.setattr(holder, name, fails_once)
     writer = CheckpointWriter(tmp_path, every_s=1.0)
     for step in Agent([Scripted("eye", ("x",))]).steps(frames(4, fps=1.0)):
         writer.offer(None, step, dict)  # type: ignore[arg-type]

@@ -129,7 +129,11 @@ def test_two_runs_into_one_folder_are_told_apart_in_words(
     journal = Journal(folder / JOURNAL)
     with pytest.raises(OutputError, match="another visup is writing this run"):
         supervise(clip, folder, options=BARE)
+    with pytest.raises(OutputError, match="another visup is writing this run"):
+        fresh_folder(folder, "")
     journal.close()
+    with pytest.raises(OutputError, match="holds a run already"):
+        fresh_folder(folder, "")
     with pytest.raises(OutputError, match="a run is recorded here already"):
         supervise(clip, folder, options=BARE)
 

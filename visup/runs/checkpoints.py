@@ -93,12 +93,14 @@ class CheckpointWriter:
         self._last = step.time
         try:
             data = self._frozen(agent, step, kept())
-            self.largest = max(self.largest, len(data))
-            self._writing = self._disk.submit(self._write, data)
         except StateError as fault:
             self.note = _none_kept(fault)
-        except (MemoryError, RuntimeError):
-            return  # no room for a copy, or for a thread: the older state stays, supervision goes on
+            return
+        except MemoryError:
+            return  # no room for a copy: the older state stays, supervision goes on
+        self.largest = max(self.largest, len(data))
+        with suppress(RuntimeError):  # no room for a thread
+            self._writing = self._disk.submit(self._write, data)
 
     def _write(self, data: bytes) -> None:
         packed = seal(PACKED + zlib.compress(data, 1), self._key)

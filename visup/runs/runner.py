@@ -14,6 +14,8 @@ from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.atomic import sync
+from visup.agent.storage.file_lock import acquire_lock
+from visup.agent.storage.journal_reader import JOURNAL
 from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
@@ -51,10 +53,13 @@ def fresh_folder(out: Path | None, source: str) -> Path:
     """The folder of a run, made new; by default `runs/<source>`, numbered when that exists.
 
     Raises:
-        OutputError: It cannot be made, or holds a run already (what was recorded is never lost).
+        OutputError: It cannot be made, or holds a run already (what was recorded is never lost), which
+            may still go on.
     """
     out = out or _numbered_folder(source)
-    if (out / "journal.sqlite").exists():
+    if (out / JOURNAL).exists():
+        # Nobody is told to delete a run that goes on.
+        acquire_lock(out / JOURNAL, "this run").release()
         raise OutputError(
             "the folder holds a run already",
             where=str(out),

@@ -31,6 +31,12 @@ def test_a_stage_that_begins_again_is_another_one() -> None:
     assert [s.outcome for s in told] == ["failing", "complete"]
 
 
+def test_what_makes_no_progress_is_not_complete_until_it_goes_on() -> None:
+    stuck = [said("started", "ride", 1.0), said("stalled", "ride", 4.0)]
+    on = [*stuck, said("progressing", "ride", 5.0)]
+    assert [told_stages(e)[0].outcome for e in (stuck, on)] == ["failing", "complete"]
+
+
 def test_the_stage_in_which_a_task_is_interrupted_is_unsafe() -> None:
     events = [said("started", "reach", 1.0), said("started", "grasp", 2.0)]
     assert [s.outcome for s in told_stages(events, "grasp")] == ["complete", "unsafe"]

@@ -124,3 +124,15 @@ def test_what_touches_and_stands_above_is_on_the_other(
     mind = replace(mind, relations=(touching,))
     truth = RelationLookup(mind).find("on", (2, 1)).truth
     assert truth is (Truth.TRUE if stands else Truth.FALSE)
+
+
+@pytest.mark.parametrize("met", [True, False])
+def test_what_has_met_does_not_fail_to_approach_by_fingers_that_close(met: bool) -> None:
+    text = "<t> ::= <near> <off>\n<near> ::= converging(leg_1, top)\n<off> ::= gone(leg_1)"
+    pair = (TOP, 2)
+    spells = [Spell("converging", 1.0, 5.0, pair), Spell("diverging", 5.5, 7.0, pair)]
+    if met:
+        spells += [Spell(n, 5.0, 1e9, pair) for n in ("touching", "in_contact")]
+    played = watched(text, Script(tuple(spells), objects=HERE, identities=NAMES), 7.0)
+    failing = [e for e in played.events if e.kind == "stage_failing" and "`near`" in e.text]
+    assert bool(failing) is not met

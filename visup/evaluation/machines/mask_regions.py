@@ -1,7 +1,9 @@
 """Eyes that see the truth: regions from the masks of a world, named by the roles.
 
 So what reasoning loses is told apart from what seeing loses. Only what shows in the mask is a region; an
-object that nothing shows of has none. Image motion is taken from the masks, too.
+object that nothing shows of has none. Image motion is taken from the masks, too. What is seen and whose
+it is come in one report, as from a behaviour that finds what it was taught: such a region is an object's
+own, whatever it touches.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ SIMILARITY = 0.95
 
 @dataclass(slots=True)
 class MaskRegions:
-    """A behaviour that reports what the masks of a world show.
+    """A behaviour that reports what the masks of a world show, and which role it is.
 
     Attributes:
         mask: (H, W) uint8 of a frame, by its number.
@@ -43,7 +45,9 @@ class MaskRegions:
     mask: Callable[[int], NDArray[np.uint8]]
     labels: Mapping[str, int]
     fps: float
-    contract: Contract = field(default=Contract("masks", gives=("region", "health")), init=False)
+    contract: Contract = field(
+        default=Contract("masks", gives=("region", "hypothesis", "health")), init=False
+    )
     _past: list[dict[str, TrueMask]] = field(default_factory=list, init=False)
 
     def perceive(
@@ -67,6 +71,8 @@ class MaskRegions:
                 velocity_sigma=0.0 if velocity is None else VELOCITY_SIGMA,
             )
             yield Percept("region", region, frame.time, "masks", region.confidence)
+            named = Hypothesis(number, name, 0, SIMILARITY)
+            yield Percept("hypothesis", named, frame.time, "masks", SIMILARITY)
 
 
 def has_masks(folder: Path) -> bool:
@@ -90,8 +96,7 @@ def role_behaviours(
     mask: Callable[[int], NDArray[np.uint8]], labels: Mapping[str, int], fps: float
 ) -> list[Behaviour]:
     """What sees by masks: each role's region by its name; arguments as of `MaskRegions`."""
-    names = dict(enumerate(sorted(labels), start=1))
-    return [MaskRegions(mask, labels, fps), RoleNames(names)]
+    return [MaskRegions(mask, labels, fps)]
 
 
 def read_mask(folder: Path, index: int) -> NDArray[np.uint8]:
@@ -105,21 +110,3 @@ def read_mask(folder: Path, index: int) -> NDArray[np.uint8]:
     if picture is None:
         raise SettingsError("a mask is missing or cannot be read", where=str(path))
     return np.asarray(picture, dtype=np.uint8)
-
-
-@dataclass(slots=True)
-class RoleNames:
-    """A behaviour that says of each region which role it is."""
-
-    names: Mapping[int, str]
-    contract: Contract = field(
-        default=Contract("roles", gives=("hypothesis",), needs=("region",)), init=False
-    )
-
-    def perceive(
-        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
-    ) -> Iterable[Percept]:
-        """Report one frame; see `Behaviour`."""
-        for region in observation.of("region"):
-            named = Hypothesis(region.id, self.names[region.id], 0, SIMILARITY)
-            yield Percept("hypothesis", named, frame.time, "roles", SIMILARITY)

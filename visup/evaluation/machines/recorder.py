@@ -158,7 +158,7 @@ def told_stages(events: Sequence[Event], unsafe: str | None = None) -> tuple[Rep
 
     Returns:
         One for each time that a stage was told to have begun; it is complete unless the last word on it
-        was that it fails.
+        was that it fails, or makes no progress.
     """
     told: list[ReportedStage] = []
     for event in events:
@@ -177,6 +177,7 @@ def told_stages(events: Sequence[Event], unsafe: str | None = None) -> tuple[Rep
 _OUTCOMES = {
     "stage_progressing": "complete",
     "stage_done": "complete",
+    "stage_stalled": "failing",
     "stage_failing": "failing",
     "stage_failed": "failing",
 }
