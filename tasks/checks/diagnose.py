@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Set as AnySet
 from functools import partial
-from pathlib import Path
 
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.bounds import MOST_FAULTS, text_fault
-from visup.tasks.checks.files import read_beside
+from visup.tasks.checks.files import include_root, read_beside
 from visup.tasks.checks.repairs import with_tried_hints
 from visup.tasks.checks.semantics import check_semantics
 from visup.tasks.diagnostics.includes import Read, join_included
@@ -79,7 +78,7 @@ def _diagnosed(
     read: Read | None,
 ) -> tuple[Task, list[Diagnostic]]:
     cleaned, odd = normalise(text, source)
-    within = partial(read_beside, root=Path(source.file).parent)
+    within = partial(read_beside, root=include_root(source.file))
     parsed = join_included(parse(cleaned, source), source, read or within)
     foreign = {f.place.line for f in parsed.faults if f.code in FOREIGN}
     odd = [f for f in odd if f.place.line not in foreign]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.resources import files
 from os.path import normpath
 from pathlib import Path
@@ -9,6 +10,20 @@ from pathlib import Path
 from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import TaskError
 from visup.agent.storage.text_file import read_text_file
+
+
+ROOT = "VISUP_TASK_ROOT"
+"""Environment variable that names the folder in which included files must be, below or above the task's."""
+
+
+def include_root(file: str) -> Path:
+    """The folder that included files must be in: the one that the user gives, else that of the first file.
+
+    Args:
+        file: The task file that is read first.
+    """
+    given = os.environ.get(ROOT)
+    return Path(given) if given else Path(file).parent
 
 
 def read_text(path_or_name: str | Path) -> str:
@@ -54,6 +69,7 @@ def read_beside(path: str, including: str, root: Path | None = None) -> tuple[st
             "it is outside of the folder of the task that is read",
             where=str(beside)[:LONGEST_NAME],
             expected=f"a file in {root} or below",
+            hint=f"{ROOT} may name a folder above both",
         )
     return str(beside), read_text(beside)
 

@@ -100,6 +100,23 @@ def test_include_stays_in_the_folder_of_the_task(tmp_path: Path) -> None:
         assert "swordfish" not in str(told.value)
 
 
+def test_a_root_that_is_given_bounds_includes_instead(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root, cell = tmp_path / "tasks", tmp_path / "tasks" / "cell"
+    cell.mkdir(parents=True)
+    for folder in (tmp_path, root):
+        (folder / "common.task").write_text("<near> ::= converging(a, b)\n")
+    monkeypatch.setenv("VISUP_TASK_ROOT", str(root))
+    for path, allowed in (("../common.task", True), ("../../common.task", False)):
+        (cell / "t.task").write_text(f'include "{path}"\n<t> ::= <near> touching(a, b)\n')
+        if allowed:
+            assert load_tasks(cell / "t.task")[0].name == "t"
+        else:
+            with pytest.raises(VisupError, match="cannot be included"):
+                load_tasks(cell / "t.task")
+
+
 @pytest.mark.parametrize("name", ["x" * 3900, "x/" * 1900, "\\0", "/dev/zero", "."])
 def test_an_include_that_is_no_file_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "a.task").write_text(f'include "{name}"\n<t> ::= seen(a)\n')
