@@ -11,7 +11,6 @@ from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import TaskError
 from visup.agent.storage.text_file import read_text_file
 
-
 ROOT = "VISUP_TASK_ROOT"
 """Environment variable that names the folder in which included files must be, below or above the task's."""
 
