@@ -12,8 +12,8 @@ from visup.tasks.automaton.backpointers import behind, extended
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
-from visup.tasks.supervision.sentences import outcome
-from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.supervision.sentences import last_held, outcome
+from visup.tasks.verification.observe import TRENDS, ActionObservation
 from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
 
@@ -173,7 +173,7 @@ class Advance:
         state = transition.taken(leaves(hypothesis.state), entered(self.now))
         begun = set(transition.transition.begun)
         under_way = [
-            self._begun(self._after(_in_turn(x, transition.left), transition), opened)
+            self._begun(self._after(self._in_turn(x, transition), transition), opened)
             if i in begun
             else x
             for i, x in enumerate(leaves(state))
@@ -219,6 +219,25 @@ class Advance:
         if meaning.lasts or meaning.measures or held_by is None or held_by.since >= turn:
             return False
         return frozenset(step.actors) not in asked
+
+    def _in_turn(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
+        """A step that begins, with since when what shows it counts, and is told."""
+        left = transition.left
+        same = any(leaf.step.same_as(x.step) for x in left)
+        begun = (x.payload.begun for x in left)
+        turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
+        told = max(
+            (self._trend_until(x, transition) for x in left if _between_same(x, leaf)),
+            default=-math.inf,
+        )
+        return replace(leaf, payload=replace(leaf.payload, turn=turn, told_from=told))
+
+    def _trend_until(self, left: Leaf[StepMonitor], transition: OpenTransition) -> float:
+        """Until when two are told to have drawn nearer or apart, last: outlines may have touched before."""
+        if left.step.action not in TRENDS:
+            return left.payload.told_from
+        meaning = self.steps.actions[left.step.action]
+        return last_held(meaning, left.payload, self.now, self._followed(transition))
 
     def _after(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
         """A step that begins, with when what comes before it was over; its delay counts from then."""
@@ -270,12 +289,8 @@ class Advance:
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
 
-def _in_turn(leaf: Leaf[StepMonitor], left: tuple[Leaf[StepMonitor], ...]) -> Leaf[StepMonitor]:
-    """A step that begins, with since when what shows it counts."""
-    same = any(leaf.step.same_as(x.step) for x in left)
-    begun = (x.payload.begun for x in left)
-    turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
-    return replace(leaf, payload=replace(leaf.payload, turn=turn))
+def _between_same(a: Leaf[StepMonitor], b: Leaf[StepMonitor]) -> bool:
+    return frozenset(a.step.actors) == frozenset(b.step.actors)
 
 
 def _may_end(transition: OpenTransition) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import TaskStep
+from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.step_monitor import StepMonitor
 
 
@@ -51,8 +52,10 @@ def evidence(
                 f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.PROGRESSING if monitor.helped_since is not None:
-            what = _say(monitor.helped_by or "", actions)
-            return f"{who} {have} been {what} since {max(0.0, monitor.helped_since):.1f} s"
+            what, since = _say(monitor.helped_by or "", actions), max(0.0, monitor.helped_since)
+            if monitor.helped_by not in TRENDS:
+                since = max(since, monitor.told_from)
+            return f"{who} {have} been {what} since {since:.1f} s"
         case Status.STALLED if monitor.helped_at is not None:
             return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
         case Status.UNKNOWN if monitor.unseen_since is not None:
@@ -113,18 +116,31 @@ def _held(
     """From or until when a step that is done was what it should be."""
     was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
     if not meaning.lasts and monitor.held_s > 0.0:
-        since = max(0.0, now - monitor.held_s, monitor.helped_since or 0.0)
+        since = max(0.0, now - monitor.held_s, monitor.helped_since or 0.0, monitor.told_from)
         if denied is not None and denied > since:
             return f"{was} {meaning.text} until {denied:.1f} s"
         return f"{have} been {meaning.text} since {since:.1f} s"
+    return f"{was} {meaning.text} until {last_held(meaning, monitor, now, followed):.1f} s"
+
+
+def last_held(
+    meaning: ActionDefinition, monitor: StepMonitor, now: float, followed: Sequence[float]
+) -> float:
+    """Until when a step that has been left is told to have been what it should be, seconds.
+
+    Args:
+        meaning: Its action.
+        monitor: What is kept about it.
+        now: Seconds.
+        followed: See `outcome`.
+    """
     over = now if monitor.helped_at is None else monitor.helped_at
     if not meaning.lasts and monitor.broken_since is not None:
         over = monitor.broken_since
     # It was so since before that was noticed, which `begun` tells.
     known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
     start = min(known, default=-math.inf)
-    over = min((over, *(since for since in followed if since > start)))
-    return f"{was} {meaning.text} until {over:.1f} s"
+    return min((over, *(since for since in followed if since > start)))
 
 
 def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -> str:

@@ -64,6 +64,7 @@ class StepMonitor:
         after: When what comes before it was over; of what the task begins with, when that was.
         hasty_s: How long after that it began, where its course asks for a longer delay; else None.
         fulfilled_at: When it was first fulfilled, or None.
+        told_from: Since when it is told to be so at the earliest: until then what excludes it was told.
     """
 
     entered: float
@@ -95,6 +96,7 @@ class StepMonitor:
     after: float = -math.inf
     hasty_s: float | None = None
     fulfilled_at: float | None = None
+    told_from: float = -math.inf
 
     @property
     def begun_anew(self) -> bool:
