@@ -182,6 +182,14 @@ MACHINERY_EVALUATIONS = (
         failed=adapters.stepping_failed,
     ),
     EvaluationCommand(
+        "teaching",
+        "What it costs that five things at rest are known: the time of a step with them, and without.",
+        "visup.evaluation.machines.teaching_cost:evaluate_teaching",
+        "stepping",
+        ("ms", "ms_taught", "cost", "teach_s"),
+        (count("frames", 400, "How many are watched.", None), _SEED),
+    ),
+    EvaluationCommand(
         "pace",
         "The time of a step without perception, of replay and observers, and what a kept mind takes.",
         "visup.evaluation.runtime.pace:evaluate_pace",
