@@ -54,8 +54,8 @@ def evaluate_teaching(
         progress: Told what is done.
 
     Returns:
-        `total` with `ms` and `ms_taught` of a step (medians, processor time), `cost`, the median of the ratios
-        of each pair less one, and `teach_s`, the greatest time to teach one thing.
+        `total` with `ms` and `ms_taught` of a step (medians, processor time), `cost`, the median of
+        the ratios of each pair less one, and `teach_s`, the greatest time to teach one thing.
 
     Raises:
         SettingsError: There are too few frames.
