@@ -140,6 +140,8 @@ def last_held(
     # It was so since before that was noticed, which `begun` tells.
     known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
     start = min(known, default=-math.inf)
+    if monitor.status is Status.PROGRESSING:
+        start = max(start, monitor.since)  # it was told to go on then
     return min((over, *(since for since in followed if since > start)))
 
 

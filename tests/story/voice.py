@@ -69,7 +69,9 @@ def times_that_are_told_exclude_each_other_rightly(told: Told) -> Iterator[str]:
         for who, what, since in SPAN.findall(line.text):
             spans.append((who, what, float(since), line.time, line.text))
         for who, what, until in ENDED.findall(line.text):
-            spans.append((who, what, float(until) - 0.5, float(until), line.text))
+            told_since = [s[2] for s in spans if s[:2] == (who, what) and s[2] < float(until)]
+            begin = max(told_since, default=float(until) - 0.5)
+            spans.append((who, what, begin, float(until), line.text))
     for n, (who, what, since, until, text) in enumerate(spans):
         if since > until + TOLERANCE_S:
             yield f"{who} {what}: since {since} s, told at {until:.2f} s: {text}"
