@@ -151,12 +151,17 @@ def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
 
 
 def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
-    """The regions in which the two are seen now, twice the same one when they are merged."""
+    """The regions in which the two are seen now, twice the same one when they are merged.
+
+    What still shows of a body that another one hides moves as the edge of that one does: it tells nothing.
+    """
     if seen.host is not None:
         host = mind.objects[seen.host]
         return (host.region, host.region) if host.last_seen == mind.time else None
     first, second = (mind.objects[i] for i in seen.pair)
     if first.last_seen < mind.time or second.last_seen < mind.time:
+        return None
+    if Presence.HIDDEN in (first.presence, second.presence):
         return None
     return first.region, second.region
 

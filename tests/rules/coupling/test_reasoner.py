@@ -103,3 +103,17 @@ def test_a_region_that_hides_another_did_not_swallow_it() -> None:
         return seen(i, [box_region(1, (100, 150, reach, 160)), rest])
 
     assert told(reason(at(i) for i in range(200))) == []
+
+
+def test_what_shows_of_a_hidden_body_at_the_edge_of_what_passes_does_not_couple_them() -> None:
+    def observations() -> Iterator[Observation]:
+        for i in range(300):
+            edge = 200 + 30 * i / 25  # of the body that passes in front, to the right
+            left = max(300.0, edge)
+            rest = (left, 200, 380 - left, 60) if left < 372 else (edge, 205, 12, 40)
+            regions = [box_region(1, rest), box_region(2, (edge - 200, 180, 200, 120))]
+            yield seen(i, regions if edge < 560 else regions[1:])
+
+    thoughts = reason(observations())
+    assert any(e.kind == "occlusion" for t in thoughts for e in t.events)
+    assert told(thoughts) == []
