@@ -195,6 +195,8 @@ def with_tried_hints(
     return tuple(found)
 
 
+FAULT_COST = 100
+"""A fault takes as long to explain as so many characters take to read, or longer."""
 LONGEST_HINT = 400
 """Characters of a hint: what is longer, nobody reads."""
 NOTHING, IN_PART, WHOLLY = range(3)
@@ -223,7 +225,7 @@ class _HintTrial:
         for hint in hints:
             if len(hint) > LONGEST_HINT:
                 continue
-            self.left -= len(self.text)
+            self.left -= len(self.text) + FAULT_COST * len(self.faults)
             if self.left < 0:
                 break
             helps = self.helps(replace(fault, hint=hint))

@@ -2,8 +2,10 @@
 
 import pytest
 
+from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import fix_of
 from visup.tasks.checks.diagnose import diagnose
+from visup.tasks.checks.repairs import with_tried_hints
 
 STAGES = [
     "<a> ::= not touching(x, y)",
@@ -91,3 +93,18 @@ def test_a_change_is_offered_only_where_it_helps() -> None:
     assert fault.hint == "write `within 5 s` in place of `within 5`"
     _, (alone,) = diagnose("<t> ::= <t>", "my.task")
     assert "in place of" not in (alone.hint or "")
+
+
+def test_of_many_mistakes_few_have_their_hints_tried() -> None:
+    # Each try reads the file anew and explains all its mistakes: a damaged file took 10 s in an editor.
+    text = "<t> ::= seen(a)\n" + "p\n" * 300
+    faults = diagnose(text)[1]
+    tried = 0
+
+    def check(changed: str) -> list[Diagnostic]:
+        nonlocal tried
+        tried += 1
+        return faults
+
+    with_tried_hints(text, faults, check)
+    assert 0 < tried <= 20
