@@ -12,7 +12,7 @@ from visup.agent.model.errors import TaskError
 from visup.agent.storage.text_file import read_text_file
 
 ROOT = "VISUP_TASK_ROOT"
-"""Environment variable that names the folder in which included files must be, below or above the task's."""
+"""Environment variable: the folder in which all included files must lie."""
 
 
 def include_root(file: str) -> Path:

@@ -6,6 +6,7 @@ prints what breaks a law in the clips and recorded runs below a folder.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -70,7 +71,7 @@ def times_that_are_told_exclude_each_other_rightly(told: Told) -> Iterator[str]:
             spans.append((who, what, float(since), line.time, line.text))
         for who, what, until in ENDED.findall(line.text):
             told_since = [s[2] for s in spans if s[:2] == (who, what) and s[2] < float(until)]
-            begin = max(told_since, default=float(until) - 0.5)
+            begin = min(float(until) - 0.5, max(told_since, default=math.inf))
             spans.append((who, what, begin, float(until), line.text))
     for n, (who, what, since, until, text) in enumerate(spans):
         if since > until + TOLERANCE_S:
