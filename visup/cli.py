@@ -23,6 +23,7 @@ from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
+from visup.commands.serve.site_commands import app as serve_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
@@ -56,6 +57,7 @@ app.command("replay")(replay)
 app.command("export")(export)
 app.command("render")(render)
 app.command("doctor")(doctor)
+app.add_typer(serve_app, name="serve", help="Many cameras under one supervisor.")
 app.add_typer(task_app, name="task", help="Check, show and list task files.")
 app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")

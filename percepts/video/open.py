@@ -17,6 +17,7 @@ from visup.percepts.video.capture import (
 )
 from visup.percepts.video.image_folder import open_folder
 from visup.percepts.video.live_source import LiveSource, Reconnection
+from visup.percepts.video.looped import LOOP, LoopedCapture
 from visup.percepts.video.ros_bag import is_bag, open_bag
 from visup.percepts.video.source import VideoSource
 from visup.percepts.video.video_file import VideoFile, open_file
@@ -37,7 +38,8 @@ def open_source(
 
     Args:
         source: A video file, a folder of images (or a MOT or DAVIS sequence folder), the index of
-            a camera such as '0', a URL (rtsp, http, ...), or a ROS 2 bag (`bag` or `bag#/topic`).
+            a camera such as '0', a URL (rtsp, http, ...), a ROS 2 bag (`bag` or `bag#/topic`), or
+            `loop:CLIP`, a video file that is played over and over as a camera would deliver it.
         every: Give only every n-th frame; frames keep their number and time in the source.
         fps: Frames per second to assume in place of what the source says.
         factory: What opens files, cameras and URLs.
@@ -59,6 +61,8 @@ def open_source(
         return opening.live(f"camera {source}", camera, int(source))
     if URL.match(source):
         return _open_url(source, opening)
+    if source.startswith(LOOP):
+        return _open_loop(source, opening)
     return _open_path(Path(source).expanduser(), opening)
 
 
@@ -115,6 +119,21 @@ def _open_url(url: str, opening: _Opening) -> VideoFile | LiveSource:
     if announced_frames(capture):
         return VideoFile(url, capture, every=opening.every, fps=opening.fps)
     return opening.live(url, capture, url)
+
+
+def _open_loop(source: str, opening: _Opening) -> LiveSource:
+    path = Path(source.removeprefix(LOOP)).expanduser()
+    if not path.is_file():
+        raise SourceError(
+            "there is no such clip to play over and over",
+            where=source,
+            expected=f"{LOOP}CLIP, a video file",
+            hint=_nearest(path),
+        )
+    clip = LoopedCapture(str(path), opening.factory, opening.fps)
+    if not clip.isOpened():
+        raise SourceError("this is not a video that can be read", where=source)
+    return LiveSource(source, clip, every=opening.every, fps=opening.fps)
 
 
 def _open_path(path: Path, opening: _Opening) -> VideoSource:

@@ -16,6 +16,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "watch": "watch a video and say whether the work goes well",
             "demo": "watch the shipped clip, a capture that fails",
             "check": "say beforehand whether a run can lead to anything",
+            "serve": "many cameras under one supervisor, from a site file",
             "presets": "what --preset traffic, cell, orbit, bench choose",
         },
         "Prepare": {

@@ -7,12 +7,41 @@ from typing import TYPE_CHECKING
 
 from visup.agent.model.errors import SettingsError
 from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent, open_video
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import task_actors
 
 if TYPE_CHECKING:
     from visup.agent.cycle.agent import Agent
     from visup.tasks.grammar.nodes import Task
+
+
+def preflight(settings: WatchSettings) -> Iterator[str]:
+    """Open the source, load everything, and say what is found, a line each; warnings come last.
+
+    Args:
+        settings: Of the run.
+
+    Yields:
+        What there is; what may keep the run from coming to anything begins with `WARNING`.
+
+    Raises:
+        VisupError: No such run can begin.
+    """
+    with open_video(settings) as video:
+        frames = "" if video.frame_count is None else f", {video.frame_count} frames"
+        width, height = video.size
+        yield f"source {video.name}: {width} x {height} pixels, {video.fps:g} frames a second{frames}"
+        notes = video.notes
+    agent = build_agent(settings)
+    try:
+        yield from readiness(settings, agent)
+        yield from (f"{WARNING}{text}" for text in (*notes, *check_cast(settings, agent)))
+    finally:
+        agent.close()
+
+
+WARNING = "warning: "
 
 
 def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False) -> tuple[str, ...]:
