@@ -22,7 +22,8 @@ from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
 from visup.agent.storage.jsonable import to_jsonable
 from visup.percepts.video import VideoSource
-from visup.runs.settings import RunOptions, WatchSettings
+from visup.redaction import has_secret, redacted
+from visup.runs.settings import SECRET_LEFT_OUT, RunOptions, WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
 from visup.version import __version__
@@ -80,8 +81,10 @@ class Recorder:
             "fps": source.fps,
             "size": source.size,
             "live": source.live,
-            "settings": to_jsonable(settings),
+            "settings": to_jsonable(replace(settings, source=redacted(settings.source))),
         }
+        if has_secret(settings.source):
+            self.facts[SECRET_LEFT_OUT] = True
         if not resume:
             self.journal.note(**self.facts)
         self.notes = source.notes
