@@ -75,16 +75,7 @@ class Recorder:
         self.folder = folder
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
         self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
-        self.facts: dict[str, Any] = {
-            "visup": __version__,
-            "source": source.name,
-            "fps": source.fps,
-            "size": source.size,
-            "live": source.live,
-            "settings": to_jsonable(replace(settings, source=redacted(settings.source))),
-        }
-        if has_secret(settings.source):
-            self.facts[SECRET_LEFT_OUT] = True
+        self.facts = _facts(settings, source)
         if not resume:
             self.journal.note(**self.facts)
         self.notes = source.notes
@@ -228,6 +219,20 @@ class Recorder:
         # In the order of writing: `annotated.webm`, `annotated-2.webm`, ...
         names = sorted((path.name for path in videos), key=lambda name: (len(name), name))
         return replace(collected, videos=tuple(names))
+
+
+def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
+    """What is noted of a run when it begins."""
+    left_out = {SECRET_LEFT_OUT: True} if has_secret(settings.source) else {}
+    return {
+        "visup": __version__,
+        "source": source.name,
+        "fps": source.fps,
+        "size": source.size,
+        "live": source.live,
+        "settings": to_jsonable(replace(settings, source=redacted(settings.source))),
+        **left_out,
+    }
 
 
 def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:

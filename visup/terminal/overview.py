@@ -30,6 +30,9 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "replay": "reason again, with other tasks or rules",
             "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",
         },
+        "Ask many runs": {
+            "archive": "fill a lake with the tables of many runs",
+        },
         "Extend and measure": {
             "behaviours": "list, check and create plug-ins",
             "render": "render a scene with masks and truth",
