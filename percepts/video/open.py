@@ -21,6 +21,7 @@ from visup.percepts.video.looped import LOOP, LoopedCapture
 from visup.percepts.video.ros_bag import is_bag, open_bag
 from visup.percepts.video.source import VideoSource
 from visup.percepts.video.video_file import VideoFile, open_file
+from visup.redaction import redacted
 
 URL = re.compile(r"^[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 SCHEMES = ("rtsp", "rtsps", "rtmp", "http", "https", "udp", "tcp", "srt")
@@ -103,22 +104,26 @@ def _camera(camera: int | str, factory: CaptureFactory) -> Capture:
 
 
 def _open_url(url: str, opening: _Opening) -> VideoFile | LiveSource:
-    """A recording when the stream knows how many frames it has, else a live source."""
+    """A recording when the stream knows how many frames it has, else a live source.
+
+    It is called by its address without what only its owner should know: names stand in every record.
+    """
+    shown = redacted(url)
     if url.split(":", 1)[0].lower() not in SCHEMES:
         raise SourceError(
-            "this kind of URL cannot be read", where=url, expected=f"one of {', '.join(SCHEMES)}"
+            "this kind of URL cannot be read", where=shown, expected=f"one of {', '.join(SCHEMES)}"
         )
     capture = opening.factory(url)
     if not capture.isOpened():
         raise SourceError(
             "the URL cannot be opened, or what it gives is not a video",
-            where=url,
+            where=shown,
             expected="an address that delivers video",
             hint="check the address and the network",
         )
     if announced_frames(capture):
-        return VideoFile(url, capture, every=opening.every, fps=opening.fps)
-    return opening.live(url, capture, url)
+        return VideoFile(shown, capture, every=opening.every, fps=opening.fps)
+    return opening.live(shown, capture, url)
 
 
 def _open_loop(source: str, opening: _Opening) -> LiveSource:

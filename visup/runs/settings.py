@@ -13,6 +13,9 @@ from typing import Annotated, Any
 
 from visup.agent.model.errors import SettingsError
 
+SECRET_LEFT_OUT = "source_without_secret"
+"""The fact of a recorded run that its source had a password, which is not recorded."""
+
 
 @dataclass(frozen=True, slots=True)
 class Option:

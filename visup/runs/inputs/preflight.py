@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from visup.agent.model.errors import SettingsError
+from visup.redaction import redacted
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent, open_video
 from visup.tasks import load_tasks
@@ -126,7 +127,7 @@ def _refusal(
         f"task {names} cannot be followed: nothing tells what its actors look like ({who}; {missing})",
         expected="a model database that knows them (--models DB), and --actor NAME=MODEL where the "
         f"names differ; or a task that says it: actor {actor} is red",
-        hint=f"outline them once: visup teach {settings.source} --models cell.models"
+        hint=f"outline them once: visup teach {redacted(settings.source)} --models cell.models"
         if not settings.models
         else f"visup models list {settings.models}; then --actor {actor}=MODEL in place of "
         f"{' or '.join(models)}",
