@@ -136,7 +136,7 @@ USUAL = (
     _usual("E208", r"\s*\bpauses\s+when\b.*$", ""),
     _usual("E133", rf"\b({SIGN})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
     _usual("E133", rf"\b({SIGN})\s+(?={NAME}\()", r"\1 when "),
-    _usual("E133", rf"\b({MEANT})\s+(?:when|if|while|on|once|whenever)\b", lambda m: f"{SIGNS_MEANT[m[1]]} when"),
+    _usual("E133", rf"\b({MEANT})\s+(?:when|if|while|on)\b", lambda m: f"{SIGNS_MEANT[m[1]]} when"),
     _usual("E133", rf"\b({MEANT})\s+(?={NAME}\()", lambda m: f"{SIGNS_MEANT[m[1]]} when "),
     _usual("E134", r"\b(at\s+(?:least|most)\s+\d+)\b(?!\s*times?)", r"\1 times"),
     _usual("E134", r"\btwice\b", "at least 2 times at most 2 times"),
