@@ -97,7 +97,7 @@ def run(
                 v = shifted((arena[a + k], arena[a + c + k]), p, q)
                 arena[out + k], arena[out + c + k] = v
         elif op == NUMBER:
-            arena[out], arena[out + 1] = p, p
+            arena[out], arena[out + 1] = p, q
         elif op == FACT:
             _read_facts(facts, code[i], n, arena)
         elif op in (SPREAD, SOME, EVERY):

@@ -21,10 +21,10 @@ from visup.rules.formula.nodes import (
 )
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import TICKS, Number
-from visup.rules.monitoring.compiler import Scope, ValueRef
+from visup.rules.monitoring.compiler import Scope, ValueRef, scope_of
 from visup.rules.monitoring.intervals import UNKNOWN, Interval, verdict
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.safety.compiled_rules import CompiledRules, scope_of
+from visup.rules.safety.compiled_rules import CompiledRules
 from visup.rules.safety.verdicts import Evaluation
 from visup.rules.wording.sentences import short
 
@@ -88,7 +88,18 @@ def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleEx
         for word, p in zip(("when", "unless"), parts, strict=False)
     )
     found = Truth.FALSE if suspended else parts[0].verdict
-    return RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+    told = RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+    early = values.prepared.early[values.prepared.rules.index(rule)]
+    return told if early is None else _with_early(told, values.interval(early, reader.rows))
+
+
+def _with_early(late: RuleExplanation, interval: Interval) -> RuleExplanation:
+    """A rule with what is decided of it before its verdict comes, which may make it true already."""
+    early = RuleExplanation("what is decided by now", interval, verdict(interval))
+    told = replace(late, parts=(*late.parts, early))
+    if late.verdict is Truth.TRUE or early.verdict is not Truth.TRUE:
+        return told
+    return replace(told, interval=interval, verdict=Truth.TRUE, late_s=0.0)
 
 
 MAX_LINES = 4096

@@ -107,6 +107,13 @@ class WatchSettings:
     rules: Annotated[
         tuple[Path, ...], Option("Rules file, instead of the shipped rules.", metavar="FILE")
     ] = ()
+    early: Annotated[
+        bool,
+        Option(
+            "Tell what rules say of the future as soon as it is decided, not when their windows are over.",
+            "--early",
+        ),
+    ] = False
     actors: Annotated[
         Mapping[str, tuple[str, ...]],
         Option(
