@@ -21,6 +21,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     Literal,
     MOfN,
     Not,
@@ -40,6 +41,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import Number, ticks
@@ -58,6 +60,7 @@ from visup.rules.monitoring.operators import (
     SlidingWindow,
     TemporalOperator,
     Unbounded,
+    ValueWhenTrue,
 )
 
 Scope = tuple[tuple[str, bool], ...]
@@ -195,6 +198,8 @@ class Compiler:
                 return self._recalled(age, self.formula(part, scope))
             case Quantified():
                 return self._quantified(node, scope)
+            case Let(part=part):
+                return self.formula(part, scope)
 
     def term(self, node: Term, scope: Scope = ()) -> ValueRef:
         """The place of a quantity."""
@@ -214,6 +219,10 @@ class Compiler:
             case PointwiseFunction(name=name, parts=parts):
                 join = "least" if name == "min" else "most"
                 return self._joined(join, [self.term(p, scope) for p in parts])
+            case Variable(part=part, at=at):
+                assert part is not None
+                noted = self.term(part, scope), self.formula(at, scope)
+                return self.remembered(ValueWhenTrue(), *noted)
             case WindowFunction():
                 return self._over_time(node, self.term(node.part, scope))
 

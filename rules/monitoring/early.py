@@ -16,6 +16,7 @@ from visup.rules.formula.nodes import (
     And,
     Formula,
     FutureOperator,
+    Let,
     Not,
     Or,
     PastOperator,
@@ -95,6 +96,8 @@ class EarlyCompiler:
                 return replace(
                     early, first=self._on.quantified(node, scope, early.first), last=last
                 )
+            case Let(part=part):
+                return self.formula(part, scope)
             case FutureOperator(kind=kind, part=part, window=TimeWindow() as window):
                 return self._ahead(kind, ticks(window.low.base), self.formula(part, scope), last)
             case Until(left=left, right=right, window=TimeWindow() as window):

@@ -30,6 +30,7 @@ from visup.rules.monitoring.operators import (
     SlidingWindow,
     TemporalOperator,
     Unbounded,
+    ValueWhenTrue,
 )
 from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD, Update
 from visup.rules.monitoring.signals import Signals, known_interval, later
@@ -228,6 +229,13 @@ def _update(operator: TemporalOperator) -> Update:
                 return entered, value
 
             return latch
+        case ValueWhenTrue():
+
+            def note(state: Any, now: int, v: Interval, at: Interval) -> tuple[Any, Interval]:
+                kept = v if at[0] > 0 else state or UNKNOWN
+                return kept, kept
+
+            return note
         case BooleanWindow(kind=kind, high=high):
             return SlidingWindow(kind, 0, high).on(_ON)
     return operator.on(_ON)

@@ -19,7 +19,7 @@ from visup.rules.formula.nodes import (
     children,
     placeholder,
 )
-from visup.rules.formula.terms import Measure, Term
+from visup.rules.formula.terms import Measure, Term, Variable
 from visup.rules.formula.units import TICKS, Number
 from visup.rules.monitoring.compiler import Scope, ValueRef, scope_of
 from visup.rules.monitoring.intervals import UNKNOWN, Interval, verdict
@@ -185,7 +185,7 @@ class _ExplanationBuilder:
         """What a node came to, with what it is made of."""
         place, interval = self._value(node)
         term = isinstance(node, Term)
-        whole = not isinstance(node, Predicate | Measure | Number)
+        whole = not isinstance(node, Predicate | Measure | Number | Variable)
         return RuleExplanation(
             _text(node, self.names, self.values.prepared),
             interval,
@@ -237,6 +237,8 @@ def _late(seconds: float) -> str:
 
 
 def _unit(node: Node) -> str:
+    if isinstance(node, Variable) and node.part is not None:
+        return _unit(node.part)
     if not isinstance(node, Measure):
         return ""
     return RULES.quantities[node.name].unit
