@@ -26,6 +26,7 @@ class WatchOptions(TypedDict, total=False):
     behaviours: Sequence[str | os.PathLike[str]]
     plugins: Sequence[str]
     early: bool
+    at_end: str
     plugin_settings: Mapping[str, Mapping[str, Any]]
     isolate: Sequence[str]
     budgets: bool

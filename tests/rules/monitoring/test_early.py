@@ -20,6 +20,7 @@ from visup.rules.monitoring.intervals import AtEnd, Interval, verdict
 from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.reasoners import default_reasoners
+from visup.rules.safety.ending import open_rules
 from visup.rules.safety.queries import explain
 
 
@@ -149,3 +150,26 @@ def test_it_is_said_that_a_rule_is_true_before_its_verdict_has_come() -> None:
     assert told.splitlines()[0].startswith("near(")
     assert " is true" in told.splitlines()[0]
     assert "what is decided by now is true" in told
+
+
+@pytest.mark.parametrize(
+    ("when", "weak", "strong"),
+    [
+        ("gap(a, b) < 400 px and eventually[60 s] gap(a, b) < 200 px", True, True),
+        ("gap(a, b) < 400 px and eventually[60 s] gap(a, b) > 900 px", True, False),
+        ("not seen(a) and eventually[60 s] gap(a, b) < 1 px", False, False),
+        ("henceforth[60 s] gap(a, b) < 400 px", True, False),
+        ("eventually[60 s] gap(a, b) > 400 px", True, False),
+        ("gap(a, b) < 200 px", False, False),
+    ],
+)
+def test_rules_that_are_due_at_the_end_are_told_as_one_chooses(
+    when: str, weak: bool, strong: bool
+) -> None:
+    text = f'rule near(a, b): info when {when} say "{{a}} {{is}} near {{b}}."'
+    mind = thoughts(text, early=False)[-1].mind
+    assert open_rules(mind, "unknown") == ()
+    told = open_rules(mind, "weak"), open_rules(mind, "strong")
+    assert tuple(map(bool, told)) == (weak, strong)
+    assert all(o.decided == strong for o in told[0])
+    assert all(str(o).startswith("At the end rule 'near' is ") for o in told[0])
