@@ -62,9 +62,8 @@ def open_rules(mind: Mind, at_end: AtEnd | str) -> tuple[OpenRule, ...]:
     if at_end == "unknown" or memory.now is None or memory.after is None:
         return ()
     prepared = compile_rules(memory.rules, memory.early)
-    known = [ticks(mind.objects[i].first_seen) for i in memory.ids]
-    strong = dict.fromkeys(_found(prepared, memory, known, 0))
-    weak = {} if at_end == "strong" else dict.fromkeys(_found(prepared, memory, known, 1))
+    strong = dict.fromkeys(_found(prepared, memory, 0))
+    weak = {} if at_end == "strong" else dict.fromkeys(_found(prepared, memory, 1))
     found = {**strong, **weak}
     standing = {key for key, held in memory.held.items() if held.until == inf}
     told: dict[tuple[str, frozenset[int]], OpenRule] = {}
@@ -79,14 +78,13 @@ def open_rules(mind: Mind, at_end: AtEnd | str) -> tuple[OpenRule, ...]:
 
 
 def _found(
-    prepared: CompiledRules, memory: RuleMemory, known: list[int], bound: int
+    prepared: CompiledRules, memory: RuleMemory, bound: int
 ) -> Iterator[tuple[Rule, tuple[int, ...]]]:
     """What is true of the moments of which verdicts are due.
 
     Args:
         prepared: The rules.
         memory: What they remember.
-        known: Since when each object is, microseconds; of earlier moments nothing is asked.
         bound: Whether the lower bounds count (0) or the upper ones (1).
     """
     n, delays = len(memory.ids), [places[0].delay for places in prepared.places]
@@ -103,7 +101,7 @@ def _found(
             row = _bounds(rows[number], prepared, number, n, bound)
             for hit in found[: find_true(row, n, arena, found)].tolist():
                 ids = prepared.choice((number << CHOICE_BITS) + hit, memory.ids)[1]
-                if all(known[memory.ids.index(i)] <= now - delay for i in ids):
+                if all(memory.since.get(i, memory.now) <= now - delay for i in ids):
                     yield rule, ids
 
 

@@ -33,6 +33,7 @@ class RuleMemory:
         held: Concerns that stand, those whose sentences are oldest first.
         cooling: Until when, in seconds, objects raise no concern again.
         early: Whether what rules say of the future was told as soon as it was decided.
+        since: Microseconds of the first sample of each of its objects.
     """
 
     rules: tuple[Rule, ...] = ()
@@ -47,6 +48,7 @@ class RuleMemory:
     )
     cooling: Mapping[AlarmKey, float] = field(default_factory=lambda: MappingProxyType({}))
     early: bool = False
+    since: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
 
 
 SAFETY = MemoryKey("rules.safety", RuleMemory())
@@ -88,6 +90,9 @@ class RuleReasoner:
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
             before = remapped(prepared, old.after, now, old.ids, facts.ids)
+        since = old.since
+        if old.ids != facts.ids:
+            since = MappingProxyType({i: since.get(i, now) for i in facts.ids})
         values = Evaluation(prepared, facts, now, before)
         held, cooling = update(values, old.held, old.cooling, old.time)
         mind = mind.remember(
@@ -103,6 +108,7 @@ class RuleReasoner:
                 held,
                 cooling,
                 self.early,
+                since,
             ),
         )
         told = tuple(h.concern for h in held.values())
