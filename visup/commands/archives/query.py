@@ -21,7 +21,7 @@ SHOWN_ROWS = 50
 
 
 @dataclass(frozen=True, slots=True)
-class QueryOptions:
+class AnswerOptions:
     """What becomes of an answer, and what is shown besides."""
 
     form: Annotated[
@@ -39,7 +39,7 @@ class QueryOptions:
     memory_gb: Annotated[float, Option("What a question may take, gigabytes.", at_least=0.1)] = 2.0
 
 
-@takes(QueryOptions)
+@takes(AnswerOptions)
 def query(
     wanted: Given,
     lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
@@ -56,7 +56,7 @@ def query(
     from visup.archive.lake import Lake
     from visup.terminal.console import echo, echo_json, make_console
 
-    options = QueryOptions(**wanted)
+    options = AnswerOptions(**wanted)
     if not (sql or options.tables or options.examples):
         raise typer.BadParameter("ask something, or see --examples", param_hint="SQL")
     form = format_of(options.form, options.out)
