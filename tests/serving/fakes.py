@@ -6,7 +6,7 @@ from pathlib import Path
 
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.serving.reports import CameraJob, CameraReport, ReportKind
-from visup.serving.site import ProcessLimits, SiteCamera
+from visup.serving.site.records import ProcessLimits, SiteCamera
 
 
 def site_camera(name: str = "cell", source: str = "0", fingerprint: str = "a") -> SiteCamera:

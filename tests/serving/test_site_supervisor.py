@@ -14,7 +14,7 @@ from visup.agent.storage.file_lock import acquire_lock
 from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
 from visup.serving.reports import ReportKind
-from visup.serving.site import Site, SiteCamera
+from visup.serving.site.records import Site, SiteCamera
 from visup.serving.site_supervisor import ServiceClock, SiteSupervisor, serve_site
 
 

@@ -13,7 +13,7 @@ from visup.serving.backoff import Backoff
 from visup.serving.camera_child import CameraChild
 from visup.serving.reports import CameraJob, CameraReport, ReportKind
 from visup.serving.run_store import begin_run, run_under_way
-from visup.serving.site import SiteCamera
+from visup.serving.site.records import SiteCamera
 
 ASK_AGAIN_S = 2.5
 CLOSE_S = 5.0

@@ -16,8 +16,8 @@ from visup.serving.camera_child import CameraChild
 from visup.serving.camera_supervisor import CameraState, CameraSupervisor, Child, Tell
 from visup.serving.reports import CameraJob
 from visup.serving.service_manager import notify_manager
-from visup.serving.site import Site
-from visup.serving.site_file import read_site
+from visup.serving.site.reading import read_site
+from visup.serving.site.records import Site
 
 TURN_S = 0.1
 """Seconds between two looks at all cameras."""

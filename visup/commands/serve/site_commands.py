@@ -13,7 +13,7 @@ from visup.runs.result import ExitCode
 
 if TYPE_CHECKING:
     from visup.serving.camera_supervisor import Tell
-    from visup.serving.site_check import CameraCheck
+    from visup.serving.site.checking import CameraCheck
 
 SiteFile = Annotated[Path, typer.Argument(metavar="SITE.toml", help="The site file.")]
 
@@ -52,7 +52,7 @@ def run(
     process did not close in time.
     """
     from visup.runs.inputs.stop_signals import stop_signals
-    from visup.serving.site_file import read_site
+    from visup.serving.site.reading import read_site
     from visup.serving.site_supervisor import serve_site
 
     site = read_site(site_file)
@@ -89,8 +89,8 @@ def check(
     task are looked for among the models; and some frames are looked at. Exit code: 0 when all can be
     watched, 2 when the file is not as it should be or a camera cannot be watched.
     """
-    from visup.serving.site_check import check_camera, load_lines, store_fault
-    from visup.serving.site_file import read_site
+    from visup.serving.site.checking import check_camera, load_lines, store_fault
+    from visup.serving.site.reading import read_site
     from visup.terminal.console import complain, echo
 
     site = read_site(site_file)
@@ -112,7 +112,7 @@ def check(
 
 
 def _tell(checked: CameraCheck) -> None:
-    from visup.serving.site_check import speed_line
+    from visup.serving.site.checking import speed_line
     from visup.terminal.console import complain, echo
 
     for line in checked.lines:
@@ -126,7 +126,7 @@ def _tell(checked: CameraCheck) -> None:
 @app.command()
 def schema() -> None:
     """Print the JSON Schema of site files, by which editors complete and check them."""
-    from visup.serving.site_form import schema_text
+    from visup.serving.site.form import schema_text
     from visup.terminal.console import echo
 
     echo(schema_text())

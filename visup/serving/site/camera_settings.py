@@ -14,9 +14,9 @@ from visup.percepts.video.open import URL
 from visup.redaction import redacted
 from visup.runs.inputs.signals import BROKER
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.serving.placeholders import filled
-from visup.serving.site import ProcessLimits, SiteCamera
-from visup.serving.site_form import CameraTable, SiteTable
+from visup.serving.site.form import CameraTable, SiteTable
+from visup.serving.site.placeholders import filled
+from visup.serving.site.records import ProcessLimits, SiteCamera
 from visup.tasks import shipped_tasks
 from visup.version import __version__
 
