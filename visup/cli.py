@@ -10,6 +10,7 @@ import typer
 
 from visup.agent.memory_limit import check_memory
 from visup.agent.model.errors import VisupError
+from visup.commands.archives.archive import app as archive_app
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.check import check
 from visup.commands.debug import app as debug_app
@@ -22,6 +23,7 @@ from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
+from visup.commands.serve.site_commands import app as serve_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
@@ -55,9 +57,11 @@ app.command("replay")(replay)
 app.command("export")(export)
 app.command("render")(render)
 app.command("doctor")(doctor)
+app.add_typer(serve_app, name="serve", help="Many cameras under one supervisor.")
 app.add_typer(task_app, name="task", help="Check, show and list task files.")
 app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
+app.add_typer(archive_app, name="archive", help="Fill lakes: tables of many recorded runs.")
 app.add_typer(behaviours_app, name="behaviours", help="List, check and begin behaviours.")
 app.add_typer(eval_app(), name="eval", help="Compute figures against ground truth.")
 app.add_typer(train_app, name="train", help="Make the files of what was learnt from labelled data.")

@@ -35,6 +35,8 @@ EVENT_KINDS: Mapping[str, str] = {
     "task_inactive": "a task turns out not to be going on",
     "stage_started": "a stage has begun",
     "stage_progressing": "a stage goes well",
+    "stage_paused": "a stage is paused",
+    "stage_resumed": "a stage goes on after a pause",
     "stage_stalled": "a stage makes no progress",
     "stage_failing": "a stage is failing",
     "stage_failed": "a stage has failed",

@@ -14,6 +14,7 @@ class Status(StrEnum):
     PENDING = "pending"
     ACTIVE = "active"
     PROGRESSING = "progressing"
+    PAUSED = "paused"
     STALLED = "stalled"
     FAILING = "failing"
     FAILED = "failed"

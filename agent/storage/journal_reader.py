@@ -128,7 +128,7 @@ class Recording:
     ) -> Iterator[tuple[Path, tuple[Any, ...]]]:
         for path in segments(self.path):
             try:
-                with closing(_opened(path)) as db:
+                with closing(opened_readonly(path)) as db:
                     if path != self.path and is_empty(db):
                         continue
                     check_version(db, path)
@@ -201,7 +201,7 @@ def event_text(event: Mapping[str, Any]) -> str:
     return json.dumps(event, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
-def _opened(path: Path) -> sqlite3.Connection:
+def opened_readonly(path: Path) -> sqlite3.Connection:
     """The file, to be read only; also where not even the log beside it may be touched.
 
     A reader that is left half way may be closed by whichever thread collects it.

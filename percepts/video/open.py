@@ -17,9 +17,11 @@ from visup.percepts.video.capture import (
 )
 from visup.percepts.video.image_folder import open_folder
 from visup.percepts.video.live_source import LiveSource, Reconnection
+from visup.percepts.video.looped import LOOP, LoopedCapture
 from visup.percepts.video.ros_bag import is_bag, open_bag
 from visup.percepts.video.source import VideoSource
 from visup.percepts.video.video_file import VideoFile, open_file
+from visup.redaction import redacted
 
 URL = re.compile(r"^[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 SCHEMES = ("rtsp", "rtsps", "rtmp", "http", "https", "udp", "tcp", "srt")
@@ -37,7 +39,8 @@ def open_source(
 
     Args:
         source: A video file, a folder of images (or a MOT or DAVIS sequence folder), the index of
-            a camera such as '0', a URL (rtsp, http, ...), or a ROS 2 bag (`bag` or `bag#/topic`).
+            a camera such as '0', a URL (rtsp, http, ...), a ROS 2 bag (`bag` or `bag#/topic`), or
+            `loop:CLIP`, a video file that is played over and over as a camera would deliver it.
         every: Give only every n-th frame; frames keep their number and time in the source.
         fps: Frames per second to assume in place of what the source says.
         factory: What opens files, cameras and URLs.
@@ -59,6 +62,8 @@ def open_source(
         return opening.live(f"camera {source}", camera, int(source))
     if URL.match(source):
         return _open_url(source, opening)
+    if source.startswith(LOOP):
+        return _open_loop(source, opening)
     return _open_path(Path(source).expanduser(), opening)
 
 
@@ -99,22 +104,41 @@ def _camera(camera: int | str, factory: CaptureFactory) -> Capture:
 
 
 def _open_url(url: str, opening: _Opening) -> VideoFile | LiveSource:
-    """A recording when the stream knows how many frames it has, else a live source."""
+    """A recording when the stream knows how many frames it has, else a live source.
+
+    It is called by its address without what only its owner should know: names stand in every record.
+    """
+    shown = redacted(url)
     if url.split(":", 1)[0].lower() not in SCHEMES:
         raise SourceError(
-            "this kind of URL cannot be read", where=url, expected=f"one of {', '.join(SCHEMES)}"
+            "this kind of URL cannot be read", where=shown, expected=f"one of {', '.join(SCHEMES)}"
         )
     capture = opening.factory(url)
     if not capture.isOpened():
         raise SourceError(
             "the URL cannot be opened, or what it gives is not a video",
-            where=url,
+            where=shown,
             expected="an address that delivers video",
             hint="check the address and the network",
         )
     if announced_frames(capture):
-        return VideoFile(url, capture, every=opening.every, fps=opening.fps)
-    return opening.live(url, capture, url)
+        return VideoFile(shown, capture, every=opening.every, fps=opening.fps)
+    return opening.live(shown, capture, url)
+
+
+def _open_loop(source: str, opening: _Opening) -> LiveSource:
+    path = Path(source.removeprefix(LOOP)).expanduser()
+    if not path.is_file():
+        raise SourceError(
+            "there is no such clip to play over and over",
+            where=source,
+            expected=f"{LOOP}CLIP, a video file",
+            hint=_nearest(path),
+        )
+    clip = LoopedCapture(str(path), opening.factory, opening.fps)
+    if not clip.isOpened():
+        raise SourceError("this is not a video that can be read", where=source)
+    return LiveSource(source, clip, every=opening.every, fps=opening.fps)
 
 
 def _open_path(path: Path, opening: _Opening) -> VideoSource:

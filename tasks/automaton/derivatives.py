@@ -25,6 +25,7 @@ from visup.tasks.automaton.states import (
     State,
     TaskStep,
     leaves,
+    paused_by,
     with_leaves,
 )
 from visup.tasks.grammar.conditions import Fact
@@ -265,7 +266,7 @@ def _surrounded(
     todo = replace(todo, course=course.item)
     if isinstance(course, Timed):
         return _timed(task, todo, course.clauses, now)
-    kinds = {c.kind for c in course.conditions}
+    kinds = {c.kind for c in course.conditions} - {"pauses"}  # which hold each for itself
     outer = tuple(c for c in todo.conditions if c.kind not in kinds)
     return replace(todo, conditions=(*outer, *course.conditions))
 
@@ -278,7 +279,8 @@ def _timed(
         if isinstance(clause, Hold):
             continuation = replace(continuation, hold_s=seconds)
         elif isinstance(clause, Deadline):
-            due = RunningDeadline(seconds, continuation.stage, now + seconds)
+            pauses = paused_by(continuation.conditions)
+            due = RunningDeadline(seconds, continuation.stage, now + seconds, pauses)
             continuation = replace(continuation, deadlines=(*continuation.deadlines, due))
     return continuation
 

@@ -22,6 +22,7 @@ class RunningDeadline:
     Attributes:
         seconds: As written.
         stage: The stage that says it.
+        pauses: The pause conditions around it, during which it does not run.
         at: When the time is over, seconds; takes no part in equality, so that two ways to the
             same place are seen to be the same place.
     """
@@ -29,6 +30,7 @@ class RunningDeadline:
     seconds: float
     stage: str
     at: float = field(compare=False)
+    pauses: tuple[StageCondition, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,8 @@ class TaskStep:
         stage: The innermost stage that asks for it.
         hold_s: Seconds for which it must hold, or None when the course does not say.
         deadlines: Each `within` that has the action inside.
-        conditions: By what it begins, ends, progresses or fails, where the course says so; one of a kind.
+        conditions: By what it begins, ends, progresses or fails, where the course says so, one of a kind;
+            and by what it is paused, the outermost first.
         inside: Every stage that has the action inside, the innermost with them.
         already: Whether it is done also by what has been so since before its turn.
         delay: Least and greatest time, seconds, from the end of what comes before until it begins, or None.
@@ -61,9 +64,24 @@ class TaskStep:
         """What the course says of how it begins, ends, progresses or fails, or None."""
         return next((s for s in self.conditions if s.kind == kind), None)
 
+    @property
+    def pauses(self) -> tuple[StageCondition, ...]:
+        """The conditions that pause it, the outermost first."""
+        return paused_by(self.conditions)
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the course says by what it begins, ends, progresses or fails."""
+        return len(self.conditions) > len(self.pauses)
+
     def same_as(self, other: TaskStep) -> bool:
         """Whether both ask the same action of the same actors."""
         return (self.action, self.actors) == (other.action, other.actors)
+
+
+def paused_by(conditions: tuple[StageCondition, ...]) -> tuple[StageCondition, ...]:
+    """Those of some stage conditions that pause."""
+    return tuple(c for c in conditions if c.kind == "pauses")
 
 
 @dataclass(frozen=True, slots=True)

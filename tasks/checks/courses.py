@@ -185,6 +185,9 @@ class CourseCheck:
                         "E235", what, sign.span, f"one `{sign.kind} when`", hint
                     )
                 told.add(sign.kind)
+                if sign.kind == "pauses" and self.grammar.sole_fact(course.item) == sign.condition:
+                    what = f"what is asked for, `{sign.condition}`, also pauses it, so it is never done"
+                    yield self.source.fault("E208", what, sign.span, "another condition")
                 if sign.kind in ("begins", "ends") and self.grammar.is_sequential(course.item):
                     what = f"`{sign.kind} when` stands behind things that follow one another"
                     hint = f"put it behind the one that {sign.kind} so"

@@ -238,7 +238,8 @@ class NameCheck:
         for b in bystanders:
             if b.name in task_actors(self.task):
                 what = f"`{b.name}` is declared as a bystander, but it takes part"
-                yield self.source.fault("E224", what, b.span, "another name")
+                expected = f"`optional actor {b.name}`, or another name"
+                yield self.source.fault("E224", what, b.span, expected)
         kinds: tuple[tuple[str, Sequence[Declared]], ...] = (
             ("a bystander", bystanders),
             ("a zone", self.task.zones),

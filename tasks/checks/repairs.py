@@ -15,6 +15,7 @@ from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.edits import edits, hint_of
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
+from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
 from visup.tasks.grammar.statement import RESERVED_WORDS
 from visup.tasks.grammar.units import UNITS
 
@@ -57,9 +58,11 @@ WORDS = (*RESERVED_WORDS, *ACTIONS, "leftmost", "rightmost", "ignored")
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
              "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
 KEYWORD = (
-    r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|when|any|order|already|each"
+    r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|pauses|when|any|order|already|each"
     r"|of)"
 )
+SIGN = r"begins|ends|fails|progresses|pauses"
+MEANT = "|".join(SIGNS_MEANT)
 NAME = r"[^\W\d]\w*"
 CALL = rf"{NAME}\s*\([^()]*\)"
 TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"
@@ -130,8 +133,11 @@ USUAL = (
     _usual("E130", r"\binclude\s+([\w./-]+)", r'include "\1"'),
     _usual("E131", rf"\bzone\s+({NAME})\b.*$", r"zone \1 is (100, 50) (300, 50) (300, 200)"),
     _usual("E132", rf"\bparameter\s+({NAME})\s*(?:=|:|:=)?\s*(?=\d)", r"parameter \1 is "),
-    _usual("E133", r"\b(begins|ends|fails|progresses)\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
-    _usual("E133", rf"\b(begins|ends|fails|progresses)\s+(?={NAME}\()", r"\1 when "),
+    _usual("E208", r"\s*\bpauses\s+when\b.*$", ""),
+    _usual("E133", rf"\b({SIGN})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
+    _usual("E133", rf"\b({SIGN})\s+(?={NAME}\()", r"\1 when "),
+    _usual("E133", rf"\b({MEANT})\s+(?:when|if|while|on)\b", lambda m: f"{SIGNS_MEANT[m[1]]} when"),
+    _usual("E133", rf"\b({MEANT})\s+(?={NAME}\()", lambda m: f"{SIGNS_MEANT[m[1]]} when "),
     _usual("E134", r"\b(at\s+(?:least|most)\s+\d+)\b(?!\s*times?)", r"\1 times"),
     _usual("E134", r"\btwice\b", "at least 2 times at most 2 times"),
     _usual("E134", r"\b(?:thrice|three times)\b", "at least 3 times at most 3 times"),

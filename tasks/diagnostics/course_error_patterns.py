@@ -158,13 +158,24 @@ def commas(text: str) -> RecognisedError | None:
     return None
 
 
+STAGE_CONDITIONS = "`begins when`, `ends when`, `progresses when`, `fails when` or `pauses when`"
+SIGNS_MEANT = {
+    "starts": "begins", "stops": "ends", "pause": "pauses", "paused": "pauses", "suspends": "pauses",
+    "suspended": "pauses", "interrupted": "pauses", "interrupts": "pauses", "waits": "pauses",
+    "halts": "pauses",
+}  # fmt: skip
+"""What people write in place of the word of a stage condition."""
+
+
 def signs(text: str) -> RecognisedError | None:
     """`begins when` and the like without a condition, or without `when`."""
     m = re.search(
-        r"[>)?*+smh]\s+((?:begins|ends|progresses|fails|starts|stops)\b)(?!\s+when\b)", text
+        rf"[>)?*+smh]\s+((?:begins|ends|progresses|fails|pauses|{'|'.join(SIGNS_MEANT)})\b)"
+        r"(?!\s+when\b)",
+        text,
     )
     if m is not None:
-        meant = {"starts": "begins", "stops": "ends"}.get(m[1], m[1])
+        meant = SIGNS_MEANT.get(m[1], m[1])
         what = f"`{m[1]}` is not followed by `when` and a condition"
         return RecognisedError(
             "E133", m.start(1), len(m[1]), what, f"`{meant} when touching(arm, satellite)`"
@@ -174,11 +185,10 @@ def signs(text: str) -> RecognisedError | None:
         what = "`when` is not followed by a condition"
         expected = "such as `when touching(arm, satellite) and not converging(arm, satellite)`"
         return RecognisedError("E133", m.start(), 4, what, expected)
-    m = re.search(r"\b(starts|stops|succeeds|completes)\s+when\b", text)
+    m = re.search(rf"\b({'|'.join(SIGNS_MEANT)}|succeeds|completes)\s+when\b", text)
     if m is not None:
         what = f"`{m[1]} when` is not part of the language"
-        expected = "`begins when`, `ends when`, `progresses when` or `fails when`"
-        return RecognisedError("E133", m.start(1), len(m[1]), what, expected)
+        return RecognisedError("E133", m.start(1), len(m[1]), what, STAGE_CONDITIONS)
     return None
 
 

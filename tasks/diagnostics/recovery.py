@@ -12,6 +12,7 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedTok
 
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.tasks.diagnostics.course_error_patterns import STAGE_CONDITIONS
 from visup.tasks.diagnostics.error_patterns import recognise_error
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import collect, read, read_statements
@@ -194,7 +195,7 @@ SAID = {
     "UNIT": "a unit",
     "COUNT": "a whole number",
     "TEXT": "a text in double quotes",
-    "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
+    "SIGN": STAGE_CONDITIONS,
     "COMPARE": "`<` or `>`",
     "BYSTANDER": "`bystander`",
     "BYSTANDERS": "`bystanders ignored`",
@@ -213,7 +214,8 @@ SAID = {
 }
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
-    "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
+    "ends", "progresses", "fails", "pauses",
+    "when", "and", "not", "another", "larger", "smaller", "than", "what",
     "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
     "already", "each", "on", "failure", "first", "rests", "from", "part", "of", "the", "other",
 )  # fmt: skip

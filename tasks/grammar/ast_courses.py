@@ -54,19 +54,20 @@ class Delay:
 
 
 Clause: TypeAlias = Hold | Deadline | Delay
+ConditionKind: TypeAlias = Literal["begins", "ends", "progresses", "fails", "pauses"]
 
 
 @dataclass(frozen=True, slots=True)
 class StageCondition:
-    """`fails when diverging(a, b) for 2 s`: by what an action begins, ends, progresses or fails.
+    """`fails when diverging(a, b) for 2 s`: by what an action begins, ends, progresses, fails or is paused.
 
     Attributes:
-        kind: Which of the four.
+        kind: Which of the five.
         condition: What must be seen.
         lasting: How long it must be seen without a break, or None.
     """
 
-    kind: Literal["begins", "ends", "progresses", "fails"]
+    kind: ConditionKind
     condition: Condition
     lasting: Hold | None = None
     span: Span = field(default=NOWHERE, compare=False, repr=False)

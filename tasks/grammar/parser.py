@@ -12,6 +12,7 @@ from lark import Lark, Token, Transformer
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span, Unit
+from visup.tasks.grammar.ast_courses import ConditionKind
 from visup.tasks.grammar.conditions import Condition, PartName, Range
 from visup.tasks.grammar.criteria import (
     Another,
@@ -312,7 +313,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Delay(items[1], _third(items), _of(items[0]).to(items[-1].span))
 
     def sign(self, items: list[Any]) -> StageCondition:
-        kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
+        kind = cast("ConditionKind", str(items[0]))
         return StageCondition(kind, items[1], _third(items), _of(items[0]).to(items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:

@@ -17,6 +17,7 @@ from visup.tasks.grammar.nodes import (
     Course,
     Reference,
     Stage,
+    StageCondition,
     Task,
     walk,
 )
@@ -82,7 +83,9 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
 @cached_by_identity
 def task_actors(task: Task) -> tuple[str, ...]:
     """All actors of a task, in the order in which its stages ask for them; machines of parts last."""
-    staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
+    root = task.stage(task.name)
+    grouped = [s.name for s in _reached(task, root)] if root else []
+    staged = [a for s in (*stage_names(task), *grouped) for a in stage_actors(task, s)]
     watched = [
         a for i in task.invariants for f in facts_of(i.condition) for a in fact_key(task, f)[1]
     ]
@@ -119,6 +122,16 @@ def signals_named(task: Task) -> tuple[str, ...]:
     facts += [f for i in task.invariants for f in facts_of(i.condition)]
     asked = (action_of(f) for f in facts if action_of(f).name in SIGNAL_WORDS)
     return tuple(dict.fromkeys(str(a.words[0]) for a in asked if a.name != "signal_known"))
+
+
+def pause_conditions(task: Task) -> Iterator[StageCondition]:
+    """What pauses some stage of a task, as often as it is said."""
+    for stage in task.stages:
+        courses = () if isinstance(stage.body, Actors) else walk(stage.body)
+        told = (
+            c for course in courses if isinstance(course, Conditioned) for c in course.conditions
+        )
+        yield from (c for c in told if c.kind == "pauses")
 
 
 def _facts(stage: Stage) -> Iterator[Fact]:
@@ -210,8 +223,10 @@ def _names(task: Task, node: Course) -> tuple[str, ...]:
 
 
 def _asks(task: Task, stage: Stage) -> bool:
+    # What is said of the progress of a group asks for nothing: its stages do.
     return not isinstance(stage.body, Actors) and any(
-        isinstance(n, Action | Comparison) or _names(task, n) for n in walk(stage.body)
+        isinstance(n, Action | Comparison) or (isinstance(n, Reference) and _names(task, n))
+        for n in walk(stage.body)
     )
 
 

@@ -48,7 +48,15 @@ class Advance:
     def outcomes(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
     ) -> Iterator[tuple[TaskHypothesis, float]]:
-        """A hypothesis and those that come out of it by leaving a step, with their probabilities."""
+        """A hypothesis and those that come out of it by leaving a step, with their probabilities.
+
+        What is paused is not left.
+        """
+        if all(self.observe(x.step).paused for x in leaves(hypothesis.state)):
+            yield hypothesis, 1.0
+            return
+        barred = tuple(t.entered for t in transitions if self._is_paused(t))
+        transitions = [t for t in transitions if not self._is_paused(t)]
         hypothesis = replace(hypothesis, met=self._met(hypothesis, transitions))
         ends = any(t.ends and _may_end(t) for t in transitions)
         if ends and hypothesis.finished is None:
@@ -65,7 +73,12 @@ class Advance:
                 yield self._moved(hypothesis, transition), chance
         if not forced:
             considered = tuple((t.entered, support) for t, support in supported)
+            considered += tuple(c for c in hypothesis.considered if c[0] in barred)
             yield replace(hypothesis, considered=considered), max(0.0, 1.0 - gone)
+
+    def _is_paused(self, transition: OpenTransition) -> bool:
+        """Whether work is paused on any step that a transition leaves."""
+        return any(self.observe(x.step).paused for x in transition.left)
 
     def _chances(
         self, hypothesis: TaskHypothesis, supported: Supported, ends: bool, forced: bool
@@ -132,7 +145,8 @@ class Advance:
     def _opens(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
         """Whether all that a transition enters was seen to begin."""
         met = dict(hypothesis.met).get(transition.entered, -math.inf)
-        return self.now - met <= self.steps.settings.contact_s
+        passed = (self.observe(s).elapsed(s, met, self.now) for s in transition.entered)
+        return all(p <= self.steps.settings.contact_s for p in passed)
 
     def _met(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
@@ -142,20 +156,21 @@ class Advance:
         for transition in transitions:
             if self._goes_round(transition):
                 continue
-            entries = (self.observe(s).entry for s in transition.entered)
-            if transition.entered and all(self._lasted(entry) for entry in entries):
+            entries = ((s, self.observe(s).entry) for s in transition.entered)
+            if transition.entered and all(self._lasted(s, entry) for s, entry in entries):
                 met[transition.entered] = self.now
         return tuple(met.items())
 
-    def _lasted(self, relation: Relation | None) -> bool:
+    def _lasted(self, step: TaskStep, relation: Relation | None) -> bool:
         """Whether a relation by which a step begins has lasted long enough."""
         if relation is None:
             return False
-        return self.now - relation.since >= self.steps.settings.enter_s - 1e-9
+        lasted = self.observe(step).elapsed(step, relation.since, self.now)
+        return lasted >= self.steps.settings.enter_s - 1e-9
 
     def _nearer(self, step: TaskStep) -> bool:
         """Whether a step comes nearer; one whose course says when it begins only begins."""
-        return step.condition("begins") is None and self._lasted(self.observe(step).helps)
+        return step.condition("begins") is None and self._lasted(step, self.observe(step).helps)
 
     def _skipped(self, transition: OpenTransition) -> float:
         """Probability that the steps that a transition leaves are left as they stand."""
@@ -204,20 +219,23 @@ class Advance:
         What goes on until something else begins (`converging`) may have begun before its turn, and so
         may what is measured; and what was asked for already between the same actors goes on.
         """
-        if not transition.entered or any(s.already or s.conditions for s in transition.entered):
+        if not transition.entered or any(s.already or s.is_told for s in transition.entered):
             return False
         begun = [x.payload.begun for x in transition.left]
         if any(b is None for b in begun):
             return False  # whether it came before what was never seen, nobody knows
-        turn = min(b for b in begun if b is not None) - BEFORE_S
+        turn = min(b for b in begun if b is not None)
         asked = {frozenset(x.step.actors) for x in transition.left}
         asked |= {frozenset(b.step.actors) for b in behind(hypothesis.backpointer)}
         return all(self._before(s, turn, asked) for s in transition.entered)
 
     def _before(self, step: TaskStep, turn: float, asked: set[frozenset[str]]) -> bool:
-        """Whether a step was done before a moment, and by nothing that the course had asked for."""
-        meaning, held_by = self.steps.actions[step.action], self.observe(step).held_by
-        if meaning.lasts or meaning.measures or held_by is None or held_by.since >= turn:
+        """Whether a step was done well before a moment, and by nothing that the course had asked for."""
+        meaning, seen = self.steps.actions[step.action], self.observe(step)
+        held_by = seen.held_by
+        if meaning.lasts or meaning.measures or held_by is None:
+            return False
+        if seen.elapsed(step, held_by.since, turn) <= BEFORE_S:
             return False
         return frozenset(step.actors) not in asked
 

@@ -35,6 +35,8 @@ def is_first(stages: tuple[StageBelief, ...]) -> bool:
 def _begun(before: StageBelief, now: StageBelief, stirs: bool) -> bool:
     if now.status is Status.PENDING:
         return False
+    if now.status is Status.PAUSED:
+        return before.begun
     anew = before.status is Status.DONE and now.status is Status.ACTIVE
     return stirs or (before.begun and not anew) or now.status not in (Status.ACTIVE, Status.UNKNOWN)
 

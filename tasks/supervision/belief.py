@@ -17,6 +17,7 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
+from visup.tasks.automaton.states import leaves
 from visup.tasks.grammar.structure import stage_names
 from visup.tasks.supervision.hypotheses import (
     NOT_BEGUN,
@@ -29,9 +30,10 @@ from visup.tasks.supervision.hypotheses import (
     under_way,
 )
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.supervision.sentences import evidence, in_retrospect, outcome
+from visup.tasks.supervision.sentences import evidence, in_retrospect, outcome, paused_by
 from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.task_inference import TaskActivity
+from visup.tasks.verification.pauses import Pause
 from visup.tasks.verification.step_monitor import BAD
 
 NEAR = 0.01  # hypotheses that are so likely against the best have a say in what is expected
@@ -70,7 +72,7 @@ def task_belief(
             expected=_expected(model, snapshot, model.filter.start(snapshot.mind.time)),
             evidence=interrupted or _missing(model, snapshot),
         )
-    stages = tuple(stage_beliefs(model, posterior))
+    stages = tuple(stage_beliefs(model, posterior, snapshot))
     verdict, probability, teller = _outcome(posterior)
     current = None if teller.finished is not None else _current(posterior)
     if current is not None and verdict is not Verdict.FAILED:
@@ -168,7 +170,9 @@ def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
     return NOT_BEGUN if waits and round(lead, WAITING_DIGITS) <= 0.0 else standing
 
 
-def stage_beliefs(model: MonitoredPhases, posterior: TaskHypotheses) -> Iterator[StageBelief]:
+def stage_beliefs(
+    model: MonitoredPhases, posterior: TaskHypotheses, snapshot: TaskSnapshot
+) -> Iterator[StageBelief]:
     """How each stage stands by all hypotheses together, in the order of the task."""
     marginals = stage_marginals(posterior)
     for stage in stage_names(model.task):
@@ -179,14 +183,15 @@ def stage_beliefs(model: MonitoredPhases, posterior: TaskHypotheses) -> Iterator
             continue
         hypotheses = (w.value for w in posterior.hypotheses.values())
         teller = next(h for h in hypotheses if standings(h).get(stage) == standing)
-        belief = _stage_belief(model, teller, stage, posterior.time)
+        belief = _stage_belief(model, teller, stage, snapshot)
         yield replace(belief, confidence=chances[standing] * belief.confidence)
 
 
 def _stage_belief(
-    model: MonitoredPhases, hypothesis: TaskHypothesis, stage: str, now: float
+    model: MonitoredPhases, hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot
 ) -> StageBelief:
     """What a hypothesis tells of a stage that it has begun."""
+    now = snapshot.mind.time
     past = next((p for p in hypothesis.past if p.stage == stage), None)
     leaf = under_way(hypothesis).get(stage)
     if leaf is None or (past is not None and past.status is Status.FAILED):
@@ -197,8 +202,19 @@ def _stage_belief(
     if hypothesis.finished is not None:
         _, why = outcome(leaf.step, meaning, monitor, hypothesis.finished)
         return StageBelief(stage, Status.DONE, hypothesis.finished, monitor.confidence, why)
+    pause = _pause(hypothesis, stage, snapshot)
+    if pause is not None and monitor.status not in BAD:
+        why = paused_by(pause, model.task, model.actions)
+        return StageBelief(stage, Status.PAUSED, pause.spans[-1][0], monitor.confidence, why)
     why = evidence(leaf.step, meaning, monitor, now, model.actions)
     return StageBelief(stage, monitor.status, monitor.since, monitor.confidence, why)
+
+
+def _pause(hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot) -> Pause | None:
+    """The pause of a stage of which every step under way is paused, or None."""
+    steps = (x.step for x in leaves(hypothesis.state) if x.step.stage == stage)
+    pauses = [snapshot.pauses.now(s.pauses) for s in steps]
+    return pauses[0] if all(p is not None for p in pauses) else None
 
 
 def _outcome(posterior: TaskHypotheses) -> tuple[Verdict, float, TaskHypothesis]:

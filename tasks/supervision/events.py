@@ -26,12 +26,15 @@ from visup.tasks.verification.step_monitor import BAD
 
 KINDS = {
     Status.PROGRESSING: "stage_progressing",
+    Status.PAUSED: "stage_paused",
     Status.STALLED: "stage_stalled",
     Status.FAILING: "stage_failing",
     Status.FAILED: "stage_failed",
     Status.DONE: "stage_done",
     Status.UNKNOWN: "stage_unknown",
 }
+GOES_ON = (Status.ACTIVE, Status.PROGRESSING, Status.STALLED)
+"""Of a stage that was paused and stands so now it is told that it goes on, and no more."""
 
 
 def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) -> Iterator[Event]:
@@ -155,6 +158,9 @@ def _kinds(was: StageBelief | None, now: StageBelief) -> Iterator[str]:
     if again or (now.begun and not (was is not None and was.begun)):
         yield "stage_started"
     if now.status is before:
+        return
+    if before is Status.PAUSED and now.status in GOES_ON:
+        yield "stage_resumed"
         return
     if now.status in KINDS and not (before is Status.UNKNOWN and now.status is Status.PENDING):
         yield KINDS[now.status]

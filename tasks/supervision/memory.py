@@ -8,6 +8,7 @@ from visup.agent import TaskBelief
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.replay import PastLook
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity
+from visup.tasks.verification.kept import NOTHING_KEPT, Kept
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class TaskMemory:
         broken_since: Since when each invariant has been broken, or None.
         rival: A matching that would change who plays whom, by actor; empty when there is none.
         rival_since: Since when it has been the better one.
-        lasting: Since when what is no plain relation of the mind has been true, by key.
+        kept: What is kept of its facts: how long they have been so, and when they paused work.
         activity: Whether it is going on, where several tasks are given.
         gain: The evidence that it is, of each second, as it was seen last.
         inferred: Seconds of the step in which it was last inferred whether it is.
@@ -44,7 +45,7 @@ class TaskMemory:
     broken_since: tuple[float | None, ...] = ()
     rival: tuple[int | None, ...] = ()
     rival_since: float = 0.0
-    lasting: tuple[tuple[str, float], ...] = ()
+    kept: Kept = NOTHING_KEPT
     activity: TaskActivity = ALONE
     gain: float = 0.0
     inferred: float = 0.0

@@ -23,7 +23,8 @@ from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, StageHmm
 from visup.tasks.automaton.states import TaskStep, leaves, with_leaves
 from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.automaton.transitions import HiddenState
-from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.nodes import StageCondition, Task
+from visup.tasks.grammar.structure import pause_conditions
 from visup.tasks.supervision.advance import Advance, Observe
 from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransitions
@@ -78,6 +79,11 @@ class MonitoredPhases:
     def steps(self) -> StepModel:
         """What is read off the monitors of steps."""
         return StepModel(self.actions, self.settings, self.hmm)
+
+    @cached_property
+    def pauses(self) -> tuple[StageCondition, ...]:
+        """The conditions that pause some of it, each once."""
+        return tuple(dict.fromkeys(pause_conditions(self.task)))
 
     @cached_property
     def _open(self) -> OpenTransitions:
@@ -138,11 +144,14 @@ class MonitoredPhases:
         """
         if len(posterior.hypotheses) == 1:
             return
-        since, until = posterior.time - self.hmm.look_s, now - self.hmm.look_s
+        look = self.hmm.look_s
         nodes = dict.fromkeys(w.value.node for w in posterior.hypotheses.values())
         for step in dict.fromkeys(s for node in nodes for s in self._due(node)):
-            held_by = observe(step).held_by
-            if held_by is not None and since < held_by.since <= until:
+            seen = observe(step)
+            held_by = seen.held_by
+            if held_by is None or seen.elapsed(step, held_by.since, now) < look:
+                continue
+            if seen.elapsed(step, held_by.since, posterior.time) < look:
                 yield step, held_by
 
     def _due(self, node: int) -> tuple[TaskStep, ...]:
@@ -213,7 +222,7 @@ class MonitoredPhases:
     ) -> tuple[TaskHypothesis, float]:
         """A hypothesis after `dt` seconds in which it stays where it is, and how well that fits."""
         finished = hypothesis.finished
-        if finished is not None and now - finished > self.settings.regret_s:
+        if finished is not None and self._settled(hypothesis, finished, observe, now):
             return hypothesis, 1.0
         done, moment = finished is not None, Moment(now, dt)
         new = [
@@ -223,3 +232,11 @@ class MonitoredPhases:
         lost = any(x.payload.status in BAD for x in new)
         state = with_leaves(hypothesis.state, iter(new))
         return replace(hypothesis, state=state, finished=None if lost else finished), fit
+
+    def _settled(
+        self, hypothesis: TaskHypothesis, finished: float, observe: Observe, now: float
+    ) -> bool:
+        """Whether a task has been done for so long that nothing undoes it."""
+        steps = [x.step for x in leaves(hypothesis.state)]
+        worked = min(observe(s).elapsed(s, finished, now) for s in steps)
+        return worked > self.settings.regret_s

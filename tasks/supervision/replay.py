@@ -19,6 +19,7 @@ from visup.rules.relations.zones import ZONES
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
+from visup.tasks.verification.kept import NOTHING_KEPT, Kept
 
 KEPT_S = 60.0
 """For how long what was seen is kept."""
@@ -37,19 +38,19 @@ class PastLook:
     Attributes:
         mind: What was believed of the objects, without what nobody asks for later.
         posterior: The hypotheses about the task before that look.
-        lasting: Since when what is no plain relation had been true before it, by key.
+        kept: What was kept of its facts before it.
     """
 
     mind: Mind
     posterior: TaskHypotheses | None
-    lasting: tuple[tuple[str, float], ...] = ()
+    kept: Kept = NOTHING_KEPT
 
 
 def remembered(
     looks: tuple[PastLook, ...],
     mind: Mind,
     posterior: TaskHypotheses | None,
-    lasting: tuple[tuple[str, float], ...],
+    kept: Kept,
 ) -> tuple[PastLook, ...]:
     """The looks with the present one, if it is time for it; the oldest are forgotten.
 
@@ -57,12 +58,12 @@ def remembered(
         looks: What was kept so far.
         mind: What is believed now.
         posterior: The hypotheses before this look.
-        lasting: As of `PastLook`.
+        kept: As of `PastLook`.
     """
     if looks and mind.time - looks[-1].mind.time < EVERY_S - 1e-9:
         return looks
-    kept = (p for p in looks if mind.time - p.mind.time <= KEPT_S)
-    return (*kept, PastLook(_stripped(mind), posterior, lasting))
+    recent = (p for p in looks if mind.time - p.mind.time <= KEPT_S)
+    return (*recent, PastLook(_stripped(mind), posterior, kept))
 
 
 def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -> bool:
@@ -74,7 +75,7 @@ def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -
 
 def replayed(
     model: MonitoredPhases, looks: Sequence[PastLook], bindings: Sequence[Binding]
-) -> tuple[TaskHypotheses | None, tuple[tuple[str, float], ...]]:
+) -> tuple[TaskHypotheses | None, Kept]:
     """The hypotheses about a task after what was kept, had it been known who plays whom.
 
     Args:
@@ -83,17 +84,17 @@ def replayed(
         bindings: Who plays whom, as it is known now.
 
     Returns:
-        The hypotheses, and since when what is no plain relation has been true.
+        The hypotheses, and what is kept of the facts.
     """
     if not looks:
-        return None, ()
-    posterior, lasting = looks[0].posterior, looks[0].lasting
+        return None, NOTHING_KEPT
+    posterior, kept = looks[0].posterior, looks[0].kept
     for look in looks:
         known = tuple(_as_of(b, look.mind) for b in bindings)
-        snapshot = TaskSnapshot(look.mind, known, model, dict(lasting))
+        snapshot = TaskSnapshot(look.mind, known, model, kept)
         posterior = followed(model, posterior, snapshot)
-        lasting = snapshot.since
-    return posterior, lasting
+        kept = snapshot.kept
+    return posterior, kept
 
 
 def followed(

@@ -8,6 +8,10 @@ from collections.abc import Mapping, Sequence
 from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import TaskStep
+from visup.tasks.grammar.conditions import Action
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.structure import fact_key
+from visup.tasks.verification.pauses import Pause
 from visup.tasks.verification.step_monitor import StepMonitor
 from visup.tasks.verification.told import since_told
 
@@ -41,7 +45,7 @@ def evidence(
         case Status.FAILING | Status.FAILED if monitor.early:
             return _too_soon(step, meaning, monitor)
         case Status.FAILED if monitor.late:
-            return _late(step, now)
+            return _late(step, monitor)
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
             what = _say(monitor.contrary, actions)
             known = monitor.entered if monitor.contrary_since is None else monitor.contrary_since
@@ -93,7 +97,7 @@ def outcome(
     """
     who, was = names(step.actors), "was" if len(step.actors) < 2 else "were"
     if monitor.late:
-        return Status.FAILED, _late(step, now)
+        return Status.FAILED, _late(step, monitor)
     if step.hold_s is not None and not monitor.fulfilled:
         return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
     end = step.condition("ends")
@@ -210,9 +214,19 @@ def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -
     )
 
 
-def _late(step: TaskStep, now: float) -> str:
+def paused_by(pause: Pause, task: Task, actions: Words) -> str:
+    """What pauses work, and since when: one clause."""
+    condition = pause.condition.condition
+    if not isinstance(condition, Action):
+        return f"`{condition}` since {pause.since:.1f} s"
+    key, actors = fact_key(task, condition)
+    have = "has" if len(actors) < 2 else "have"
+    return f"{names(actors)} {have} been {_say(key, actions)} since {pause.since:.1f} s"
+
+
+def _late(step: TaskStep, monitor: StepMonitor) -> str:
     """Which time ran out before a step was over, or had begun."""
-    due = next((d for d in step.deadlines if now > d.at), None)
+    due = monitor.missed
     if due is not None:
         return f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
     assert step.delay is not None
@@ -243,6 +257,8 @@ UNDONE = "Stage `{stage}` is no longer complete"
 STAGE_WORDS = {
     "stage_started": "Stage `{stage}` of task `{task}` has begun",
     "stage_progressing": "Stage `{stage}` is progressing satisfactorily",
+    "stage_paused": "Stage `{stage}` is paused",
+    "stage_resumed": "Stage `{stage}` goes on",
     "stage_stalled": "Stage `{stage}` makes no progress",
     "stage_failing": "Stage `{stage}` is failing",
     "stage_failed": "Stage `{stage}` has failed",

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from visup.agent import Binding, Mind, Truth
+from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Hold
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.verification.observe import NEVER, ActionObservation, RelationLookup
+from visup.tasks.verification.kept import NOTHING_KEPT, Kept
+from visup.tasks.verification.observe import ActionObservation, RelationLookup
 from visup.tasks.verification.observe import observe as observe_action
 from visup.tasks.verification.stage_conditions import ConditionEvaluator
 
@@ -21,7 +21,7 @@ class TaskSnapshot:
         mind: What is believed.
         bindings: Who plays which actor.
         model: The task with the meanings of its actions.
-        before: Since when what is no plain relation of the mind has been true, by key.
+        before: What was kept of the facts of the step before.
     """
 
     def __init__(
@@ -29,34 +29,52 @@ class TaskSnapshot:
         mind: Mind,
         bindings: tuple[Binding, ...],
         model: MonitoredPhases,
-        before: Mapping[str, float] = NEVER,
+        before: Kept = NOTHING_KEPT,
     ) -> None:
         self.mind = mind
         self.bindings = bindings
         self._actions = model.actions
         self._objects = {b.actor: b.object_id for b in bindings}
-        self._relations = RelationLookup(mind, model.looks, before)
+        self._relations = RelationLookup(mind, model.looks, dict(before.lasting))
         self._conditions = ConditionEvaluator(model.task, self._holds, self._relations)
         self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
         self._judged: dict[TaskStep, ActionObservation] = {}
+        self._pausing = model.pauses
+        self.pauses = before.pauses.noted(
+            model.pauses,
+            lambda c: self._conditions.relation(c.condition, c.lasting),
+            mind.time if before.time is None else before.time,
+            mind.time,
+            model.settings.unseen_s,
+        )
 
     def observe(self, step: TaskStep) -> ActionObservation:
         """What is seen now of a step."""
         if not step.conditions:
             return self._look(step.action, step.actors)
         if step not in self._judged:
-            seen = self._look(step.action, step.actors)
-            self._judged[step] = self._conditions.apply(step, seen)
+            self._judged[step] = self._judge(step)
         return self._judged[step]
+
+    def _judge(self, step: TaskStep) -> ActionObservation:
+        """What is seen of a step of which its course says more than its action."""
+        if self.pauses.now(step.pauses) is not None:
+            return ActionObservation(paused=True, pauses=self.pauses)
+        seen = replace(self._look(step.action, step.actors), pauses=self.pauses)
+        return self._conditions.apply(step, seen)
 
     def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
         """Whether a condition holds, and has for as long as it must."""
         return self._conditions.relation(condition, lasting).truth
 
     @property
-    def since(self) -> tuple[tuple[str, float], ...]:
-        """Since when what is no plain relation of the mind has been true, for the next step."""
-        return tuple(self._relations.after.items())
+    def kept(self) -> Kept:
+        """What is to be kept of the facts for the next step."""
+        lasting = self._relations.after
+        if self.pauses.now(self._pausing) is not None:
+            # Nobody asks for what is paused: it is so after the pause since it was so before.
+            lasting = self._relations.unjudged() | lasting
+        return Kept(self.mind.time, tuple(lasting.items()), self.pauses)
 
     def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
         key = (action, actors)

@@ -88,7 +88,8 @@ def task_reasoner(
     Returns:
         A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
         in order, keeps its memory under `MEMORY`, and gives events 'stage_started',
-        'stage_progressing', 'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
+        'stage_progressing', 'stage_paused', 'stage_resumed',
+        'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
         'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
         'verdict', and concerns 'stage_failing' and 'invariant_broken'.
     """
@@ -225,10 +226,10 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     """One step of one task: bind its actors, follow its hypotheses, judge."""
     settings, now = model.settings, mind.time
     bindings, rival, rival_since = _bind(model, memory, mind)
-    start, since = memory.posterior, memory.lasting
+    start, kept = memory.posterior, memory.kept
     if memory.looks and newly_found(memory.belief.bindings, bindings, mind):
-        start, since = replayed(model, memory.looks, bindings)
-    snapshot = TaskSnapshot(mind, bindings, model, dict(since))
+        start, kept = replayed(model, memory.looks, bindings)
+    snapshot = TaskSnapshot(mind, bindings, model, kept)
     posterior = followed(model, start, snapshot)
     gain = 0.0
     if start is not None and posterior is not None:
@@ -263,11 +264,11 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         broken,
         rival,
         rival_since,
-        snapshot.since,
+        snapshot.kept,
         memory.activity,
         gain,
         memory.inferred,
-        remembered(memory.looks, mind, start, since) if _awaited(model, bindings) else (),
+        remembered(memory.looks, mind, start, kept) if _awaited(model, bindings) else (),
         violated,
         akin,
     )

@@ -46,6 +46,7 @@ WORDS = {
     "ends when": "by what it ends",
     "progresses when": "what counts as progress",
     "fails when": "what counts as failure, in place of the contrary of the action",
+    "pauses when": "while what work is paused: no clock runs, nothing is done or fails",
     "is": "what an actor may be: `is cup`, `is red`, `is the leftmost red`, `is part of arm`",
     "at": "the place of an actor in the image: `at (410, 160)`",
     "another": "an actor alike, but not the same: `is another red`",

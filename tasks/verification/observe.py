@@ -15,6 +15,8 @@ from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.relations.reasoner import kinematics
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.vocabulary import FactEvaluator
+from visup.tasks.automaton.states import TaskStep
+from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NEVER: Mapping[str, float] = MappingProxyType({})
@@ -43,6 +45,8 @@ class ActionObservation:
         observed: Whether anything at all is known about it; False while an actor is not found
             or its object is hidden.
         round: Whether its entry is that two draw nearer or apart of which one goes round the other.
+        paused: Whether the work on it is paused: then nothing is seen of it.
+        pauses: All pauses of the task so far.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -54,6 +58,13 @@ class ActionObservation:
     over: Truth | None = None
     observed: bool = False
     round: bool = False
+    paused: bool = False
+    pauses: PauseRecord = NO_PAUSES
+
+    def elapsed(self, step: TaskStep, since: float, now: float) -> float:
+        """Seconds from one time to another in which the work on a step was not paused."""
+        pauses = step.pauses
+        return self.pauses.elapsed(pauses, since, now) if pauses else now - since
 
 
 UNOBSERVED = ActionObservation()
@@ -79,6 +90,7 @@ class RelationLookup:
         self._before = before
         self._looked: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._judged: set[str] = set()
         self.after: dict[str, float] = {}
 
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
@@ -154,10 +166,15 @@ class RelationLookup:
         While it cannot be observed the time is kept: not seen is not "no".
         """
         key = f"{name} {objects}"
+        self._judged.add(key)
         since = self._before.get(key, self._mind.time)
         if truth is Truth.TRUE or (truth is Truth.UNKNOWN and key in self._before):
             self.after[key] = since
         return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
+
+    def unjudged(self) -> dict[str, float]:
+        """Since when what nobody asked for at this moment was true before it, by key."""
+        return {key: since for key, since in self._before.items() if key not in self._judged}
 
     def first_true(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
         """The first of some relations that is true, or None."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from visup.agent import Relation, Truth
 from visup.rules.formula.nodes import And, Formula, Not, Or
@@ -14,9 +15,14 @@ from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, 
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.verification.observe import ActionObservation, RelationLookup
+from visup.tasks.verification.step_monitor import Worked
 
 Holds = Callable[[str, tuple[str, ...]], Truth]
 """Whether an action holds now, by its key and its actors."""
+
+
+def _passed(since: float, now: float) -> float:
+    return now - since
 
 
 @dataclass(frozen=True)
@@ -46,23 +52,30 @@ class ConditionEvaluator:
                 return disjunction(map(self.truth, parts))
         raise TypeError(f"a task has no condition like {condition}")
 
-    def relation(self, condition: Condition, lasting: Hold | None) -> Relation:
-        """A condition as a relation: true once it has held as long as it must."""
+    def relation(
+        self, condition: Condition, lasting: Hold | None, worked: Worked = _passed
+    ) -> Relation:
+        """A condition as a relation: true once it has held as long as it must, pauses not counted."""
         found = self.relations.lasting(str(condition), (), self.truth(condition))
         if found.truth is not Truth.TRUE or lasting is None:
             return found
         must = value(self.task.amount(lasting.duration))
-        held = self.relations.time - found.since >= must - 1e-9
+        held = worked(found.since, self.relations.time) >= must - 1e-9
         return found if held else replace(found, truth=Truth.FALSE)
 
     def apply(self, step: TaskStep, seen: ActionObservation) -> ActionObservation:
         """A sighting with what the course itself says of the step in place of what its action says."""
+        worked = partial(seen.elapsed, step)
         for sign in step.conditions:
-            seen = self._apply(sign, seen)
+            seen = self._apply(sign, seen, worked)
         return seen
 
-    def _apply(self, sign: StageCondition, seen: ActionObservation) -> ActionObservation:
-        found = self.relation(sign.condition, sign.lasting)
+    def _apply(
+        self, sign: StageCondition, seen: ActionObservation, worked: Worked
+    ) -> ActionObservation:
+        if sign.kind == "pauses":
+            return seen
+        found = self.relation(sign.condition, sign.lasting, worked)
         known = seen.observed or found.truth is not Truth.UNKNOWN
         true = found if found.truth is Truth.TRUE else None
         match sign.kind:

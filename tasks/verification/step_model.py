@@ -33,7 +33,9 @@ class StepModel:
     def looked_at(
         self, leaf: Leaf[StepMonitor], seen: ActionObservation, moment: Moment, done: bool
     ) -> Leaf[StepMonitor]:
-        """A step with what is seen of it in its monitor; `done` when the task is."""
+        """A step with what is seen of it in its monitor; `done` when the task is. A pause shows nothing."""
+        if seen.paused:
+            return leaf
         # A `within` no longer matters once the task is done.
         step = replace(leaf.step, deadlines=()) if done else leaf.step
         meaning = self.actions[step.action]
@@ -41,7 +43,9 @@ class StepModel:
         return replace(leaf, payload=monitor)
 
     def fit(self, leaf: Leaf[StepMonitor], seen: ActionObservation, done: bool, dt: float) -> float:
-        """How well `dt` seconds of what is seen fit a step; 1 at best."""
+        """How well `dt` seconds of what is seen fit a step; 1 at best, and in a pause."""
+        if seen.paused:
+            return 1.0
         if not seen.observed:
             return self.hmm.fit(ActionStatus.UNKNOWN, 1.0, dt)
         if leaf.payload.status in BAD and not done:

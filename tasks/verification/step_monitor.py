@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.states import TaskStep
+from visup.tasks.automaton.states import RunningDeadline, TaskStep
 from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.told import Told, with_told
 
 BAD = (Status.FAILING, Status.FAILED)
+
+Worked = Callable[[float, float], float]
+"""Seconds from one time to another in which work was not paused."""
 
 
 class Moment(NamedTuple):
@@ -54,6 +59,7 @@ class StepMonitor:
         fault: The contrary by which it last failed, or None.
         fault_since: Since when that was so.
         late: Whether a `within` ran out before the step was over; there is no way back from that.
+        missed: That `within`; None where it is the greatest delay that ran out.
         ceased: Whether it once held and then was seen not to.
         unseen_since: Since when nothing is known about it, or None.
         denied: Whether what the course says of its end was last seen not to hold.
@@ -87,6 +93,7 @@ class StepMonitor:
     fault: str | None = None
     fault_since: float = 0.0
     late: bool = False
+    missed: RunningDeadline | None = None
     ceased: bool = False
     unseen_since: float | None = None
     confidence: float = 1.0
@@ -135,18 +142,17 @@ def update(
     if step.condition("begins") is not None and not monitor.opened:
         # Until it begins, nothing that is seen speaks for or against it.
         monitor = replace(monitor, opened=seen.entry is not None)
-        seen = seen if monitor.opened else replace(UNOBSERVED, observed=seen.observed)
+        if not monitor.opened:
+            seen = replace(UNOBSERVED, observed=seen.observed, pauses=seen.pauses)
     if step.delay is not None:
-        monitor = _note_haste(monitor, step.delay[0], seen)
+        monitor = _note_haste(monitor, step, seen)
+    worked = partial(seen.elapsed, step)
     if monitor.early:
-        monitor, seen = _not_yet(monitor, seen, moment, settings)
-    noted = _note_contrary(
-        _note_progress(monitor, step, meaning, seen, moment, settings), seen, now
-    )
-    late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
-    late = late or (noted.begun is None and now > latest(noted, step))
-    noted = replace(noted, late=late)
-    status = _status(noted, seen, now, settings)
+        monitor, seen = _not_yet(monitor, seen, moment, settings, worked)
+    noted = _note_progress(monitor, step, meaning, seen, moment, settings, worked)
+    noted = _note_contrary(noted, seen, now)
+    noted = _note_lateness(noted, step, meaning, seen, now)
+    status = _status(noted, seen, now, settings, worked)
     if status is noted.status:
         return noted
     noted = _note_told(noted, step, status, now)
@@ -172,21 +178,38 @@ def _note_told(monitor: StepMonitor, step: TaskStep, status: Status, now: float)
     return replace(monitor, told=with_told(monitor.told, step.actors, by, now)) if by else monitor
 
 
-def latest(monitor: StepMonitor, step: TaskStep) -> float:
-    """By when a step must have begun, seconds; without end where its course does not say."""
-    return math.inf if step.delay is None else monitor.after + step.delay[1]
+def _note_lateness(
+    monitor: StepMonitor,
+    step: TaskStep,
+    meaning: ActionDefinition,
+    seen: ActionObservation,
+    now: float,
+) -> StepMonitor:
+    """A `within` that has run out, or the greatest delay: there is no way back from that."""
+    if monitor.late:
+        return monitor
+    missed = None if over(monitor, step, meaning) else overdue(step, seen, now)
+    most = math.inf if step.delay is None else step.delay[1]
+    delayed = monitor.begun is None and seen.elapsed(step, monitor.after, now) > most
+    late = missed is not None or delayed
+    return replace(monitor, late=True, missed=missed) if late else monitor
 
 
-def _note_haste(monitor: StepMonitor, least: float, seen: ActionObservation) -> StepMonitor:
+def _note_haste(monitor: StepMonitor, step: TaskStep, seen: ActionObservation) -> StepMonitor:
     """What begins sooner than its course allows counts for nothing until it begins anew."""
     if monitor.held or monitor.early or seen.held_by is None or seen.holds is not Truth.TRUE:
         return monitor
-    passed = seen.held_by.since - monitor.after
-    return replace(monitor, early=True, hasty_s=passed) if passed < least else monitor
+    passed = seen.elapsed(step, monitor.after, seen.held_by.since)
+    hasty = step.delay is not None and passed < step.delay[0]
+    return replace(monitor, early=True, hasty_s=passed) if hasty else monitor
 
 
 def _not_yet(
-    monitor: StepMonitor, seen: ActionObservation, moment: Moment, settings: TaskSettings
+    monitor: StepMonitor,
+    seen: ActionObservation,
+    moment: Moment,
+    settings: TaskSettings,
+    worked: Worked,
 ) -> tuple[StepMonitor, ActionObservation]:
     """What was so before its turn counts for nothing until it has ceased; after a while it is a fault."""
     if not seen.observed:
@@ -198,7 +221,7 @@ def _not_yet(
     held_by = seen.held_by
     monitor = replace(monitor, parted_s=0.0)
     seen = replace(seen, holds=Truth.FALSE, held_by=None, helps=None, entry=None)
-    if held_by is None or moment.now - monitor.entered < settings.early_s:
+    if held_by is None or worked(monitor.entered, moment.now) < settings.early_s:
         return monitor, seen
     since = monitor.entered + settings.early_s
     return monitor, replace(seen, contrary=replace(held_by, since=since))
@@ -210,9 +233,15 @@ def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> boo
     return monitor.fulfilled and (not meaning.lasts or told)
 
 
-def overdue(step: TaskStep, now: float) -> bool:
-    """Whether a `within` around the step has run out."""
-    return any(now > d.at for d in step.deadlines)
+def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadline | None:
+    """The first `within` around the step that has run out, or None; it does not run in pauses around it."""
+
+    def left(due: RunningDeadline) -> float:
+        if not due.pauses:
+            return due.at - now
+        return due.seconds - seen.pauses.elapsed(due.pauses, due.at - due.seconds, now)
+
+    return next((d for d in step.deadlines if left(d) < 0.0), None)
 
 
 def _note_progress(
@@ -222,6 +251,7 @@ def _note_progress(
     seen: ActionObservation,
     moment: Moment,
     settings: TaskSettings,
+    worked: Worked,
 ) -> StepMonitor:
     now, dt = moment
     if not seen.observed:
@@ -232,10 +262,10 @@ def _note_progress(
         held, broken = held + dt, None
         if step.hold_s is None and seen.held_by is not None:
             # What held already when the step began need not hold for as long once more.
-            held = max(held, now - seen.held_by.since)
+            held = max(held, worked(seen.held_by.since, now))
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
-        if now - broken >= settings.gap_s:
+        if worked(broken, now) >= settings.gap_s:
             held, ceased = 0.0, ceased or monitor.fulfilled
     helping = seen.helps is not None
     must = meaning.hold_s if step.hold_s is None else step.hold_s
@@ -280,50 +310,59 @@ def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) ->
 
 
 def _status(
-    monitor: StepMonitor, seen: ActionObservation, now: float, settings: TaskSettings
+    monitor: StepMonitor,
+    seen: ActionObservation,
+    now: float,
+    settings: TaskSettings,
+    worked: Worked,
 ) -> Status:
     if monitor.late:
         return Status.FAILED
     if not seen.observed:
-        return _status_unseen(monitor, now, settings)
-    if _fails(monitor, now, settings):
-        return Status.FAILED if _long_failing(monitor, now, settings) else Status.FAILING
-    if monitor.status in BAD and not _recovered(monitor, now, settings):
-        return Status.FAILED if _long_failing(monitor, now, settings) else monitor.status
+        return _status_unseen(monitor, now, settings, worked)
+    if _fails(monitor, now, settings, worked):
+        return Status.FAILED if _long_failing(monitor, now, settings, worked) else Status.FAILING
+    if monitor.status in BAD and not _recovered(monitor, now, settings, worked):
+        long = _long_failing(monitor, now, settings, worked)
+        return Status.FAILED if long else monitor.status
     if monitor.begun is None:
         return Status.ACTIVE
-    stalled = monitor.helped_at is not None and now - monitor.helped_at >= settings.stalled_s
+    helped = monitor.helped_at
+    stalled = helped is not None and worked(helped, now) >= settings.stalled_s
     return Status.STALLED if stalled else Status.PROGRESSING
 
 
-def _status_unseen(monitor: StepMonitor, now: float, settings: TaskSettings) -> Status:
+def _status_unseen(
+    monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked
+) -> Status:
     """A failing stage stays so while it is not seen; any other becomes unknown after a while."""
     lasting = monitor.status in (Status.FAILING, Status.FAILED, Status.ACTIVE)
-    long = monitor.unseen_since is not None and now - monitor.unseen_since >= settings.unseen_s
+    unseen = monitor.unseen_since
+    long = unseen is not None and worked(unseen, now) >= settings.unseen_s
     return Status.UNKNOWN if long and not lasting else monitor.status
 
 
-def _fails(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+def _fails(monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked) -> bool:
     if monitor.contrary_since is None:
         return False
     patience = settings.contrary_s if monitor.begun is not None else settings.contrary_early_s
-    return now - monitor.contrary_since >= patience - 1e-9
+    return worked(monitor.contrary_since, now) >= patience - 1e-9
 
 
-def _long_failing(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+def _long_failing(monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked) -> bool:
     if monitor.status is Status.FAILED:
         return True
-    return monitor.status is Status.FAILING and now - monitor.since >= settings.failed_s
+    return monitor.status is Status.FAILING and worked(monitor.since, now) >= settings.failed_s
 
 
-def _recovered(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+def _recovered(monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked) -> bool:
     """What has long failed must go well for longer; for good, for as long as that took."""
     if monitor.better_since is None:
         return False
-    lasted = monitor.better_since - monitor.since
+    lasted = worked(monitor.since, monitor.better_since)
     must = max(settings.recover_s, settings.recover_share * lasted)
     must = settings.failed_s if monitor.status is Status.FAILED else must
-    return now - monitor.better_since >= must
+    return worked(monitor.better_since, now) >= must
 
 
 def _first(earlier: float | None, now: float) -> float:

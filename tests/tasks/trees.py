@@ -92,7 +92,7 @@ def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]
 
 
 conditions = st.recursive(facts, _joined, max_leaves=4)
-kinds = st.sampled_from(["begins", "ends", "progresses", "fails"])
+kinds = st.sampled_from(["begins", "ends", "progresses", "fails", "pauses"])
 signs = st.builds(StageCondition, kinds, conditions, st.none() | holds)
 
 

@@ -30,6 +30,7 @@ class WatchOptions(TypedDict, total=False):
     budgets: bool
     realtime: bool | None
     every: int
+    pace: float | None
     fps: float | None
     fov_vertical_deg: float | None
     zones: str | os.PathLike[str] | None

@@ -23,6 +23,7 @@ from visup.api.display import html_with_picture, story, with_picture
 from visup.api.records import Records
 from visup.api.watch_options import TaskLike, WatchOptions, settings_from
 from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.redaction import redacted
 from visup.runs.result import RunResult
 from visup.runs.runner import Audience, fresh_folder, supervised
 from visup.runs.settings import WatchSettings
@@ -129,7 +130,7 @@ class Run(Iterator[Step]):
 
     def __repr__(self) -> str:
         state = "ended" if self.result else "under way" if self._begun else "not begun"
-        return f"Run({self.settings.source!r}, {state}, {len(self._events)} events)"
+        return f"Run({redacted(self.settings.source)!r}, {state}, {len(self._events)} events)"
 
     def __rich__(self) -> RenderableType:
         return with_picture(self._story(), self._last())
@@ -203,7 +204,7 @@ class Run(Iterator[Step]):
         state = "" if self.result else "; the run is under way" if self._begun else "; not begun"
         verdict = self.result.verdict if self.result else self._verdict_so_far()
         return story(
-            f"{self.settings.source}{state}",
+            f"{redacted(self.settings.source)}{state}",
             self._events,
             verdict,
             has_task=bool(self.settings.tasks),

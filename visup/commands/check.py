@@ -25,24 +25,9 @@ def check(
     and the actors of each task are looked for among the models. Exit code: 0 when a run can begin, 2 when it
     cannot.
     """
-    from visup.runs.inputs.preflight import check_cast, readiness
-    from visup.runs.wiring import build_agent, open_video
+    from visup.runs.inputs.preflight import preflight
     from visup.terminal.console import echo
 
-    settings = watch_settings(source, setting, settings_file)
-    with open_video(settings) as video:
-        frames = "" if video.frame_count is None else f", {video.frame_count} frames"
-        width, height = video.size
-        echo(
-            f"source {video.name}: {width} x {height} pixels, {video.fps:g} frames a second{frames}"
-        )
-        notes = video.notes
-    agent = build_agent(settings)
-    try:
-        for line in readiness(settings, agent):
-            echo(line)
-        for warning in (*notes, *check_cast(settings, agent)):
-            echo(f"warning: {warning}")
-    finally:
-        agent.close()
+    for line in preflight(watch_settings(source, setting, settings_file)):
+        echo(line)
     echo("A run can begin.")

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from visup.terminal.console import echo, make_console
-
-if TYPE_CHECKING:
-    from visup.runs.settings import WatchSettings
 
 LIBRARIES = {
     "numpy": "arrays",
@@ -47,6 +44,7 @@ EXTRAS = {
     "ros": ("the pictures of ROS 2 bags", ("rosbags",)),
     "rerun": ("the Rerun viewer", ("rerun-sdk",)),
     "tables": ("runs as pandas and Arrow tables", ("pandas", "pyarrow")),
+    "cluster": ("visup archive: tables of many runs", ("pyarrow",)),
     "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),
 }
 """What each extra brings, and its libraries; the same as `optional-dependencies` in pyproject.toml."""
@@ -125,6 +123,7 @@ def speeds(frames: int = SPEED_FRAMES) -> Iterator[str]:
 
     from visup.runs.demo import demo_settings
     from visup.runs.inputs.presets import PRESETS
+    from visup.runs.inputs.speed import measured_speed
 
     demo = demo_settings(1)
     bare = replace(demo, tasks=(), models=None, actors={})
@@ -132,29 +131,9 @@ def speeds(frames: int = SPEED_FRAMES) -> Iterator[str]:
     tried |= {f"--preset {name}": replace(bare, preset=name) for name in PRESETS}
     yield "Frames a second on this machine, shipped clip (640 x 480, 25 a second):"
     for name, settings in tried.items():
-        looked, wanted = _speed(settings, frames)
-        keeps = "keeps up with a camera" if looked >= wanted else "drops frames of a camera"
-        yield f"  {name:24} {looked:5.1f} of {wanted:4.1f} that it asks for: {keeps}"
-
-
-def _speed(settings: WatchSettings, frames: int) -> tuple[float, float]:
-    """Frames looked at in a second, and how many the settings ask for."""
-    import time
-    from itertools import islice
-    from statistics import median
-
-    from visup.runs.wiring import build_agent, open_video
-
-    took = []
-    agent = build_agent(settings)
-    with open_video(settings) as video:
-        for frame in islice(video, frames):
-            begin = time.perf_counter()
-            agent.step(frame)
-            took.append(time.perf_counter() - begin)
-        wanted = video.fps / video.every
-    agent.close()
-    return 1.0 / median(took[len(took) // 3 :]), wanted
+        speed = measured_speed(settings, frames)
+        keeps = "keeps up with a camera" if speed.load <= 1.0 else "drops frames of a camera"
+        yield f"  {name:24} {speed.possible:5.1f} of {speed.wanted:4.1f} that it asks for: {keeps}"
 
 
 def _library(name: str, purpose: str) -> CheckedPart:

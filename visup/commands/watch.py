@@ -108,18 +108,21 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
     return WatchSettings(source, **given)
 
 
-def _interrupted(run: Path, setting: Given, *given: Any) -> InterruptedRun:
+def _interrupted(run: Path, setting: Given, source: str | None, *given: Any) -> InterruptedRun:
     """The run that goes on; what it is about was settled when it began, but for code of the user's own."""
     from visup.agent.model.errors import SettingsError
+    from visup.redaction import has_secret
     from visup.runs.resume import interrupted_run
 
-    if any(given) or setting.keys() - {"behaviours", "plugins"}:
+    # An address with a password is not recorded whole, so that it is named again.
+    address = source if source and has_secret(source) else None
+    if any((*given, source != address)) or setting.keys() - {"behaviours", "plugins"}:
         raise SettingsError(
             "a resumed run keeps its settings: --resume takes no source, task or other settings",
             expected="nothing else but the behaviours that it had (--behaviour, --plugin)",
             hint=f"visup watch --resume {run}",
         )
-    return interrupted_run(run, **setting)
+    return interrupted_run(run, **setting, source=address)
 
 
 @takes(WatchSettings, only=("every",), every=2)

@@ -30,6 +30,7 @@ KIND_WEIGHTS: Mapping[str, int] = {
     "stage_failing": 6,
     "stage_done": 5,
     "stage_started": 4,
+    "stage_paused": 4,
     "coupled": 5,
     "decoupled": 5,
     "entry": 3,

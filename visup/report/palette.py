@@ -30,6 +30,7 @@ STATUS_COLOURS: dict[Status, Rgb] = {
     Status.PENDING: (120, 130, 142),
     Status.ACTIVE: (86, 150, 205),
     Status.PROGRESSING: (38, 112, 188),
+    Status.PAUSED: (110, 110, 170),
     Status.STALLED: (230, 159, 0),
     Status.FAILING: (224, 96, 30),
     Status.FAILED: (186, 32, 44),

@@ -22,7 +22,8 @@ from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
 from visup.agent.storage.jsonable import to_jsonable
 from visup.percepts.video import VideoSource
-from visup.runs.settings import RunOptions, WatchSettings
+from visup.redaction import has_secret, redacted
+from visup.runs.settings import SECRET_LEFT_OUT, RunOptions, WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
 from visup.version import __version__
@@ -74,14 +75,7 @@ class Recorder:
         self.folder = folder
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
         self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
-        self.facts: dict[str, Any] = {
-            "visup": __version__,
-            "source": source.name,
-            "fps": source.fps,
-            "size": source.size,
-            "live": source.live,
-            "settings": to_jsonable(settings),
-        }
+        self.facts = _facts(settings, source)
         if not resume:
             self.journal.note(**self.facts)
         self.notes = source.notes
@@ -225,6 +219,20 @@ class Recorder:
         # In the order of writing: `annotated.webm`, `annotated-2.webm`, ...
         names = sorted((path.name for path in videos), key=lambda name: (len(name), name))
         return replace(collected, videos=tuple(names))
+
+
+def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
+    """What is noted of a run when it begins."""
+    left_out = {SECRET_LEFT_OUT: True} if has_secret(settings.source) else {}
+    return {
+        "visup": __version__,
+        "source": source.name,
+        "fps": source.fps,
+        "size": source.size,
+        "live": source.live,
+        "settings": to_jsonable(replace(settings, source=redacted(settings.source))),
+        **left_out,
+    }
 
 
 def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:

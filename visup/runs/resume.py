@@ -24,9 +24,10 @@ from visup.agent.plugins.factory import MODULE_PATH
 from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal_reader import Recording
 from visup.percepts.video import VideoSource
+from visup.redaction import redacted
 from visup.runs.checkpoints import Checkpoint, read_checkpoint
 from visup.runs.runtime_faults import RuntimeFaults
-from visup.runs.settings import WatchSettings
+from visup.runs.settings import SECRET_LEFT_OUT, WatchSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,10 @@ class InterruptedRun:
 
 
 def interrupted_run(
-    run: Path, behaviours: Collection[Path | str] = (), plugins: Collection[str] = ()
+    run: Path,
+    behaviours: Collection[Path | str] = (),
+    plugins: Collection[str] = (),
+    source: str | None = None,
 ) -> InterruptedRun:
     """The past of a run.
 
@@ -77,10 +81,12 @@ def interrupted_run(
         run: A run folder.
         behaviours: Files or modules of behaviours of one's own that the run had, and that may run.
         plugins: Names of installed behaviours that the run had, and that may run.
+        source: The source with its password, which is not recorded; None of a run whose source has none.
 
     Raises:
         OutputError: There is no run, or it is over, or nothing of it was recorded.
-        SettingsError: It had other behaviours than those that are named.
+        SettingsError: It had other behaviours than those that are named, or its source is not named as it
+            must be.
     """
     recording = Recording.open(run)
     facts = recording.facts()
@@ -104,6 +110,7 @@ def interrupted_run(
         )
     verdict = verdict_without_task(map(_kind, filter(_is_grave, recording.events())))
     settings = _with_named_code(recorded_settings(facts, str(run)), run, behaviours, plugins)
+    settings = _with_secret(settings, run, source, needed=bool(facts.get(SECRET_LEFT_OUT)))
     answers = _answers(facts, str(run))
     return InterruptedRun(recording, settings, state, why_none, recording.count(), verdict, answers)
 
@@ -127,6 +134,28 @@ def _with_named_code(
             hint=f"if you trust them, name them again: {again}" if wanted else None,
         )
     return replace(recorded, behaviours=tuple(behaviours), plugins=tuple(plugins))
+
+
+def _with_secret(
+    recorded: WatchSettings, run: Path, source: str | None, *, needed: bool
+) -> WatchSettings:
+    """The settings of a run with its source as it can be opened."""
+    if needed and source is None:
+        raise SettingsError(
+            "the source of this run had a password, which is not recorded",
+            where=str(run),
+            expected=f"the address of {recorded.source} with user and password",
+            hint=f"visup watch ADDRESS --resume {shlex.quote(str(run))}",
+        )
+    if source is None:
+        return recorded
+    if redacted(source) != recorded.source:
+        raise SettingsError(
+            "this is not the source of the run",
+            where=redacted(source),
+            expected=recorded.source if needed else "no source: it is known",
+        )
+    return replace(recorded, source=source)
 
 
 def _code_name(where: Path | str) -> str:

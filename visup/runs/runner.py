@@ -19,6 +19,7 @@ from visup.agent.storage.journal_reader import JOURNAL
 from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
+from visup.redaction import redacted
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.inputs.preflight import check_cast
 from visup.runs.inputs.stop_signals import stop_signals
@@ -82,6 +83,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
 
 def _numbered_folder(source: str) -> Path:
     """`runs/<source>`, made new; numbered where that exists, so that no two runs are given the same."""
+    source = redacted(source)
     stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
     stem = stem or Path(source).resolve().parent.name or "run"
     for n in range(1, 10**6):

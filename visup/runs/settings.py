@@ -13,6 +13,9 @@ from typing import Annotated, Any
 
 from visup.agent.model.errors import SettingsError
 
+SECRET_LEFT_OUT = "source_without_secret"
+"""The fact of a recorded run that its source had a password, which is not recorded."""
+
 
 @dataclass(frozen=True, slots=True)
 class Option:
@@ -148,6 +151,10 @@ class WatchSettings:
         Option("Drop frames when visup cannot keep up, and report it (default: for live sources)."),
     ] = None
     every: Annotated[int, Option("Use every n-th frame.")] = 1
+    pace: Annotated[
+        float | None,
+        Option("So many frames a second are enough: of a faster source others are left out."),
+    ] = None
     fps: Annotated[float | None, Option("Frame rate, where the source has none.")] = None
     fov_vertical_deg: Annotated[
         float | None, Option("Vertical field of view of the camera, degrees.", "--fov")
@@ -193,6 +200,8 @@ class WatchSettings:
     def __post_init__(self) -> None:
         if self.every < 1:
             raise SettingsError(f"--every is {self.every}", expected="1 or more")
+        if self.pace is not None and not 0 < self.pace <= 1000:
+            raise SettingsError(f"--pace is {self.pace}", expected="more than 0, at most 1000")
         if self.fps is not None and not 0 < self.fps <= 1000:
             raise SettingsError(f"--fps is {self.fps}", expected="more than 0, at most 1000")
         if not (self.motion or self.behaviours or self.plugins or self.detections):

@@ -33,7 +33,7 @@ from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import ReasonerSettings, default_reasoners
 from visup.runs.inputs.plugins import user_behaviours
-from visup.runs.inputs.presets import preset_named
+from visup.runs.inputs.presets import every_for, preset_named
 from visup.runs.inputs.signals import check_signals, signal_behaviours
 from visup.runs.inputs.zones import load_ground, load_zones
 from visup.runs.runtime_faults import runtime_fault_reasoner
@@ -74,9 +74,16 @@ def open_video(settings: WatchSettings) -> VideoSource:
         fps=settings.fps,
         patience_s=settings.patience_s,
     )
-    if settings.preset and settings.every == 1:
-        source.every = preset_named(settings.preset).every(source.fps)
+    if settings.every == 1:
+        source.every = _every(settings, source.fps)
     return source
+
+
+def _every(settings: WatchSettings, fps: float) -> int:
+    """Every how many frames are looked at: what the user says goes before what suits the scene."""
+    if settings.pace is not None:
+        return every_for(settings.pace, fps)
+    return preset_named(settings.preset).every(fps) if settings.preset else 1
 
 
 def build_agent(

@@ -8,6 +8,7 @@ from typing import Any
 from visup.agent import Alert, Frame, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import to_jsonable
+from visup.redaction import redacted
 from visup.sinks.outbox import Outbox
 
 VERSION = 1
@@ -47,7 +48,7 @@ class AlertSender:
 
     def __init__(self, outboxes: Sequence[Outbox], source: str) -> None:
         self._outboxes = outboxes
-        self._source = source
+        self._source = redacted(source)
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Send the alerts that a step opened or closed."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from visup.agent import AlertCondition, Frame, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
+from visup.redaction import redacted
 from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import MOST_WAITING, Outbox, Sink
@@ -33,7 +34,8 @@ def open_sink(wanted: str) -> Sink:
     """
     kind, colon, place = wanted.partition(":")
     if not (colon and place and kind in _MAKERS):
-        raise SettingsError(f"--sink {wanted!r} cannot be read", expected=f"one of: {KINDS}")
+        shown = f"{kind}{colon}{redacted(place)}"
+        raise SettingsError(f"--sink {shown!r} cannot be read", expected=f"one of: {KINDS}")
     return _MAKERS[kind](wanted, place)
 
 

@@ -19,6 +19,7 @@ from urllib3.exceptions import HTTPError, LocationParseError
 from urllib3.util import parse_url
 
 from visup.agent.model.errors import SettingsError
+from visup.redaction import redacted
 from visup.sinks.lines import TIMEOUT_S, json_text
 
 TRIES = 4
@@ -59,8 +60,10 @@ class Webhook:
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
         if not _is_web_address(url):
-            raise SettingsError(f"--sink webhook:{url}", expected="an http or https address")
-        self.name = f"webhook:{url}"
+            raise SettingsError(
+                f"--sink webhook:{redacted(url)}", expected="an http or https address"
+            )
+        self.name = f"webhook:{_shown(url)}"
         self._url, self._timeout_s, self._tries, self._wait = url, timeout_s, tries, wait
         self._opened: list[socket.socket] = []
         self._manager = _manager(url, self._opened)
@@ -128,6 +131,14 @@ class Webhook:
         for opened in list(self._opened):
             with suppress(OSError):
                 opened.shutdown(socket.SHUT_RDWR)
+
+
+def _shown(url: str) -> str:
+    """An address as it may be told: chat services keep their keys in the path."""
+    told = parse_url(url)
+    port = f":{told.port}" if told.port else ""
+    beyond = "/..." if (told.path or "/") != "/" or told.query else ""
+    return f"{told.scheme}://{told.host}{port}{beyond}"
 
 
 def _is_web_address(url: str) -> bool:

@@ -16,6 +16,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "watch": "watch a video and say whether the work goes well",
             "demo": "watch the shipped clip, a capture that fails",
             "check": "say beforehand whether a run can lead to anything",
+            "serve": "many cameras under one supervisor, from a site file",
             "presets": "what --preset traffic, cell, orbit, bench choose",
         },
         "Prepare": {
@@ -28,6 +29,9 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "step": "step through it, back and forth, and ask why",
             "replay": "reason again, with other tasks or rules",
             "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",
+        },
+        "Ask many runs": {
+            "archive": "fill a lake with the tables of many runs",
         },
         "Extend and measure": {
             "behaviours": "list, check and create plug-ins",

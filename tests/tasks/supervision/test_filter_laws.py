@@ -68,7 +68,7 @@ def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
     found = []
     for mind in followed:
         memory = mind.memory["tasks"][0]
-        scene = TaskSnapshot(mind, memory.belief.bindings, model, dict(memory.lasting))
+        scene = TaskSnapshot(mind, memory.belief.bindings, model, memory.kept)
         found.append((mind.time, scene.observe))
     return found
 

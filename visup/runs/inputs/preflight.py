@@ -6,13 +6,43 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from visup.agent.model.errors import SettingsError
+from visup.redaction import redacted
 from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent, open_video
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import task_actors
 
 if TYPE_CHECKING:
     from visup.agent.cycle.agent import Agent
     from visup.tasks.grammar.nodes import Task
+
+
+def preflight(settings: WatchSettings) -> Iterator[str]:
+    """Open the source, load everything, and say what is found, a line each; warnings come last.
+
+    Args:
+        settings: Of the run.
+
+    Yields:
+        What there is; what may keep the run from coming to anything begins with `WARNING`.
+
+    Raises:
+        VisupError: No such run can begin.
+    """
+    with open_video(settings) as video:
+        frames = "" if video.frame_count is None else f", {video.frame_count} frames"
+        width, height = video.size
+        yield f"source {video.name}: {width} x {height} pixels, {video.fps:g} frames a second{frames}"
+        notes = video.notes
+    agent = build_agent(settings)
+    try:
+        yield from readiness(settings, agent)
+        yield from (f"{WARNING}{text}" for text in (*notes, *check_cast(settings, agent)))
+    finally:
+        agent.close()
+
+
+WARNING = "warning: "
 
 
 def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False) -> tuple[str, ...]:
@@ -97,7 +127,7 @@ def _refusal(
         f"task {names} cannot be followed: nothing tells what its actors look like ({who}; {missing})",
         expected="a model database that knows them (--models DB), and --actor NAME=MODEL where the "
         f"names differ; or a task that says it: actor {actor} is red",
-        hint=f"outline them once: visup teach {settings.source} --models cell.models"
+        hint=f"outline them once: visup teach {redacted(settings.source)} --models cell.models"
         if not settings.models
         else f"visup models list {settings.models}; then --actor {actor}=MODEL in place of "
         f"{' or '.join(models)}",

@@ -42,7 +42,16 @@ class Preset:
         >>> PRESETS["traffic"].every(30.0), PRESETS["traffic"].every(10.0), PRESETS["cell"].every(60.0)
         (2, 1, 1)
         """
-        return 1 if self.enough_fps is None else max(1, int(fps / self.enough_fps + 1e-6))
+        return 1 if self.enough_fps is None else every_for(self.enough_fps, fps)
+
+
+def every_for(enough_fps: float, fps: float) -> int:
+    """Every how many frames of a source are looked at, where so many a second are enough.
+
+    >>> every_for(5.0, 25.0), every_for(5.0, 24.0), every_for(5.0, 3.0)
+    (5, 4, 1)
+    """
+    return max(1, int(fps / enough_fps + 1e-6))
 
 
 _MEETING = frozenset({"collision_course", "doubtful_collision", "contact"})

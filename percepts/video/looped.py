@@ -1,0 +1,84 @@
+"""A clip that is played over and over, as a camera would deliver it: to rehearse a supervisor without one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.video.capture import Capture, CaptureFactory, frame_rate
+
+LOOP = "loop:"
+"""Before the name of such a clip: `loop:clip.mp4`."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaybackClock:
+    """By what a clip is played; arguments for tests.
+
+    Attributes:
+        now: Seconds from any start.
+        wait: Waits so many seconds.
+    """
+
+    now: Callable[[], float] = time.monotonic
+    wait: Callable[[float], None] = time.sleep
+
+
+class LoopedCapture:
+    """A capture of a clip that begins anew at its end, each frame when its time has come.
+
+    Like a camera it waits for nobody: who asks late is given the next frame at once, until the clip's
+    own times are caught up with.
+
+    Args:
+        path: The clip.
+        factory: What opens it.
+        fps: Frames a second, in place of what the clip says.
+        clock: By what it is played.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        factory: CaptureFactory,
+        fps: float | None = None,
+        clock: PlaybackClock | None = None,
+    ) -> None:
+        self._path, self._factory = path, factory
+        self._clock = clock or PlaybackClock()
+        self._clip: Capture = factory(path)
+        self._pause = 1.0 / frame_rate(self._clip, fps)[0]
+        self._due: float | None = None
+
+    def isOpened(self) -> bool:
+        """Whether the clip could be opened."""
+        return self._clip.isOpened()
+
+    def grab(self) -> bool:
+        """Wait until the next frame is due, and go to it; False when the clip holds none."""
+        now = self._clock.now()
+        self._due = now if self._due is None else self._due + self._pause
+        if self._due > now:
+            self._clock.wait(self._due - now)
+        return self._clip.grab() or self._begin_anew()
+
+    def retrieve(self) -> tuple[bool, NDArray[np.generic]]:
+        """Decode the frame."""
+        return self._clip.retrieve()
+
+    def get(self, prop: int) -> float:
+        """A property of the clip."""
+        return self._clip.get(prop)
+
+    def release(self) -> None:
+        """Close the clip."""
+        self._clip.release()
+
+    def _begin_anew(self) -> bool:
+        self._clip.release()
+        self._clip = self._factory(self._path)
+        return self._clip.isOpened() and self._clip.grab()

@@ -1,0 +1,25 @@
+"""What is kept of facts from step to step: how long they have been so, and when they paused work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What is kept of the facts of a task at one moment, for the next.
+
+    Attributes:
+        time: Seconds of that moment, or None before the first.
+        lasting: Since when what is no plain relation of the mind has been true, by key.
+        pauses: When work was paused.
+    """
+
+    time: float | None = None
+    lasting: tuple[tuple[str, float], ...] = ()
+    pauses: PauseRecord = NO_PAUSES
+
+
+NOTHING_KEPT = Kept()

@@ -1,0 +1,118 @@
+"""When work is paused, and how long something has lasted without its pauses.
+
+Times stay those of the recording, so that what is told of them is true. What counts is how much time there
+was for work between two of them: the times in which a pause condition held are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from visup.agent import Relation, Truth
+from visup.agent.model.fast_replace import replace
+from visup.tasks.grammar.nodes import StageCondition
+
+MOST_SPANS = 64
+"""So many pauses of one condition are kept apart; of more the two oldest count as one of both lengths."""
+
+Span = tuple[float, float]
+"""From the last moment of work to the last one of the pause, seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """One pause condition over time.
+
+    Attributes:
+        condition: The condition.
+        spans: When work was paused by it, in order.
+        paused: Whether it is now.
+        since: Since when what pauses it has been so, where it does now.
+        known: When that was last observed, seconds.
+    """
+
+    condition: StageCondition
+    spans: tuple[Span, ...] = ()
+    paused: bool = False
+    since: float = 0.0
+    known: float = 0.0
+
+    def noted(self, seen: Relation, before: float, now: float, patience: float) -> Pause:
+        """The same with what is seen now.
+
+        Args:
+            seen: Whether the condition holds, and since when.
+            before: When it was looked at last, seconds.
+            now: Seconds.
+            patience: A condition that is not observed pauses for so long as it did, seconds.
+        """
+        if seen.truth is Truth.UNKNOWN:
+            paused, since, known = (
+                self.paused and now - self.known < patience,
+                self.since,
+                self.known,
+            )
+        else:
+            paused, since, known = seen.truth is Truth.TRUE, seen.since, now
+        spans = self.spans
+        if paused and self.paused:
+            spans = (*spans[:-1], (spans[-1][0], now))
+        elif paused:
+            spans = _bounded((*spans, (before, now)))
+        return replace(self, spans=spans, paused=paused, since=since, known=known)
+
+
+@dataclass(frozen=True, slots=True)
+class PauseRecord:
+    """All pauses of a task up to one moment."""
+
+    pauses: tuple[Pause, ...] = ()
+
+    def noted(
+        self,
+        conditions: Sequence[StageCondition],
+        seen: Callable[[StageCondition], Relation],
+        before: float,
+        now: float,
+        patience: float,
+    ) -> PauseRecord:
+        """The record with what is seen of some conditions now; see `Pause.noted`."""
+        if not conditions:
+            return self
+        known = {p.condition: p for p in self.pauses}
+        each = ((c, known.get(c) or Pause(c)) for c in conditions)
+        return PauseRecord(tuple([p.noted(seen(c), before, now, patience) for c, p in each]))
+
+    def now(self, conditions: Sequence[StageCondition]) -> Pause | None:
+        """The pause of one of some conditions that is going on, the longest first; or None."""
+        paused = (p for p in self._of(conditions) if p.paused)
+        return min(paused, key=lambda p: p.spans[-1][0], default=None)
+
+    def elapsed(self, conditions: Sequence[StageCondition], since: float, now: float) -> float:
+        """Seconds of work from one time to another: those in which none of the conditions paused it."""
+        spans = [s for p in self._of(conditions) for s in p.spans]
+        lost = (min(end, now) - max(start, since) for start, end in _joined(spans))
+        return now - since - sum(x for x in lost if x > 0.0)
+
+    def _of(self, conditions: Sequence[StageCondition]) -> Iterator[Pause]:
+        return (p for p in self.pauses if p.condition in conditions)
+
+
+NO_PAUSES = PauseRecord()
+
+
+def _bounded(spans: tuple[Span, ...]) -> tuple[Span, ...]:
+    if len(spans) <= MOST_SPANS:
+        return spans
+    (start, end), (later, until), *others = spans
+    return ((later - (end - start), until), *others)
+
+
+def _joined(spans: Sequence[Span]) -> Iterator[Span]:
+    """Spans that overlap as one, so that no time is counted twice."""
+    reached = float("-inf")
+    for start, end in sorted(spans):
+        if end > reached:
+            yield max(start, reached), end
+            reached = end

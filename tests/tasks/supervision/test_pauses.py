@@ -1,0 +1,217 @@
+"""`pauses when`: while work is paused no clock runs, and nothing is done or fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from tests.tasks.scripted import Played, Script, Spell, mind_at, play, task_of
+from visup.agent import Mind, Observation, Status, Truth, Verdict
+from visup.tasks import parse_task
+from visup.tasks.supervision.supervise import finish, task_reasoner
+from visup.tasks.verification.pauses import MOST_SPANS, PauseRecord
+
+ARM, PART, TRAY, GUARD = 1, 2, 3, 4
+NAMES = {ARM: {"arm": 0.9}, PART: {"part": 0.9}, TRAY: {"tray": 0.9}, GUARD: {"guard": 0.9}}
+PAUSE = "pauses when touching(guard, arm)"
+TASKS = (
+    """<put>    ::= ((<grasp> <carry> <place>) within 14 s) {}
+       <grasp>  ::= touching(arm, part) for 2 s
+       <carry>  ::= converging(part, tray)
+       <place>  ::= touching(part, tray) after 1 s to 6 s""",
+    """<put>    ::= (<grasp> (<carry> | <back>)) {}
+       <grasp>  ::= coupled(arm, part) within 9 s
+       <carry>  ::= moving_together(arm, part) & converging(part, tray) for 2 s
+       <back>   ::= diverging(arm, part) decoupled(arm, part)""",
+    """<put>    ::= any order (<grasp>, <place>) {}
+       <grasp>  ::= touching(arm, part)
+       <place>  ::= touching(part, tray) fails when diverging(part, tray) for 1 s""",
+)
+FPS = 5.0
+UNEVEN = 1 / 0.19
+"""Frames a second such that no two are as far apart as any patience, to the last bit."""
+UNTIL = 24
+
+
+def script(spells: list[Spell]) -> Script:
+    return Script(tuple(spells), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+
+
+def paused_for(begins: float, lasts: float) -> Spell:
+    return Spell("touching", begins, begins + lasts, (ARM, GUARD))
+
+
+def cut(text: str, scene: Script) -> list[tuple[int, Mind]]:
+    """What comes of the same recording with the pauses cut out, by the number of the frame."""
+    reasoner, mind, lost, before = task_reasoner([parse_task(text)]), Mind(), 0.0, 0.0
+    guarded = [s for s in scene.spells if GUARD in s.objects]
+    frames: list[tuple[int, Mind]] = []
+    spans: list[tuple[float, float]] = []
+    for index in range(round(UNTIL * UNEVEN) + 1):
+        time = index / UNEVEN
+        if any(s.from_s <= time < s.to_s for s in guarded):
+            spans.append((before, time))
+            lost += time - before
+            before = time
+            continue
+        before = time
+        seen = mind_at(scene, time, index, mind)
+        shifted = tuple(replace(r, since=_moved(r.since, spans)) for r in seen.relations)
+        seen = replace(seen, time=time - lost, relations=shifted)
+        mind = reasoner(seen, Observation(index, time - lost, (640, 480))).mind
+        frames.append((index, mind))
+    return frames
+
+
+def _moved(time: float, spans: list[tuple[float, float]]) -> float:
+    return time - sum(max(0.0, min(time, end) - start) for start, end in spans)
+
+
+def statuses(mind: Mind) -> list[tuple[str, Status]]:
+    return [(s.stage, s.status) for s in mind.tasks[0].stages]
+
+
+tenths = st.integers(0, 10 * UNTIL).map(lambda n: n / 10 + 0.037)
+pairs = st.sampled_from([(ARM, PART), (PART, TRAY)])
+names = st.sampled_from(["converging", "diverging", "touching", "coupled", "moving_together"])
+spell = st.builds(
+    lambda name, pair, at, lasts: Spell(name, at, at + lasts, pair),
+    names, pairs, tenths, st.integers(5, 80).map(lambda n: n / 10),
+)  # fmt: skip
+guarding = st.builds(
+    paused_for, tenths.filter(lambda t: t > 0.5), st.integers(3, 90).map(lambda n: n / 10)
+)
+
+
+@settings(max_examples=8, phases=[Phase.explicit, Phase.generate])
+@given(
+    st.sampled_from(TASKS), st.lists(spell, max_size=7), st.lists(guarding, min_size=1, max_size=3)
+)
+def test_a_pause_is_as_if_it_were_cut_out_of_the_recording(
+    text: str, spells: list[Spell], pauses: list[Spell]
+) -> None:
+    scene = script([*spells, *pauses])
+    played = play(task_reasoner([parse_task(text.format(PAUSE))]), scene, UNTIL, UNEVEN)
+    for index, twin in cut(text.format(""), scene):
+        mind = played.minds[index]
+        assert statuses(mind) == statuses(twin)
+        assert mind.tasks[0].verdict is twin.tasks[0].verdict
+        assert mind.tasks[0].confidence == pytest.approx(twin.tasks[0].confidence, abs=1e-6)
+
+
+GRASP = """<put>   ::= <grasp> <lift>
+<grasp> ::= touching(arm, part) {}
+<lift>  ::= converging(part, tray) for 1 s"""
+
+
+def watched(clauses: str, *spells: Spell, text: str = GRASP, until: float = 20.0) -> Played:
+    reasoner = task_reasoner([parse_task(text.format(clauses))])
+    return play(reasoner, script(list(spells)), until, FPS)
+
+
+TOUCH = Spell("touching", 1.0, 4.0, (ARM, PART))
+AGAIN = Spell("touching", 9.0, 14.0, (ARM, PART))
+LIFT = Spell("converging", 14.0, 19.0, (PART, TRAY))
+
+
+@pytest.mark.parametrize(
+    ("clauses", "good"),
+    [
+        ("for 6 s", False),
+        (f"for 6 s {PAUSE}", True),
+        ("within 9 s for 6 s", False),
+        (f"for 6 s within 9 s {PAUSE}", True),
+        (f"for 6 s {PAUSE} or touching(guard, part)", True),
+    ],
+)
+def test_a_pause_does_not_break_what_must_hold(clauses: str, good: bool) -> None:
+    played = watched(clauses, TOUCH, paused_for(3.8, 5.4), AGAIN, LIFT)
+    assert (finish(task_of(played)) is Verdict.SUCCEEDED) == good
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_time_limit_around_more_than_is_paused_goes_on(inside: bool) -> None:
+    clauses = f"within 4 s {PAUSE}" if inside else f"{PAUSE}"
+    text = "<put> ::= <grasp>\n<grasp> ::= touching(arm, part) for 3 s {}"
+    text = text if inside else text.replace("<grasp>\n", "<grasp> within 4 s\n")
+    spells = (Spell("touching", 0.0, 2.0, (ARM, PART)), paused_for(1.8, 8.4))
+    again = Spell("touching", 10.0, 20.0, (ARM, PART))
+    played = watched(clauses, *spells, again, text=text)
+    assert (finish(task_of(played)) is Verdict.SUCCEEDED) == inside
+
+
+def test_a_pause_and_its_end_are_told() -> None:
+    played = watched(f"for 6 s {PAUSE}", TOUCH, paused_for(3.8, 5.4), AGAIN, LIFT)
+    told = [
+        (e.time, e.kind, e.text)
+        for e in played.events
+        if e.kind in ("stage_paused", "stage_resumed")
+    ]
+    assert told == [
+        (
+            3.8,
+            "stage_paused",
+            "Stage `grasp` is paused: the guard and the arm have been touching since 3.8 s.",
+        ),
+        (
+            9.2,
+            "stage_resumed",
+            "Stage `grasp` goes on: the arm and the part have been touching since 9.0 s.",
+        ),
+    ]
+    assert task_of(played, 6.0).stages[0].status is Status.PAUSED
+    assert task_of(played, 6.0).verdict is Verdict.IN_PROGRESS
+
+
+def test_what_must_never_be_counts_in_a_pause() -> None:
+    text = GRASP + "\nnever touching(part, tray)"
+    spells = (TOUCH, paused_for(3.0, 6.0), Spell("touching", 5.0, 7.0, (PART, TRAY)))
+    assert finish(task_of(watched(PAUSE, *spells, text=text))) is Verdict.INTERRUPTED
+
+
+def test_a_stage_that_was_failing_stays_so() -> None:
+    away = Spell("diverging", 3.0, 30.0, (ARM, PART))
+    played = watched(f"for 6 s {PAUSE}", TOUCH, away, paused_for(6.0, 12.0))
+    assert {task_of(played, t).stages[0].status for t in (5.8, 8.0, 17.0)} == {Status.FAILING}
+    assert not [e for e in played.events if e.kind == "stage_paused"]
+
+
+def test_what_pauses_may_have_to_last() -> None:
+    played = watched(f"for 6 s {PAUSE} for 1 s", TOUCH, paused_for(2.0, 5.0), AGAIN, LIFT)
+    assert task_of(played, 2.8).stages[0].status is Status.PROGRESSING
+    assert task_of(played, 3.2).stages[0].status is Status.PAUSED
+
+
+def test_what_is_not_seen_any_more_pauses_for_two_seconds() -> None:
+    hold = Spell("touching", 1.0, 20.0, (ARM, PART))
+    scene = replace(script([hold, paused_for(2.0, 2.0)]), hidden={GUARD: (4.0, 9.0)})
+    reasoner = task_reasoner([parse_task(GRASP.format(f"for 12 s {PAUSE}"))])
+    played = play(reasoner, scene, 10.0, FPS)
+    assert task_of(played, 5.0).stages[0].status is Status.PAUSED
+    assert task_of(played, 6.4).stages[0].status is not Status.PAUSED
+
+
+def test_pauses_around_and_inside_both_count() -> None:
+    text = "<put> ::= (<grasp> pauses when touching(guard, part))\n<grasp> ::= touching(arm, part) for 4 s {}"
+    other = Spell("touching", 8.0, 12.0, (PART, GUARD))
+    hold = Spell("touching", 1.0, 20.0, (ARM, PART))
+    played = watched(PAUSE, hold, paused_for(2.0, 4.0), other, text=text)
+    stage = [task_of(played, t).stages[0].status for t in (3.0, 7.0, 9.0)]
+    assert stage == [Status.PAUSED, Status.PROGRESSING, Status.PAUSED]
+    assert task_of(played, 12.4).verdict is Verdict.IN_PROGRESS
+    assert finish(task_of(played)) is Verdict.SUCCEEDED
+
+
+def test_many_pauses_are_kept_in_bounds_and_none_is_lost() -> None:
+    (condition,) = parse_task(f"<put> ::= touching(arm, part) {PAUSE}").stages[0].body.conditions  # type: ignore[union-attr]
+    record = PauseRecord()
+    (relation,) = [r for r in mind_at(script([paused_for(0.0, 1e9)]), 1.0, 0, Mind()).relations
+                   if set(r.objects) == {ARM, GUARD} and r.name == "touching"]  # fmt: skip
+    for k in range(4 * MOST_SPANS):
+        seen = relation if k % 2 else replace(relation, truth=Truth.FALSE)
+        record = record.noted([condition], lambda _, s=seen: s, float(k), k + 1.0, 2.0)  # type: ignore[misc]
+    assert len(record.pauses[0].spans) == MOST_SPANS
+    assert record.elapsed([condition], 0.0, 4.0 * MOST_SPANS) == 2.0 * MOST_SPANS

@@ -1,0 +1,223 @@
+"""A lake: a folder with the tables of many runs, and their journals.
+
+A run is committed by the file of its row in `runs`, which is written last. Whatever else is there of a run
+without that row (its writer was killed, the disk was full) is not part of the lake: readers pass it over, and
+writing the run again puts the same files in the same places. So nothing is lost and nothing is there twice,
+wherever a writer stops.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.atomic import replacing, write_whole
+from visup.agent.storage.journal import segments
+from visup.agent.storage.journal_reader import JOURNAL, Recording, opened_readonly
+from visup.archive.extra import imported
+from visup.archive.inputs import RunInputs, with_inputs
+from visup.archive.run_tables import RunTables
+from visup.archive.schema import SCHEMA_VERSION, TABLES
+from visup.runs.resume import recorded_settings
+from visup.runs.settings import WatchSettings
+
+MARK = "lake.json"
+TABLES_FOLDER = "tables"
+RECORDINGS = "recordings"
+SCHEMA_FILE = "schema.parquet"
+"""Beside the runs' files of a table: one without rows, so that a table is there before its first row."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lake:
+    """A lake on disk.
+
+    Attributes:
+        path: Its folder.
+    """
+
+    path: Path
+
+    @classmethod
+    def open(cls, path: Path) -> Lake:
+        """A lake that there is.
+
+        Raises:
+            OutputError: There is none, or it is of another version.
+        """
+        try:
+            told = json.loads((path / MARK).read_text(encoding="utf-8"))
+            version = told["version"]
+        except FileNotFoundError:
+            raise OutputError(
+                "there is no lake here",
+                where=str(path),
+                hint=f"visup archive run CLIPS... --into {path}",
+            ) from None
+        except (OSError, ValueError, KeyError, TypeError) as fault:
+            raise OutputError(f"this is not a lake ({fault})", where=str(path)) from fault
+        if version != SCHEMA_VERSION:
+            raise OutputError(
+                f"this lake has version {version}",
+                where=str(path),
+                expected=f"version {SCHEMA_VERSION}",
+                hint="fill a new lake with this visup, or read it with the visup that wrote it",
+            )
+        return cls(path)
+
+    @classmethod
+    def create(cls, path: Path) -> Lake:
+        """A lake that there is, or a new one in a folder that is new or empty.
+
+        Raises:
+            OutputError: The folder holds something else, or cannot be written.
+        """
+        if (path / MARK).exists():
+            return cls.open(path)
+        lake = cls(path)
+        begun = (TABLES_FOLDER, RECORDINGS, f".{MARK}")  # of one killed before it set its mark
+        try:
+            if path.exists() and any(not p.name.startswith(begun) for p in path.iterdir()):
+                raise OutputError(
+                    "the folder holds something that is no lake",
+                    where=str(path),
+                    hint="choose a new folder",
+                )
+            for table in TABLES:
+                lake._write_table(lake._table_folder(table) / SCHEMA_FILE, table, [])
+            mark = {"format": "visup lake", "version": SCHEMA_VERSION}
+            write_whole(path / MARK, (json.dumps(mark) + "\n").encode())
+        except OSError as fault:
+            raise _unwritable(path, fault) from fault
+        return lake
+
+    def has(self, run: str) -> bool:
+        """Whether a run is committed."""
+        return self._table_file("runs", run).is_file()
+
+    def runs(self) -> list[str]:
+        """The keys of all committed runs, sorted."""
+        folder = self._table_folder("runs")
+        return sorted(f.stem for f in folder.glob("??/*.parquet"))
+
+    def commit(self, tables: RunTables, recording: Recording, inputs: RunInputs) -> bool:
+        """Add a run whole, or nothing of it.
+
+        Args:
+            tables: Its rows, as of `run_tables`.
+            recording: Its journal.
+            inputs: The files that it was reasoned with.
+
+        Returns:
+            Whether it was added; False when it was there already.
+
+        Raises:
+            OutputError: It cannot be written, or the journal cannot be read.
+        """
+        run = str(tables["runs"][0][0])
+        if self.has(run):
+            return False
+        try:
+            self._keep(self.folder_of(run), recording, inputs)
+            for table in sorted(TABLES, key=lambda name: name == "runs"):  # it commits the others
+                if tables[table]:
+                    self._write_table(self._table_file(table, run), table, tables[table])
+        except (OSError, sqlite3.Error) as fault:
+            raise _unwritable(self.path, fault) from fault
+        return True
+
+    def folder_of(self, run: str) -> Path:
+        """Where the journal of a run is kept, with the files that it was reasoned with."""
+        return self.path / RECORDINGS / run[:2] / run
+
+    def recorded(self, run: str) -> tuple[Recording, WatchSettings]:
+        """The journal of a run, and its settings with the files that are kept beside it.
+
+        Raises:
+            OutputError: They are not there, or damaged.
+        """
+        folder = self.folder_of(run)
+        recording = Recording.open(folder)
+        settings = recorded_settings(recording.facts(), str(recording.path))
+        return recording, with_inputs(settings, folder)
+
+    def files(self, table: str) -> list[Path]:
+        """The files of a table, those of runs that are not committed among them."""
+        return sorted(self._table_folder(table).rglob("*.parquet"))
+
+    def rows(self, table: str) -> Iterator[Mapping[str, Any]]:
+        """All rows of a table, run by run.
+
+        Raises:
+            OutputError: A file is damaged.
+            ExtraMissingError: pyarrow is not installed.
+        """
+        parquet = imported("pyarrow.parquet")
+        for run in self.runs():
+            file = self._table_file(table, run)
+            if file.is_file():
+                try:
+                    yield from parquet.read_table(file, partitioning=None).to_pylist()
+                except (OSError, imported("pyarrow").ArrowInvalid) as fault:
+                    what = f"the table cannot be read ({fault})"
+                    raise OutputError(what, where=str(file)) from fault
+
+    def _table_folder(self, table: str) -> Path:
+        return self.path / TABLES_FOLDER / table
+
+    def _table_file(self, table: str, run: str) -> Path:
+        return self._table_folder(table) / run[:2] / f"{run}.parquet"
+
+    def _write_table(self, file: Path, table: str, rows: list[tuple[Any, ...]]) -> None:
+        arrow, parquet = imported("pyarrow"), imported("pyarrow.parquet")
+        schema = TABLES[table].arrow(arrow)
+        columns = list(zip(*rows, strict=True)) or [()] * len(schema)
+        arrays = [
+            arrow.array(_seconds(c) if f.type == arrow.timestamp("us", "UTC") else c, f.type)
+            for c, f in zip(columns, schema, strict=True)
+        ]
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(file) as draft:
+            parquet.write_table(
+                arrow.Table.from_arrays(arrays, schema=schema), draft, compression="zstd"
+            )
+
+    def _keep(self, folder: Path, recording: Recording, inputs: RunInputs) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in inputs.files().items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(folder / name, content)
+        for number, path in enumerate(segments(recording.path), 1):
+            name = JOURNAL if number == 1 else f"{Path(JOURNAL).stem}-{number}.sqlite"
+            with replacing(folder / name) as draft:
+                _copy_database(path, draft)
+
+
+def _copy_database(source: Path, target: Path) -> None:
+    """Copy a journal with what its log holds."""
+    with (
+        closing(opened_readonly(source)) as old,
+        closing(sqlite3.connect(target)) as new,
+    ):
+        old.backup(new)
+        new.execute("PRAGMA journal_mode=DELETE")
+
+
+def _seconds(column: tuple[Any, ...]) -> list[int | None]:
+    """Seconds since the epoch as microseconds."""
+    return [None if t is None else round(t * 1e6) for t in column]
+
+
+def _unwritable(path: Path, fault: Exception) -> OutputError:
+    said = getattr(fault, "strerror", None) or str(fault)
+    return OutputError(
+        f"the lake cannot be written ({said})",
+        where=str(path),
+        hint="check that the folder may be written and has room",
+    )

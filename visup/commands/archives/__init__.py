@@ -1,0 +1,1 @@
+"""Commands about many runs: lakes are filled (`archive`), and asked."""

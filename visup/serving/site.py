@@ -1,0 +1,58 @@
+"""What is watched, as the site file says it: cameras, where their runs go, and what each process may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from visup.runs.settings import RunOptions, WatchSettings
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessLimits:
+    """What the process of a camera may take before it is ended and begun anew.
+
+    Attributes:
+        memory_mb: Memory that it may have in use, megabytes.
+        silent_s: How long it may make no step while its source delivers, seconds.
+        start_s: How long it may take until its first step, seconds.
+    """
+
+    memory_mb: float
+    silent_s: float
+    start_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SiteCamera:
+    """One camera of a site.
+
+    Attributes:
+        name: By which it is called everywhere.
+        settings: Of its runs.
+        options: How they are recorded, and where alerts go.
+        limits: Of its process.
+        fingerprint: Differs when anything differs that its beliefs depend on: its settings, or files that
+            they name. A run goes on under the same fingerprint alone.
+    """
+
+    name: str
+    settings: WatchSettings
+    options: RunOptions
+    limits: ProcessLimits
+    fingerprint: str
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """All that one service watches.
+
+    Attributes:
+        path: The site file.
+        store: Folder of all runs; each camera has a folder of its name in it.
+        cameras: In the order of the file.
+    """
+
+    path: Path
+    store: Path
+    cameras: tuple[SiteCamera, ...]

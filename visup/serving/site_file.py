@@ -1,0 +1,187 @@
+"""Reading the site file (TOML); what is wrong with it is told by line, in the user's words."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
+from visup.agent.storage.text_file import read_text_file
+from visup.serving.site import Site
+from visup.serving.site_form import (
+    MOST_CAMERAS,
+    CameraTable,
+    LimitsTable,
+    RecordingTable,
+    SiteTable,
+)
+from visup.serving.site_paths import camera_of
+from visup.serving.toml_lines import locate, syntax_location
+
+LONGEST_VALUE = 80
+
+
+def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
+    """Read a site file.
+
+    Args:
+        path: The file.
+        environment: Variables that placeholders stand for; those of this process by default.
+
+    Raises:
+        SettingsError: The file cannot be read, or something in it is not as it should be; a group of them
+            (`ErrorGroup`) tells every mistake with its line.
+    """
+    text = _text(path)
+    table = _table(text, path)
+    variables = os.environ if environment is None else environment
+    faults: list[VisupError] = []
+    cameras = []
+    for number, one in enumerate(table.camera):
+        try:
+            cameras.append(camera_of(table, one, path.resolve().parent, variables))
+        except VisupError as fault:
+            where = locate(text, ("camera", number), str(path))
+            faults.append(
+                SettingsError(fault.what, where=where, expected=fault.expected, hint=fault.hint)
+            )
+    _refuse([*faults, *_miscounted(table, path), *_twins(table, text, path)])
+    return Site(path, path.resolve().parent / Path(table.store).expanduser(), tuple(cameras))
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text_file(path)
+    except OSError as fault:
+        raise SettingsError(
+            f"the site file cannot be read: {fault.strerror}",
+            where=str(path),
+            hint="see docs/serving.md for one to begin with",
+        ) from fault
+    except UnicodeDecodeError as fault:
+        raise SettingsError("the file is not text", where=str(path), expected="TOML") from fault
+
+
+def _table(text: str, path: Path) -> SiteTable:
+    try:
+        document = tomllib.loads(text)
+    except (ValueError, RecursionError) as fault:
+        said = str(fault)
+        raise SettingsError(
+            f"this is not TOML: {said.partition(' (at ')[0]}",
+            where=syntax_location(text, said, str(path)),
+        ) from fault
+    try:
+        # Lists of TOML are tuples here, which strict pydantic takes from JSON alone.
+        return SiteTable.model_validate_json(json.dumps(document, default=str))
+    except ValidationError as faults:
+        _refuse(_worded([dict(e) for e in faults.errors()], text, path))
+        raise
+
+
+def _worded(faults: Sequence[Mapping[str, Any]], text: str, path: Path) -> list[VisupError]:
+    """Mistakes in the user's words, in the order of their lines."""
+    by_place: dict[tuple[str | int, ...], list[Mapping[str, Any]]] = {}
+    for fault in faults:
+        loc = tuple(part for part in fault["loc"] if part not in _ALTERNATIVES)
+        by_place.setdefault(loc, []).append(fault)
+    located = [(locate(text, loc, str(path)), loc, said) for loc, said in by_place.items()]
+    located.sort(key=lambda each: (each[0].line, each[0].column))
+    return [_mistake(where, loc, said) for where, loc, said in located]
+
+
+def _mistake(
+    where: SourceLocation, loc: tuple[str | int, ...], faults: Sequence[Mapping[str, Any]]
+) -> VisupError:
+    """One mistake; of what may be of several kinds each has a fault."""
+    kind, (*table, key) = faults[0]["type"], loc or ("",)
+    if kind == "extra_forbidden":
+        known = _keys(table)
+        return SettingsError(
+            f"'{key}' is not known here",
+            where=where,
+            expected=f"one of: {', '.join(known)}",
+            hint=did_you_mean(str(key), known),
+        )
+    if kind == "missing":
+        return SettingsError(
+            f"'{key}' is missing", where=where, expected=_CAMERA if key == "camera" else None
+        )
+    said = ".".join(str(part) for part in loc if not isinstance(part, int))
+    wanted = " or ".join(dict.fromkeys(map(_wanted, faults)))
+    value = _quoted(faults[0]["input"])
+    return SettingsError(f"{said} cannot be {value}", where=where, expected=wanted)
+
+
+_CAMERA = '[[camera]], name = "cell", source = "rtsp://..."'
+_ALTERNATIVES = ("str", "tuple[str, ...]")
+"""Names of the kinds that a value may be of: they stand in the place that pydantic tells, and in no file."""
+
+
+def _wanted(fault: Mapping[str, Any]) -> str:
+    if fault["type"] == "string_pattern_mismatch":
+        return "letters, digits, dot, hyphen and _, the first a letter or digit, at most 63"
+    said = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
+    return _PLAIN.get(said, said.replace("a valid ", "a "))
+
+
+_PLAIN = {
+    "a valid string": "a text",
+    "a valid array": "a list of texts",
+    "a valid boolean": "true or false",
+    "an object": "a table",
+}
+
+
+def _quoted(value: object) -> str:
+    said = repr(value)
+    return said if len(said) <= LONGEST_VALUE else f"{said[:LONGEST_VALUE]}..."
+
+
+def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
+    kinds: dict[str | int, type[BaseModel]] = {
+        "recording": RecordingTable,
+        "limits": LimitsTable,
+        "camera": CameraTable,
+    }
+    return (
+        tuple(kinds.get(table[0], SiteTable).model_fields)
+        if table
+        else tuple(SiteTable.model_fields)
+    )
+
+
+def _miscounted(table: SiteTable, path: Path) -> Iterator[VisupError]:
+    if not 1 <= len(table.camera) <= MOST_CAMERAS:
+        yield SettingsError(
+            f"there are {len(table.camera)} cameras in it",
+            where=str(path),
+            expected=f"1 to {MOST_CAMERAS} tables, such as {_CAMERA}",
+        )
+
+
+def _twins(table: SiteTable, text: str, path: Path) -> Iterator[VisupError]:
+    """Cameras of one name would share a folder; file systems may not tell upper from lower case."""
+    seen: set[str] = set()
+    for number, one in enumerate(table.camera):
+        if one.name.casefold() in seen:
+            yield SettingsError(
+                f"two cameras are called '{one.name}'",
+                where=locate(text, ("camera", number, "name"), str(path)),
+                expected="a name of its own for each camera",
+            )
+        seen.add(one.name.casefold())
+
+
+def _refuse(faults: list[VisupError]) -> None:
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise ErrorGroup(faults)

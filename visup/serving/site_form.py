@@ -1,0 +1,133 @@
+"""The form of the site file: pydantic tables, from which its JSON Schema is made."""
+
+from __future__ import annotations
+
+import json
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from visup.runs.inputs.presets import PRESETS
+
+MOST_CAMERAS = 64
+
+Names = tuple[str, ...]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class RecordingTable(_Table):
+    """How runs are recorded."""
+
+    video: bool = Field(default=False, description="Write the annotated video of each run.")
+    report: bool = Field(default=False, description="Write report.html when a run ends.")
+    keep_gb: float = Field(
+        default=20.0, gt=0, description="How much of the journal of a run to keep, gigabytes."
+    )
+    state_every: float = Field(
+        default=10.0,
+        ge=1,
+        description="Seconds between two checkpoints from which a camera goes on.",
+    )
+
+
+class LimitsTable(_Table):
+    """What the process of a camera may take before it is ended and begun anew."""
+
+    memory_mb: float = Field(
+        default=2000.0, ge=200, description="Memory in use, megabytes (Linux)."
+    )
+    silent_s: float = Field(
+        default=90.0, ge=1, description="Seconds without a step or a word of life."
+    )
+    start_s: float = Field(default=180.0, ge=5, description="Seconds until the first step.")
+
+
+class CameraTable(_Table):
+    """One camera. Names of files count from the folder of the site file."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$",
+        description="A name of its own, of letters, digits, dot, hyphen and _: also that of its folder.",
+    )
+    source: str = Field(
+        min_length=1,
+        description="URL, camera index, file, folder of images, or loop:FILE; ${NAME} is a variable of the "
+        "environment, ${file:PATH} the text of a file.",
+    )
+    tasks: Names = Field(default=(), description="Task files, or names of shipped tasks.")
+    models: str | None = Field(default=None, description="Model database.")
+    actors: dict[str, str | Names] = Field(
+        default={}, description="The model or models that an actor of a task looks like."
+    )
+    bystanders: Names = Field(default=(), description="Models that play no part in any task.")
+    rules: Names = Field(default=(), description="Rules files, instead of the shipped rules.")
+    zones: str | None = Field(default=None, description="File with zones that rules can name.")
+    signals: Names = Field(default=(), description="Tables of signals (CSV), or mqtt:HOST/TOPIC.")
+    detections: str | None = Field(
+        default=None,
+        description="A YOLO network (.onnx), or a file of boxes, in place of visup's own eyes.",
+    )
+    behaviours: Names = Field(
+        default=(), description="Behaviours of your own: FILE.py or module:Class."
+    )
+    plugins: Names = Field(default=(), description="Names of installed behaviours to add.")
+    isolate: Names = Field(default=(), description="Behaviours that run in a process of their own.")
+    preset: str | None = Field(
+        default=None,
+        description="Rules, memory and pace for a kind of scene.",
+        json_schema_extra={"enum": [*PRESETS, None]},
+    )
+    pace: float | None = Field(
+        default=None, gt=0, le=1000, description="So many frames a second are enough."
+    )
+    fps: float | None = Field(
+        default=None, gt=0, le=1000, description="Frame rate, where the source has none."
+    )
+    fov: float | None = Field(
+        default=None, gt=0, lt=180, description="Vertical field of view of the camera, degrees."
+    )
+    realtime: bool | None = Field(
+        default=None,
+        description="Drop frames when visup cannot keep up (default: for live sources).",
+    )
+    patience_s: float = Field(
+        default=60.0,
+        ge=0,
+        description="How long a stream that drops is tried again within a process.",
+    )
+    attention: bool = Field(default=False, description="Match well-known objects less often.")
+    sinks: Names = Field(
+        default=(), description="Where its alerts go besides the sinks of the site."
+    )
+
+    @field_validator("preset")
+    @classmethod
+    def _known(cls, value: str | None) -> str | None:
+        if value is not None and value not in PRESETS:
+            raise ValueError(f"one of: {', '.join(PRESETS)}")
+        return value
+
+
+class SiteTable(_Table):
+    """A site: the cameras that one service watches, and what becomes of what they see."""
+
+    store: str = Field(
+        default="visup-runs",
+        min_length=1,
+        description="Folder of all runs; each camera has its own in it.",
+    )
+    sinks: Names = Field(default=(), description="Where alerts of all cameras go, as of `--sink`.")
+    recording: RecordingTable = RecordingTable()
+    limits: LimitsTable = LimitsTable()
+    camera: tuple[CameraTable, ...] = Field(
+        description="One table [[camera]] for each camera.",
+        json_schema_extra={"minItems": 1, "maxItems": MOST_CAMERAS},
+    )
+
+
+def schema_text() -> str:
+    """The JSON Schema of a site file."""
+    named = {"$id": "visup-site-1", "title": "visup: a site file, version 1"}
+    return json.dumps({**SiteTable.model_json_schema(), **named}, indent=1, sort_keys=True)

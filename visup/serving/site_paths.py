@@ -1,0 +1,131 @@
+"""A camera of the site file as settings of a run: names of files from the file's folder, secrets in place."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from visup.agent.plugins.factory import MODULE_PATH
+from visup.agent.storage.jsonable import to_jsonable
+from visup.percepts.video.looped import LOOP
+from visup.percepts.video.open import URL
+from visup.redaction import redacted
+from visup.runs.inputs.signals import BROKER
+from visup.runs.settings import RunOptions, WatchSettings
+from visup.serving.placeholders import filled
+from visup.serving.site import ProcessLimits, SiteCamera
+from visup.serving.site_form import CameraTable, SiteTable
+from visup.tasks import shipped_tasks
+from visup.version import __version__
+
+PIECE_BYTES = 2**20
+
+
+def camera_of(
+    site: SiteTable, one: CameraTable, folder: Path, environment: Mapping[str, str]
+) -> SiteCamera:
+    """A camera with all that its runs are given.
+
+    Args:
+        site: The whole file.
+        one: The camera's table.
+        folder: Of the site file, absolute.
+        environment: Variables that placeholders stand for.
+
+    Raises:
+        SettingsError: A placeholder cannot be replaced.
+    """
+    settings = WatchSettings(
+        source=_source(filled(one.source, environment, folder), folder),
+        tasks=tuple(_task(t, folder) for t in one.tasks),
+        models=_optional(one.models, folder),
+        actors={a: (m,) if isinstance(m, str) else m for a, m in one.actors.items()},
+        bystanders=one.bystanders,
+        rules=tuple(_path(r, folder) for r in one.rules),
+        zones=_optional(one.zones, folder),
+        signals=tuple(s if s.startswith(BROKER) else _path(s, folder) for s in one.signals),
+        detections=_optional(one.detections, folder),
+        behaviours=tuple(
+            b if MODULE_PATH.fullmatch(b) else _path(b, folder) for b in one.behaviours
+        ),
+        plugins=one.plugins,
+        isolate=one.isolate,
+        preset=one.preset,
+        pace=one.pace,
+        fps=one.fps,
+        fov_vertical_deg=one.fov,
+        realtime=one.realtime,
+        patience_s=one.patience_s,
+        attention=one.attention,
+    )
+    sinks = (filled(s, environment, folder) for s in (*site.sinks, *one.sinks))
+    options = RunOptions(
+        video=site.recording.video,
+        report=site.recording.report,
+        sinks=tuple(_sink(s, folder) for s in dict.fromkeys(sinks)),
+        keep_gb=site.recording.keep_gb,
+        state_every_s=site.recording.state_every,
+    )
+    limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
+    return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
+
+
+def _path(name: str, folder: Path) -> Path:
+    return folder / Path(name).expanduser()
+
+
+def _optional(name: str | None, folder: Path) -> Path | None:
+    return None if name is None else _path(name, folder)
+
+
+def _source(name: str, folder: Path) -> str:
+    if name.isdecimal() or URL.match(name):
+        return name
+    if name.startswith(LOOP):
+        return LOOP + str(_path(name.removeprefix(LOOP), folder))
+    return str(_path(name, folder))
+
+
+def _task(name: str, folder: Path) -> str:
+    return name if name.partition(":")[0] in shipped_tasks() else str(_path(name, folder))
+
+
+def _sink(name: str, folder: Path) -> str:
+    kind, colon, place = name.partition(":")
+    return f"{kind}:{_path(place, folder)}" if colon and kind == "file" else name
+
+
+def _fingerprint(settings: WatchSettings) -> str:
+    """A digest of what beliefs depend on: settings, the files that they name, visup itself.
+
+    Of the source's address only what may be known enters it: the digest is kept in a file.
+    """
+    digest = hashlib.sha256(__version__.encode())
+    known = replace(settings, source=redacted(settings.source))
+    digest.update(repr(to_jsonable(known)).encode())
+    for path in sorted(set(_files(settings))):
+        digest.update(str(path).encode())
+        digest.update(_digest(path))
+    return digest.hexdigest()
+
+
+def _files(settings: WatchSettings) -> Iterator[Path]:
+    """Files that a run reads when it begins; the source is none of them."""
+    texts = map(str, (*settings.tasks, *settings.signals, *settings.behaviours))
+    # A task may be named behind its file: `cell.task:pick`.
+    named = (Path(part) for text in texts for part in (text, text.rpartition(":")[0]) if part)
+    others = (*settings.rules, settings.models, settings.zones, settings.detections)
+    yield from (path for path in (*named, *filter(None, others)) if path.is_file())
+
+
+def _digest(path: Path) -> bytes:
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as file:
+            while piece := file.read(PIECE_BYTES):
+                digest.update(piece)
+    except OSError:
+        return b""  # what cannot be read is told when the run begins
+    return digest.digest()
