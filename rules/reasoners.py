@@ -65,12 +65,14 @@ def default_reasoners(
     rules: tuple[Rule, ...] | None = None,
     *,
     traits: bool = False,
+    early: bool = False,
 ) -> ReasonerSet:
     """The reasoners that ship with visup.
 
     Args:
         settings: Their settings; the defaults when left out.
         rules: Rules to watch; those of `safety.rules` when left out.
+        early: Whether what rules say of the future is told as soon as it is decided.
         traits: Whether colours, sizes and first places of objects are remembered.
 
     Returns:
@@ -91,6 +93,6 @@ def default_reasoners(
             ZoneReasoner(s.zones),
             CouplingReasoner(replace(s.coupling, relations=s.relations)),
             RelationEventReasoner(s.narrative),
-            RuleReasoner(shipped_rules() if rules is None else rules),
+            RuleReasoner(shipped_rules() if rules is None else rules, early=early),
         ),
     )

@@ -85,11 +85,24 @@ class PairObservation(NamedTuple):
 
 def common_speed(mind: Mind, pair: Pair) -> float:
     """The speed of the slower of two, pixels per second; that of the one whose speed is known; else 0."""
-    now = kinematics(mind)
-    speeds = [
-        s for s in (now.one("speed", i) for i in pair) if s == s
-    ]  # NaN is not equal to itself
-    return min(speeds, default=0.0)
+    speeds = [own_speed(mind, i) for i in pair]
+    return min((s for s in speeds if s is not None), default=0.0)
+
+
+def own_speed(mind: Mind, number: int) -> float | None:
+    """How fast a body moves by itself, pixels per second; None while nothing tells.
+
+    The outline of what is being covered goes back as fast as what covers it comes on, and that of what
+    comes nearer grows; image motion knows neither. So the slower of both is taken.
+
+    An approximation: image motion still has the camera's in it. What a moving camera follows counts as
+    slow, and must rest at the other for longer before the two count as one.
+    """
+    body = mind.objects[number]
+    told = [kinematics(mind).one("speed", number)]
+    if body.last_seen == mind.time and body.region.velocity_sigma > 0.0:
+        told.append(float(np.hypot(*body.region.velocity)))
+    return min((s for s in told if s == s), default=None)  # NaN is not equal to itself
 
 
 def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:

@@ -13,6 +13,7 @@ from visup.rules.dense_time.operators import (
     Latch,
     Operator,
     PieceHold,
+    PieceNote,
     Pointwise,
     PreviousPiece,
     SinceWindow,
@@ -28,6 +29,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     Literal,
     Node,
     Not,
@@ -45,6 +47,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import Number, ticks
@@ -122,6 +125,8 @@ class PieceCompiler:
                 return self._step(UntilWindow(*_bounds(window), self._samples), *sides)
             case Last(part=part, duration=age):
                 return self._step(PieceHold(ticks(age.base)), self.formula(part))
+            case Let(part=part):
+                return self.formula(part)
             case Previous(part=part) if self._samples:
                 return self._step(PreviousPiece(), self.formula(part))
         raise RuleError(
@@ -153,8 +158,11 @@ class PieceCompiler:
                 return reduce(lambda a, b: self._map(join, a, b), map(self.term, parts))
             case PointwiseFunction(name=name, parts=parts):
                 return self._map(_FUNCTIONS[name], *map(self.term, parts))
+            case Variable(part=part, at=at) if part is not None:
+                return self._step(PieceNote(), self.term(part), self.formula(at))
             case WindowFunction():
                 return self._over_time(node)
+        raise AssertionError(f"no quantity: {node}")
 
     def _over_time(self, node: WindowFunction) -> int:
         span, part = ticks(node.duration.base), self.term(node.part)

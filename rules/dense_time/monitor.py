@@ -13,13 +13,13 @@ from visup.rules.dense_time.operators import SoFar
 from visup.rules.dense_time.sweep import Piece, append
 from visup.rules.formula.nodes import Formula
 from visup.rules.formula.units import TICKS, ticks
-from visup.rules.monitoring.intervals import UNKNOWN, Interval
+from visup.rules.monitoring.intervals import UNKNOWN, Interval, as_ended
 from visup.rules.monitoring.signals import Signals, known_interval, later
 
 Reading = Literal["samples", "held", "linear"]
 """What a signal is between two samples: nothing of its own, the earlier one, or a straight line."""
 Before = Literal["unknown", "cut"]
-After = Literal["unknown", "cut", "lasting"]
+After = Literal["unknown", "weak", "strong", "cut", "lasting"]
 NAN = float("nan")
 
 
@@ -29,8 +29,9 @@ class Ends:
 
     Attributes:
         before: What is before the first sample: not known, or no part of any window ('cut').
-        after: What is after the last one, once the recording is over: not known, no part of any
-            window, or as it was last ('lasting').
+        after: What is after the last one, once the recording is over: not known; not known, and what
+            is undecided then is told as the best ('weak') or the worst ('strong') that could come; no
+            part of any window ('cut'); or as it was last ('lasting').
         hold_s: How long a sample is believed when no other comes, seconds; of straight signals how
             far apart two may be to be joined.
     """
@@ -152,7 +153,7 @@ class DenseTimeMonitor:
         if self._after == "lasting":
             rows = {n: [Piece(begin, inf, p[0].value)] for n, p in rows.items()}
             span = (begin, inf)
-        elif self._after == "unknown":
+        elif self._after != "cut":
             held = end if end_s is not None or self._linear else begin + self._hold
             held = end if held == inf else held
             rows = {
@@ -160,7 +161,10 @@ class DenseTimeMonitor:
                 for n, p in rows.items()
             }
             span = (begin, inf)
-        return _told(self._run(rows, span, end if self._after == "cut" else inf))
+        found = self._run(rows, span, end if self._after == "cut" else inf)
+        if self._after in ("weak", "strong"):
+            found = [Piece(b, e, as_ended(v, self._after)) for b, e, v in found]
+        return _told(found)
 
     @property
     def _nothing(self) -> object:

@@ -224,6 +224,26 @@ class Latch:
         return []
 
 
+class PieceNote:
+    """`let x be q at f`: what q was when f was last true."""
+
+    def __init__(self) -> None:
+        self._aligned, self._kept = Aligned(2), UNKNOWN
+
+    def take(self, rows: Sequence[list[Piece]]) -> list[Piece]:
+        """See `Operator`."""
+        found = []
+        for piece in self._aligned.take(rows):
+            value, at = piece.value
+            self._kept = value if at[0] > 0 else self._kept
+            found.append(Piece(piece.begin, piece.end, self._kept))
+        return found
+
+    def finish(self, end: float) -> list[Piece]:
+        """See `Operator`."""
+        return []
+
+
 class PieceHold:
     """`last(f, 0.5 s)`: what was known last, while that is no older.
 

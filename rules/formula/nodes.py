@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 from visup.agent import Severity
 from visup.rules.formula.terms import (
@@ -13,6 +13,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import NOWHERE, Number, Span, Unit
@@ -232,6 +233,28 @@ class Quantified:
         return f"{self.kind} {self.variable}{repeat}: {_wrapped(self.part, *_LOOSER)}"
 
 
+@dataclass(frozen=True, slots=True)
+class Let:
+    """`let x be gap(a, b) at touching(a, b): f`: f, in which x is what the gap was when they last touched.
+
+    Attributes:
+        variable: The name.
+        value: The quantity; it has no value until `at` has been true.
+        at: When it is noted.
+        part: The formula in which the variable stands for it, as a `Variable` that holds both.
+    """
+
+    variable: str
+    value: Term
+    at: Formula
+    part: Formula
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        part = _wrapped(self.part, *_LOOSER)
+        return f"let {self.variable} be {self.value} at {self.at}: {part}"
+
+
 Formula = (
     Predicate
     | Literal
@@ -247,6 +270,7 @@ Formula = (
     | MOfN
     | Last
     | Quantified
+    | Let
 )
 Node = Formula | Term
 
@@ -316,6 +340,8 @@ def children(node: Node) -> tuple[Node, ...]:
             return (left, right)
         case Comparison(left=left, right=right) | Arithmetic(left=left, right=right):
             return (left, right)
+        case Let(value=value, at=at, part=part):
+            return (value, at, part)
     return ()
 
 
@@ -332,20 +358,43 @@ def calls(node: Node | None) -> tuple[Predicate | Measure, ...]:
     return tuple(n for n in walk(node) if isinstance(n, Predicate | Measure))
 
 
+def rebuilt(node: Node, change: Callable[[Node], Node | None]) -> Node:
+    """The same tree with some nodes changed.
+
+    Args:
+        node: The root.
+        change: What stands in the place of a node; None to leave it and look at its parts.
+    """
+    changed = change(node)
+    if changed is not None:
+        return changed
+    if isinstance(node, And | Or | PointwiseFunction):
+        return replace(node, parts=tuple(rebuilt(p, change) for p in node.parts))  # type: ignore[arg-type]
+    names = _PARTS.get(type(node), ())
+    changes: dict[str, Any] = {n: rebuilt(getattr(node, n), change) for n in names}
+    return replace(node, **changes) if changes else node
+
+
 def substituted(node: Node, names: Mapping[str, str]) -> Node:
     """The same tree with variables replaced by the names of objects."""
-    if isinstance(node, Predicate | Measure):
-        return replace(node, words=tuple(names.get(w, w) for w in node.words))
-    if isinstance(node, Number | Literal):
-        return node
-    changes: dict[str, Any] = {}
-    if isinstance(node, And | Or | PointwiseFunction):
-        changes["parts"] = tuple(substituted(p, names) for p in node.parts)
-    elif isinstance(node, Since | Until | Comparison | Arithmetic):
-        changes = {"left": substituted(node.left, names), "right": substituted(node.right, names)}
-    else:
-        changes["part"] = substituted(node.part, names)
-    return replace(node, **changes)
+
+    def change(part: Node) -> Node | None:
+        if isinstance(part, Predicate | Measure):
+            return replace(part, words=tuple(names.get(w, w) for w in part.words))
+        return None
+
+    return rebuilt(node, change)
+
+
+def bound(node: Formula, variable: Variable) -> Formula:
+    """The same formula in which a name stands for what `let` says."""
+
+    def change(part: Node) -> Node | None:
+        free = isinstance(part, Variable) and part.part is None and part.name == variable.name
+        return replace(variable, span=part.span) if free else None  # type: ignore[union-attr]
+
+    found: Any = rebuilt(node, change)
+    return cast("Formula", found)
 
 
 def placeholder(variable: str) -> str:
@@ -354,7 +403,16 @@ def placeholder(variable: str) -> str:
 
 
 _LOOSER = (And, Or, Since, Until)
-_PREFIXED = (Not, Quantified, FutureOperator, PastOperator, Previous)
+_PREFIXED = (Not, Quantified, Let, FutureOperator, PastOperator, Previous)
+_PARTS: dict[type, tuple[str, ...]] = {
+    Let: ("value", "at", "part"),
+    **dict.fromkeys((Since, Until, Comparison, Arithmetic), ("left", "right")),
+    **dict.fromkeys(
+        (Not, PastOperator, FutureOperator, Previous, MOfN, Last, Quantified), ("part",)
+    ),
+    **dict.fromkeys((Negative, WindowFunction), ("part",)),
+}
+"""Where the nodes that a node is made of stand in it."""
 
 
 def _wrapped(formula: Formula, *loose: type) -> str:

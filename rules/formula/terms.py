@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from visup.rules.formula.units import NOWHERE, Number, Span
 
@@ -74,7 +75,26 @@ class WindowFunction:
         return f"{self.name}({self.part}, {self.duration})"
 
 
-Term = Number | Measure | Arithmetic | Negative | PointwiseFunction | WindowFunction
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """`x` in `let x be gap(a, b) at touching(a, b): gap(a, b) > x`.
+
+    Attributes:
+        name: Its name.
+        part: What it is a value of; None of a name that no `let` has bound.
+        at: The formula; it is the value that `part` had when this was last true.
+    """
+
+    name: str
+    part: Term | None = None
+    at: Any = None
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+Term = Number | Measure | Arithmetic | Negative | PointwiseFunction | WindowFunction | Variable
 
 
 def _wrapped(term: Term, loose: str | tuple[str, ...]) -> str:

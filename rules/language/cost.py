@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from visup.rules.formula.nodes import Node, Quantified, Rule, children
 from visup.rules.formula.units import TICKS
 from visup.rules.monitoring.compiler import Compiler
+from visup.rules.monitoring.early import EarlyCompiler
 
 MAX_STATE = 100_000
 """Most intervals that a rule may keep for one choice of objects: 8 minutes of a quantity."""
@@ -22,10 +23,12 @@ class RuleCost:
     Attributes:
         kept: Most intervals that it keeps for one choice of objects.
         delay_s: How many seconds late its verdict comes.
+        early_delay_s: How many seconds late at least where it is told as soon as it is decided.
     """
 
     kept: int
     delay_s: float
+    early_delay_s: float
 
     @property
     def bytes(self) -> int:
@@ -45,7 +48,8 @@ def cost_of(rule: Rule) -> RuleCost:
     compiler = Compiler()
     latest = compiler.rule(rule)[0].delay
     kept = sum(operator.kept for operator in compiler.program.operators())
-    return RuleCost(kept, latest / TICKS)
+    early = EarlyCompiler(compiler).rule(rule)
+    return RuleCost(kept, latest / TICKS, (early.first.delay if early else latest) / TICKS)
 
 
 def variables_of(rule: Rule) -> int:

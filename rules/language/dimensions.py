@@ -11,6 +11,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import (
@@ -48,6 +49,20 @@ def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault
         yield from _leave(node, left)
 
 
+def example_amount(node: Comparison, vocabulary: Vocabulary) -> str:
+    """A number of what is compared, such as '20 px'."""
+    kinds = (_measured(side, vocabulary, []) for side in (node.left, node.right))
+    kind = next((k for k in kinds if k is not None), SHARE)
+    return f"20 {next((u for u, (d, _) in UNITS.items() if d == kind), '')}".rstrip()
+
+
+def check_value(term: Term, vocabulary: Vocabulary) -> Iterator[Fault]:
+    """The faults of units of a quantity that stands in no comparison."""
+    faults: list[Fault] = []
+    _measured(term, vocabulary, faults)
+    yield from faults
+
+
 def check_constant(node: Comparison) -> Iterator[Fault]:
     """A comparison that never changes: right in a calculation, in a rule a mistake."""
     if _constant(node.left) and _constant(node.right):
@@ -80,6 +95,9 @@ def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimens
             return None if known is None else known.dimension
         case Negative(part=part):
             return _measured(part, vocabulary, faults)
+        case Variable(part=part):
+            # What is wrong with it is told where it is bound.
+            return None if part is None else _measured(part, vocabulary, [])
         case WindowFunction(name=name, part=part):
             inner = _measured(part, vocabulary, faults)
             return inner / TIME if inner and name == "rate" else inner

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -287,6 +288,9 @@ def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) 
     found = where.text[at : at + length]
     wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
     wanted = wanted or getattr(fault, "allowed", set()) or set()
+    if "COMMA" in wanted and _NAME_IN_CALL.search(where.text[:at]):
+        # Only the name of a value could be counted with, and none has been bound.
+        wanted = {"COMMA", "RPAR"}
     what = f"'{found}' does not belong here" if found else "the rule ends too early"
     if repair is None:
         begin = at if found else end_before(where.text, len(where.text))
@@ -298,6 +302,10 @@ def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) 
     span = max(1, repair.end - repair.begin)
     hint = repair.hint(where.text)
     return Diagnostic("", what, where.at(repair.begin, span), _expected(wanted), hint)
+
+
+_NAME_IN_CALL = re.compile(r"\A(?![\s\S]*\blet\b)[\s\S]*[(,]\s*[A-Za-z_]\w*\s*\Z")
+"""A text without values of `let` that ends with a bare name in the parentheses of a call."""
 
 
 def _put(new: str) -> str:
@@ -317,7 +325,7 @@ _SELDOM = frozenset(
     f"'{w}'"
     for w in (
         *("iff", "xor", "release", "leave", "*", "/", "+", "-"),
-        *("implies", "since", "in", "cooldown", "previous"),
+        *("implies", "since", "in", "cooldown", "previous", "let"),
     )
 )
 

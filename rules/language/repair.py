@@ -15,6 +15,7 @@ from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.model.did_you_mean import closest
 from visup.rules.language.edits import Repair, edits
+from visup.rules.language.keywords import KEYWORDS
 
 MOST_REPAIRS = 12
 MUCH_FURTHER = 8
@@ -67,6 +68,22 @@ SLIPS = (
     _slip(r"\b(?:pixels?|pix|met(?:er|re)s?|cm|mm)\b", "px"),
     _slip(r"\b(?:degrees?|°)\b", "deg"),
     _slip(r"\bpercent\b", "%"),
+    _slip(rf"({_CALL})\s*(?:===?|=|\bis)\s*true\b", r"\1"),
+    _slip(rf"({_CALL})\s*(?:!==?|<>|\bis\s+not)\s*true\b", r"not \1"),
+    _slip(rf"({_CALL})\s*(?:===?|=|\bis)\s*false\b", r"not \1"),
+    _slip(rf"({_CALL})\s*(?:!==?|<>|\bis\s+not)\s*false\b", r"\1"),
+    _slip(r"\b(north|south)[ ]+(east|west)_of\b", r"\1_\2_of"),
+    _slip(
+        r"\bthere\s+(?:is|are|exists?)\s+(?:an?\s+|some\s+|one\s+)?(\w+)\s*(?::|with|such that|so that)",
+        r"exists \1:",
+    ),
+    _slip(rf"({_CALL})\s+in\s+\[?({_AMOUNT})\s*(?:\.\.|to|-)\s*({_AMOUNT})\]?", r"\1 >= \2 and \1 <= \3"),
+    _slip(
+        rf"\b(\d+)\s+(?:out\s+)?of\s+(?:the\s+last\s+)?(\d+)\s+(?:samples|frames)\s+({_CALL})",
+        r"\3 in \1 of \2 samples",
+    ),
+    _slip(r"\bfor\s+(\d+)\s*(?:frames|samples)\b", r"in \1 of \1 samples"),
+    _slip(r"\bwithin\s+(\d+)\s*(?:frames|samples)\b", r"in 1 of \1 samples"),
     _slip(rf"({_CALL})\s+between\s+({_AMOUNT})\s+and\s+({_AMOUNT})", r"\1 >= \2 and \1 <= \3"),
     _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})", r"\1 \2 \3 and \3 \4 \5"),
     _slip(r"\b(?:for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+ago\b", r"within \1 to \1 ago"),
@@ -99,6 +116,15 @@ SLIPS = (
         r"\b(exists|forall)\s+(\w+\((?:[^()]*,\s*)?(\w+)\))", lambda m: f"{m[1]} {m[3]}: {m[2]}"
     ),
     _slip(r"\b(exists|forall)\s+(\w+)\s+(?!may|:)", r"\1 \2: "),
+    _slip(r"\blet\s+(\w+)\s+(?=\w+\()(?!be\b|as\b|is\b)", r"let \1 be "),
+    _slip(r"\blet\s+(\w+)\s*(?::=|==?|\bas\b|\bis\b)\s*", r"let \1 be "),
+    _slip(r"\b(let\s+\w+\s+be\s[^:\n]*?)\s+(?:when|if|once|on|upon|whenever)\b", r"\1 at"),
+    _slip(rf"\b(let\s+\w+\s+be\s[^:\n]*?\sat\s+{_CALL})\s*(?:,|\bin\b|;|->)", r"\1:"),
+    _slip(
+        r"\b(?:freeze|remember|store|bind|define|set|with|where)\s+(\w+)\s*(?:=|:=|\bas\b|\bbe\b)\s*",
+        r"let \1 be ",
+    ),
+    _slip(r"\b(let\s+\w+\s+be\s[^:\n]*?\))\s*:", r"\1 at true:"),
     _slip(r"\bbefore\b", "and previous"),
     _slip(r"\bduring\b|\bwhile\b", "and"),
     _slip(r"\bbut\b|\bthen\b", "and"),
@@ -125,11 +151,9 @@ SLIPS = (
 """In the order in which they are tried; each only where it meets the place of the error."""
 
 WORDS = (
-    "rule", "when", "unless", "hold", "cooldown", "say", "and", "or", "not", "for", "within", "since",
-    "until", "once", "always", "eventually", "henceforth", "exists", "forall", "in", "of", "samples",
-    "leave", "to", "ago", "may repeat", "true", "false", "implies", "iff", "xor", "release", "previous",
-    "info", "warning", "critical",
-)  # fmt: skip
+    *(w for w in KEYWORDS if w not in ("may", "repeat")),
+    *("may repeat", "info", "warning", "critical"),
+)
 PUT_IN = (")", " s", " px", ":", " samples", ": info", "(", ",", " and", "]", ' say "{a}"', "[5 s]")
 Parses = Callable[[str], UnexpectedInput | None]
 """The syntax error of a text, or None."""

@@ -26,6 +26,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     MOfN,
     Not,
     Or,
@@ -36,6 +37,7 @@ from visup.rules.formula.nodes import (
     Since,
     TimeWindow,
     Until,
+    bound,
 )
 from visup.rules.formula.terms import (
     Arithmetic,
@@ -43,6 +45,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import Number, Unit
@@ -174,6 +177,17 @@ def exists(variable: str, claim: FormulaBuilder, may_repeat: bool = False) -> Fo
 def forall(variable: str, claim: FormulaBuilder, may_repeat: bool = False) -> FormulaBuilder:
     """`forall b: f`."""
     return FormulaBuilder(Quantified("forall", variable, claim.node, may_repeat))
+
+
+def noted(name: str) -> TermBuilder:
+    """The value that `let` names."""
+    return TermBuilder(Variable(name))
+
+
+def let(name: str, value: TermBuilder, at: FormulaBuilder, claim: FormulaBuilder) -> FormulaBuilder:
+    """`let x be q at f: g`, where g speaks of `noted("x")`."""
+    part = bound(claim.node, Variable(name, value.node, at.node))
+    return FormulaBuilder(Let(name, value.node, at.node, part))
 
 
 def least(*amounts: TermBuilder) -> TermBuilder:

@@ -17,6 +17,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     Literal,
     MOfN,
     Not,
@@ -28,6 +29,7 @@ from visup.rules.formula.nodes import (
     Since,
     TimeWindow,
     Until,
+    bound,
 )
 from visup.rules.formula.nodes import Predicate as Fact
 from visup.rules.formula.terms import (
@@ -38,6 +40,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import TIME, Number, Span, Unit
@@ -91,6 +94,8 @@ class CallResolver:
                 what = f"'{node.name}' is a quantity, neither true nor false"
                 self.fault((node.span, what, "a comparison", "compare it with a number"))
             return Fact(node.name, self._words(node), node.span)
+        if isinstance(node, NameArgument):
+            return Fact(node.name, (), node.span)
         if isinstance(node, Term):
             what = f"'{node}' is a quantity, neither true nor false"
             self.fault((_place(node), what, None, "compare it with another quantity"))
@@ -103,7 +108,7 @@ class CallResolver:
             if node.name in POINTWISE:
                 return PointwiseFunction(
                     node.name,
-                    tuple(self.term(self._unworded(a)) for a in node.arguments),
+                    tuple(self.term(a) for a in node.arguments),
                     node.span,
                 )
             if node.name in OVER_WINDOW:
@@ -113,6 +118,8 @@ class CallResolver:
                 part, duration = spanned
                 return WindowFunction(node.name, self.term(part), duration, node.span)
             return Measure(node.name, self._words(node), node.span)
+        if isinstance(node, NameArgument):
+            return Variable(node.name, span=node.span)
         if isinstance(node, Term):
             return node
         what = f"'{node}' is true or false, not a quantity"
@@ -125,7 +132,7 @@ class CallResolver:
             what = f"'{call.name}' takes one formula"
             self.fault((call.span, what, f"such as {call.name}(touching(a, b))", None))
             return Fact("", (), call.span)
-        part = self.formula(self._unworded(call.arguments[0]))
+        part = self.formula(call.arguments[0])
         before, now = Previous(part, call.span), part
         if call.name == "rising":
             return And((now, Not(before, call.span)), call.span)
@@ -143,17 +150,10 @@ class CallResolver:
         """The parts of `rate(x, 2 s)` and its like, or None after a fault."""
         parts = call.arguments
         if len(parts) == 2 and isinstance(parts[1], Number) and parts[1].dimension == TIME:
-            return self._unworded(parts[0]), parts[1]
+            return parts[0], parts[1]
         what = f"'{call.name}' takes something and a time"
         self.fault((call.span, what, f"such as {call.name}(speed(a), 2 s)", None))
         return None
-
-    def _unworded(self, argument: Any) -> Any:
-        if isinstance(argument, NameArgument):
-            what = f"'{argument.name}' is a name, not a quantity"
-            self.fault((argument.span, what, "a quantity or a number", None))
-            return Number(0.0, span=argument.span)
-        return argument
 
 
 def _place(node: Any) -> Span:
@@ -292,6 +292,13 @@ class _RuleBuilder(Transformer[Token, Any]):
         place = _span_of(kind)
         return Quantified(str(kind), variable, self.meaning.formula(part), repeats, place)
 
+    def let(self, meta: Any, parts: list[Any]) -> Let:
+        name, value, at, part = parts
+        value, at = self.meaning.term(value), self.meaning.formula(at)
+        variable = Variable(str(name), value, at)
+        inner = bound(self.meaning.formula(part), variable)
+        return Let(str(name), value, at, inner, _span_of(name))
+
     def past(self, meta: Any, parts: list[Any]) -> PastOperator:
         kind, window, part = parts
         return PastOperator(str(kind), self.meaning.formula(part), window)
@@ -322,10 +329,20 @@ class _RuleBuilder(Transformer[Token, Any]):
 
     often_samples = often_time
 
-    def comparison(self, meta: Any, parts: list[Any]) -> Comparison:
+    def comparison(self, meta: Any, parts: list[Any]) -> Formula:
         left, operator, right, leave = parts
+        if isinstance(right, Literal) and operator in ("==", "!="):
+            return self._told_twice(left, right.value == (operator == "=="), _span_of(meta))
         sides = self.meaning.term(left), self.meaning.term(right)
         return Comparison(sides[0], str(operator), sides[1], leave, _span_of(meta))
+
+    def _told_twice(self, left: Any, holds: bool, span: Span) -> Formula:
+        """`touching(a, b) == true`, which says no more than `touching(a, b)`."""
+        claim = self.meaning.formula(left)
+        meant: Formula = claim if holds else Not(claim, span)
+        hint = f"write `{meant}`"
+        self.meaning.fault((span, f"'{claim}' is true or false as it is", str(meant), hint))
+        return meant
 
     def sum(self, meta: Any, parts: list[Any]) -> Arithmetic:
         left, operator, right = parts

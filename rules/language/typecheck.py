@@ -13,6 +13,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     MOfN,
     Node,
     PastOperator,
@@ -23,57 +24,24 @@ from visup.rules.formula.nodes import (
     TimeWindow,
     Until,
     children,
+    walk,
 )
-from visup.rules.formula.terms import Measure, WindowFunction
+from visup.rules.formula.terms import Measure, Variable, WindowFunction
 from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
 from visup.rules.language.diagnostics import Diagnostic, Source
-from visup.rules.language.dimensions import check_constant, check_dimensions
+from visup.rules.language.dimensions import (
+    check_constant,
+    check_dimensions,
+    check_value,
+    example_amount,
+)
+from visup.rules.language.keywords import KEYWORDS
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.qualitative_words import ALLEN_RELATIONS, TPCC_RELATIONS
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import PERCEPT_KINDS, RULES, Vocabulary
 from visup.rules.wording.sentences import mentions
-
-KEYWORDS = frozenset(
-    (
-        "rule",
-        "when",
-        "unless",
-        "hold",
-        "cooldown",
-        "say",
-        "and",
-        "or",
-        "not",
-        "for",
-        "within",
-        "since",
-        "until",
-        "once",
-        "always",
-        "eventually",
-        "henceforth",
-        "exists",
-        "forall",
-        "in",
-        "of",
-        "samples",
-        "leave",
-        "to",
-        "ago",
-        "may",
-        "repeat",
-        "true",
-        "false",
-        "implies",
-        "iff",
-        "xor",
-        "release",
-        "previous",
-    )
-)
-"""Words of the language itself, which name nothing else."""
 
 
 class TypeChecker:
@@ -159,6 +127,8 @@ class _FormulaChecker:
         self.vocabulary = vocabulary
         self.of_rule = variables is not None
         self.scope = variables or ()
+        self.values: tuple[str, ...] = ()
+        self.amount = "0"
         self.used: set[str] = set()
 
     def node(self, node: Node) -> Iterator[Fault]:
@@ -168,8 +138,14 @@ class _FormulaChecker:
             case Quantified():
                 yield from self.quantified(node)
                 return
+            case Let():
+                yield from self.let(node)
+                return
+            case Variable():
+                yield from self.variable(node)
             case Comparison():
                 yield from check_dimensions(node, self.vocabulary)
+                self.amount = example_amount(node, self.vocabulary)
                 if self.of_rule:
                     yield from check_constant(node)
             case PastOperator(window=TimeWindow() as window):
@@ -205,6 +181,54 @@ class _FormulaChecker:
             yield node.span, what, None, f"leave `{node.kind} {name}:` out"
         self.used.discard(name)
         self.scope = outer
+
+    def let(self, node: Let) -> Iterator[Fault]:
+        """What a value is of, when it is noted, and what is said of it."""
+        name, outer = node.variable, self.values
+        if name in (*self.scope, *outer):
+            what = f"'{name}' is already the name of {'a value' if name in outer else 'an object'}"
+            yield node.span, what, "another name", f"write `value` in place of `{name}`"
+        found = [*check_value(node.value, self.vocabulary), *self.node(node.value)]
+        found += [*self._noted(node), *self.node(node.at)]
+        self.values = (*outer, name)
+        found += self.node(node.part)
+        yield from found
+        self.values = outer
+        if name not in self.used and not found:
+            what = f"the value '{name}' of 'let' is not used"
+            hint = f"leave `let {name} be {node.value} at {node.at}:` out"
+            yield node.span, what, None, hint
+        self.used.discard(name)
+
+    def _noted(self, node: Let) -> Iterator[Fault]:
+        ahead = next((n for n in walk(node.at) if isinstance(n, FutureOperator | Until)), None)
+        if ahead is not None:
+            what = f"'{node.variable}' cannot be noted before it is known whether it is to be"
+            hint = (
+                f"write `{ahead.part}` in place of `{ahead}`"
+                if isinstance(ahead, FutureOperator)
+                else None
+            )
+            yield ahead.span, what, "what is true now or was", hint
+
+    def variable(self, node: Variable) -> Iterator[Fault]:
+        """A bare name among quantities: what `let` has bound, or a call without its arguments."""
+        self.used.add(node.name)
+        if node.name in self.values:
+            return
+        if node.name in self.vocabulary.quantities:
+            yield from self.call(Measure(node.name, (), node.span))
+            if not self.vocabulary.quantities[node.name].takes:
+                what = f"'{node.name}' is a quantity, and is written with parentheses"
+                yield node.span, what, f"{node.name}()", f"write `{node.name}()`"
+            return
+        what = f"'{node.name}' is a name, not a quantity"
+        near = did_you_mean(node.name, (*self.values, *self.vocabulary.quantities))
+        if near is None:
+            meant = self.values[-1] if self.values else self.amount
+            near = f"write `{meant}` in place of `{node.name}`"
+        expected = "a quantity or a number, or what `let` names"
+        yield node.span, what, expected, near
 
     def call(self, call: Predicate | Measure) -> Iterator[Fault]:
         self.used |= set(call.words) & set(self.scope)

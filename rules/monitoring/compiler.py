@@ -21,6 +21,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     Literal,
     MOfN,
     Not,
@@ -40,6 +41,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import Number, ticks
@@ -58,10 +60,21 @@ from visup.rules.monitoring.operators import (
     SlidingWindow,
     TemporalOperator,
     Unbounded,
+    ValueWhenTrue,
 )
 
 Scope = tuple[tuple[str, bool], ...]
 """The variables of a formula by axis, each with whether it may repeat another one."""
+
+
+def scope_of(rule: Rule) -> Scope:
+    """The variables of a rule by axis."""
+    return tuple((v, v in rule.may_repeat) for v in rule.variables)
+
+
+def inner_scope(node: Quantified, scope: Scope) -> Scope:
+    """The variables of what a quantifier is of."""
+    return (*scope, (node.variable, node.may_repeat))
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +87,7 @@ class Operation:
             '/', 'rate'.
         reads: Steps whose values it reads.
         axes: Axes of the objects that its value depends on.
-        numbers: Of 'number' the number; of 'above' and 'below' what is added, then what ties decide;
+        numbers: Of 'number' its interval; of 'above' and 'below' what is added, then what ties decide;
             of 'compare' the latter; of 'rate' the factor.
         node: Of 'look' what is looked up.
         order: Of 'look' the axes in the order in which its objects are named; of a quantifier its
@@ -144,8 +157,8 @@ class Compiler:
 
     def rule(self, rule: Rule) -> tuple[ValueRef, ...]:
         """The places of `when` and `unless`, which come equally late."""
-        scope = tuple((v, v in rule.may_repeat) for v in rule.variables)
-        return tuple(self._together([self.formula(f, scope) for f in rule.formulas]))
+        scope = scope_of(rule)
+        return tuple(self.together([self.formula(f, scope) for f in rule.formulas]))
 
     def formula(self, node: Formula, scope: Scope = ()) -> ValueRef:
         """The place of a formula, after its steps have been put into the program."""
@@ -154,12 +167,11 @@ class Compiler:
                 return self._called(node, scope, certain=True)
             case Literal(value=value):
                 number = inf if value else -inf
-                step = Operation("number", numbers=(number,))
-                return ValueRef(self.program.add(("number", number), step), certain=True)
+                return self.constant(number, number, certain=True)
             case Comparison():
                 return self._comparison(node, scope)
             case Not(part=part):
-                return self._map("not", self.formula(part, scope))
+                return self.combined("not", self.formula(part, scope))
             case And(parts=parts) | Or(parts=parts):
                 join = "least" if isinstance(node, And) else "most"
                 return self._joined(join, [self.formula(p, scope) for p in parts])
@@ -167,70 +179,81 @@ class Compiler:
                 return self._past(kind, window, self.formula(part, scope))
             case Previous(part=part):
                 at = self.formula(part, scope)
-                return self._operator(PreviousSample(), at, certain=at.certain)
+                return self.remembered(PreviousSample(), at, certain=at.certain)
             case Since(left=left, right=right, window=window):
-                sides = self._together([self.formula(left, scope), self.formula(right, scope)])
+                sides = self.together([self.formula(left, scope), self.formula(right, scope)])
                 return self._since(window, *sides)
             case FutureOperator(kind=kind, part=part, window=window):
                 assert window is not None
                 past = "once" if kind == "eventually" else "always"
                 low, high = ticks(window.low.base), ticks(window.high.base)
-                return self._slid(past, 0, high - low, high, self.formula(part, scope))
+                return self.windowed(past, 0, high - low, high, self.formula(part, scope))
             case Until(left=left, right=right, window=window):
                 return self._until(window, self.formula(left, scope), self.formula(right, scope))
             case MOfN(part=part, least=least, of=of):
                 span = round(of.base) if node.counts_samples else ticks(of.base)
                 counting = SlidingCount(least.base, span, node.counts_samples)
-                return self._operator(counting, self.formula(part, scope))
+                return self.remembered(counting, self.formula(part, scope))
             case Last(part=part, duration=age):
                 return self._recalled(age, self.formula(part, scope))
             case Quantified():
                 return self._quantified(node, scope)
+            case Let(part=part):
+                return self.formula(part, scope)
 
     def term(self, node: Term, scope: Scope = ()) -> ValueRef:
         """The place of a quantity."""
         match node:
             case Number():
-                step = Operation("number", numbers=(node.base,))
-                return ValueRef(self.program.add(("number", node.base), step))
+                return self.constant(node.base, node.base)
             case Measure():
                 return self._called(node, scope, certain=False)
             case Negative(part=part):
-                return self._map("not", self.term(part, scope))
+                return self.combined("not", self.term(part, scope))
             case Arithmetic(left=left, operator=operator, right=right):
-                return self._map(operator, self.term(left, scope), self.term(right, scope))
+                return self.combined(operator, self.term(left, scope), self.term(right, scope))
             case PointwiseFunction(name="abs" | "sqrt" | "exp" as name, parts=(part,)):
-                return self._map(name, self.term(part, scope))
+                return self.combined(name, self.term(part, scope))
             case PointwiseFunction(name="power", parts=(base, exponent)):
-                return self._map("power", self.term(base, scope), self.term(exponent, scope))
+                return self.combined("power", self.term(base, scope), self.term(exponent, scope))
             case PointwiseFunction(name=name, parts=parts):
                 join = "least" if name == "min" else "most"
                 return self._joined(join, [self.term(p, scope) for p in parts])
+            case Variable(part=part, at=at):
+                assert part is not None
+                noted = self.term(part, scope), self.formula(at, scope)
+                return self.remembered(ValueWhenTrue(), *noted)
             case WindowFunction():
                 return self._over_time(node, self.term(node.part, scope))
 
-    def _map(self, kind: str, *at: ValueRef, numbers: tuple[float, ...] = ()) -> ValueRef:
+    def constant(self, low: float, high: float, certain: bool = False) -> ValueRef:
+        """A step that is always the same interval."""
+        step = Operation("number", numbers=(low, high))
+        return ValueRef(self.program.add(("number", low, high), step), certain=certain)
+
+    def combined(self, kind: str, *at: ValueRef, numbers: tuple[float, ...] = ()) -> ValueRef:
         """A step that remembers nothing."""
         axes, reads = _axes(at), tuple(p.step for p in at)
         step = self.program.add((kind, numbers, reads), Operation(kind, reads, axes, numbers))
         return ValueRef(step, at[0].delay, axes, all(p.certain for p in at))
 
     def _joined(self, join: str, parts: list[ValueRef]) -> ValueRef:
-        together = self._together(parts)
+        together = self.together(parts)
         at = together[0]
         for part in together[1:]:
-            at = self._map(join, at, part)
+            at = self.combined(join, at, part)
         return at
 
-    def _together(self, parts: list[ValueRef]) -> list[ValueRef]:
+    def together(self, parts: list[ValueRef]) -> list[ValueRef]:
         """The same parts, those that come earlier made to wait for the latest one."""
         latest = max(p.delay for p in parts)
-        return [self._waited(p, latest - p.delay) for p in parts]
+        return [self.waited(p, latest - p.delay) for p in parts]
 
-    def _waited(self, at: ValueRef, wait: int) -> ValueRef:
-        return self._slid("always", wait, wait, wait, at) if wait else at
+    def waited(self, at: ValueRef, wait: int) -> ValueRef:
+        """The same value, told later."""
+        return self.windowed("always", wait, wait, wait, at) if wait else at
 
-    def _operator(
+    def remembered(
         self, operator: TemporalOperator, *at: ValueRef, delay: int = 0, certain: bool = False
     ) -> ValueRef:
         """A step that remembers."""
@@ -240,68 +263,78 @@ class Compiler:
             self.program.add((operator, reads), step), at[0].delay + delay, axes, certain
         )
 
-    def _slid(self, kind: str, low: int, high: int, delay: int, *at: ValueRef) -> ValueRef:
+    def windowed(self, kind: str, low: int, high: int, delay: int, *at: ValueRef) -> ValueRef:
+        """The least ('always') or greatest ('once') over a window of the past, 'since' or 'until' in it.
+
+        Args:
+            kind: Which.
+            low: How long before now the window ends, microseconds.
+            high: How long before now it begins.
+            delay: By how much later than the parts the value comes.
+            at: The parts.
+        """
         certain = all(p.certain for p in at)
         lasting = certain and low == 0 and kind in ("always", "once")
         operator: TemporalOperator = (
             BooleanWindow(kind, high) if lasting else SlidingWindow(kind, low, high)
         )
-        return self._operator(operator, *at, delay=delay, certain=certain)
+        return self.remembered(operator, *at, delay=delay, certain=certain)
 
     def _past(self, kind: str, window: TimeWindow | None, at: ValueRef) -> ValueRef:
         if window is not None:
-            return self._slid(kind, ticks(window.low.base), ticks(window.high.base), 0, at)
-        return self._unbounded(kind, at)
+            return self.windowed(kind, ticks(window.low.base), ticks(window.high.base), 0, at)
+        return self.unbounded(kind, at)
 
-    def _unbounded(self, kind: str, *at: ValueRef) -> ValueRef:
+    def unbounded(self, kind: str, *at: ValueRef) -> ValueRef:
+        """'always', 'once' or 'since' of all that was watched."""
         delay = at[0].delay
         operator = DelayedUnbounded(kind, delay) if delay else Unbounded(kind)
-        return self._operator(operator, *at, certain=all(p.certain for p in at))
+        return self.remembered(operator, *at, certain=all(p.certain for p in at))
 
     def _since(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         if window is None:
-            return self._unbounded("since", left, right)
+            return self.unbounded("since", left, right)
         low, high = ticks(window.low.base), ticks(window.high.base)
-        found = self._slid("since", low, high, 0, left, right)
+        found = self.windowed("since", low, high, 0, left, right)
         if not low:
             return found
         # What came after the window must have been so, too.
-        return self._map("least", found, self._operator(BegunWindow(low), left))
+        return self.combined("least", found, self.remembered(BegunWindow(low), left))
 
     def _until(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         assert window is not None
-        left, right = self._together([left, right])
+        left, right = self.together([left, right])
         low, high = ticks(window.low.base), ticks(window.high.base)
-        found = self._slid("until", 0, high - low, high, left, right)
+        found = self.windowed("until", 0, high - low, high, left, right)
         if not low:
             return found
-        before = self._operator(EndedWindow(high - low, high), left, delay=high)
-        return self._map("least", found, before)
+        before = self.remembered(EndedWindow(high - low, high), left, delay=high)
+        return self.combined("least", found, before)
 
     def _recalled(self, age: Number, at: ValueRef) -> ValueRef:
-        return self._operator(SampleAndHold(ticks(age.base)), at, certain=at.certain)
+        return self.remembered(SampleAndHold(ticks(age.base)), at, certain=at.certain)
 
     def _comparison(self, node: Comparison, scope: Scope) -> ValueRef:
         entered = self._compared(node.operator, node.left, node.right, scope)
         if node.leave is None:
             return entered
         left = self._compared(node.operator, node.left, node.leave, scope)
-        return self._operator(HysteresisLatch(), entered, left)
+        return self.remembered(HysteresisLatch(), entered, left)
 
     def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> ValueRef:
         if operator in ("==", "!="):
-            apart = self._map("abs", self._map("-", *self._sides(left, right, scope)))
+            apart = self.combined("abs", self.combined("-", *self._sides(left, right, scope)))
             if operator == "==":
-                return self._map("below", apart, numbers=(0.0, EQUAL))
-            return self._map("above", apart, numbers=(0.0, -EQUAL))
+                return self.combined("below", apart, numbers=(0.0, EQUAL))
+            return self.combined("above", apart, numbers=(0.0, -EQUAL))
         by = EQUAL if "=" in operator else -EQUAL
         more, less = (left, right) if operator[0] == ">" else (right, left)
         # With a number on one side nothing can fail to be a number, and half the work is saved.
         if isinstance(less, Number):
-            return self._map("above", self.term(more, scope), numbers=(-less.base, by))
+            return self.combined("above", self.term(more, scope), numbers=(-less.base, by))
         if isinstance(more, Number):
-            return self._map("below", self.term(less, scope), numbers=(more.base, by))
-        return self._map("compare", *self._sides(more, less, scope), numbers=(by,))
+            return self.combined("below", self.term(less, scope), numbers=(more.base, by))
+        return self.combined("compare", *self._sides(more, less, scope), numbers=(by,))
 
     def _sides(self, left: Term, right: Term, scope: Scope) -> tuple[ValueRef, ValueRef]:
         return self.term(left, scope), self.term(right, scope)
@@ -312,11 +345,11 @@ class Compiler:
             case "last":
                 return self._recalled(node.duration, at)
             case "before":
-                return self._slid("always", span, span, 0, at)
+                return self.windowed("always", span, span, 0, at)
             case "lowest" | "highest":
-                return self._slid("always" if node.name == "lowest" else "once", 0, span, 0, at)
-        begin = self._slid("always", span, span, 0, at)
-        return self._map("rate", at, begin, numbers=(1.0 / node.duration.base,))
+                return self.windowed("always" if node.name == "lowest" else "once", 0, span, 0, at)
+        begin = self.windowed("always", span, span, 0, at)
+        return self.combined("rate", at, begin, numbers=(1.0 / node.duration.base,))
 
     def _called(self, node: Predicate | Measure, scope: Scope, certain: bool) -> ValueRef:
         names = [name for name, _ in scope]
@@ -329,8 +362,11 @@ class Compiler:
         return ValueRef(self.program.add(key, step), 0, frozenset(order), certain)
 
     def _quantified(self, node: Quantified, scope: Scope) -> ValueRef:
+        return self.quantified(node, scope, self.formula(node.part, inner_scope(node, scope)))
+
+    def quantified(self, node: Quantified, scope: Scope, at: ValueRef) -> ValueRef:
+        """The least or the greatest along the axis of a quantifier, of what it is of."""
         axis = len(scope)
-        at = self.formula(node.part, (*scope, (node.variable, node.may_repeat)))
         apart = () if node.may_repeat else tuple(i for i, (_, r) in enumerate(scope) if not r)
         axes, order = (at.axes | frozenset(apart)) - {axis}, (axis, *apart)
         step = Operation(node.kind, (at.step,), axes, order=order)

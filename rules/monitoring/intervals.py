@@ -15,7 +15,7 @@ added or subtracted, which changes no other number.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,20 @@ def verdict(interval: Interval) -> Truth:
     if low > 0:
         return Truth.TRUE
     return Truth.FALSE if high < 0 else Truth.UNKNOWN
+
+
+AtEnd = Literal["unknown", "weak", "strong"]
+"""What is undecided when a recording ends: still unknown, the best that could come, or the worst."""
+
+
+def as_ended(interval: Interval, view: AtEnd) -> Interval:
+    """What is told of an interval that nothing will narrow any more.
+
+    In the weak view what is undecided is true, in the strong view it is false (Eisner and others,
+    "Reasoning with temporal logic on truncated paths", 2003).
+    """
+    low, high = interval
+    return interval if view == "unknown" else (high, high) if view == "weak" else (low, low)
 
 
 class Algebra(Protocol):

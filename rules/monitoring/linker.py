@@ -28,6 +28,7 @@ from visup.rules.monitoring.operators import (
     PointOperator,
     SampleAndHold,
     Unbounded,
+    ValueWhenTrue,
     WindowOperator,
 )
 from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD
@@ -239,5 +240,7 @@ def _moment(operator: PointOperator) -> tuple[int, float, tuple[float, ...]]:
             return ops[kind], 0.0, TRUE if kind == "always" else FALSE
         case HysteresisLatch():
             return vm.LATCH, 0.0, (0.0,)
+        case ValueWhenTrue():
+            return vm.NOTE, 0.0, UNKNOWN
         case SampleAndHold(age=age):
             return vm.RECALL, float(age), (*UNKNOWN, float(LONG_AGO))

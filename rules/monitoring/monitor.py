@@ -13,7 +13,16 @@ from visup.rules.formula.nodes import Formula
 from visup.rules.formula.units import TICKS
 from visup.rules.monitoring import _interval_jit as on_intervals
 from visup.rules.monitoring.compiler import Compiler, Operation
-from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval, Scalars
+from visup.rules.monitoring.early import EarlyCompiler
+from visup.rules.monitoring.intervals import (
+    FALSE,
+    TRUE,
+    UNKNOWN,
+    AtEnd,
+    Interval,
+    Scalars,
+    as_ended,
+)
 from visup.rules.monitoring.operators import (
     BooleanWindow,
     HysteresisLatch,
@@ -21,14 +30,18 @@ from visup.rules.monitoring.operators import (
     SlidingWindow,
     TemporalOperator,
     Unbounded,
+    ValueWhenTrue,
 )
 from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD, Update
 from visup.rules.monitoring.signals import Signals, known_interval, later
+from visup.rules.monitoring.sliding import Queue
 
 Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
 """(values of the operations before, states before, states after, microseconds, signals) -> value."""
 
 _ON = Scalars()
+_OPEN, _FORESEEN = -2, -1
+"""Where, behind the states of operators, the samples stand that are not judged yet, and what is foreseen."""
 
 
 class Monitor:
@@ -40,22 +53,34 @@ class Monitor:
     >>> [monitor.step(t, {"x": x}) for t, x in ((0.0, 3.0), (0.1, 4.0), (0.2, 2.0), (0.3, 0.0))]
     [(-inf, 2.0), (-inf, 2.0), (1.0, 1.0), (-1.0, -1.0)]
 
+    What is decided before a window of the future is over, `foreseen` tells if asked to:
+
+    >>> monitor = Monitor(parse_formula("eventually[60 s] x() > 1", signals("x")), early=True)
+    >>> monitor.step(0.0, {"x": 3.0}), monitor.foreseen()
+    ((-inf, inf), (2.0, inf))
+
     Args:
         formula: Its quantities are the signals, written `name()`.
+        early: Whether to find at every sample what is decided by then, which costs up to twice as much.
 
     Attributes:
         delay: How many seconds late a verdict comes: what is reported at t is about t - delay.
+        early_delay: The same of what is foreseen.
         state: All that is retained, an immutable value: microseconds of the last sample, or None
             before it, and what the operators remember. Put back an older one to go on from it.
     """
 
-    def __init__(self, formula: Formula) -> None:
+    def __init__(self, formula: Formula, *, early: bool = False) -> None:
         compiler = Compiler()
         value = compiler.formula(formula)
+        first = EarlyCompiler(compiler).formula(formula).first if early else value
         self._runs = [_run(step, k) for k, step in enumerate(compiler.program.steps)]
         self._at = value.step
         self.delay = value.delay / TICKS
-        self.state: tuple[int | None, tuple[Any, ...]] = (None, (None,) * len(self._runs))
+        self._early_at, self.early_delay = first.step, first.delay / TICKS
+        self._wait = value.delay
+        states = (None,) * len(self._runs)
+        self.state: tuple[int | None, tuple[Any, ...]] = (None, (*states, Queue(), UNKNOWN))
 
     def step(self, time: float, values: Signals) -> Interval:
         """Take in one sample.
@@ -78,8 +103,37 @@ class Monitor:
         take = found.append
         for run in self._runs:
             take(run(found, before, after, now, values))
+        if self._wait:
+            after[_OPEN] = after[_OPEN].advance(now - self._wait, None)[0].push(now, None)
+        after[_FORESEEN] = found[self._early_at]
         self.state = now, tuple(after)
         return found[self._at]
+
+    def foreseen(self) -> Interval:
+        """What is decided at the last sample of the moment `early_delay` before it.
+
+        The robustness interval that `step` returns in the end, `delay` after that moment, lies within
+        this one: what is true or false here stays so. Of a monitor that is not early it is the same as
+        what `step` returned.
+        """
+        foreseen: Interval = self.state[1][_FORESEEN]
+        return foreseen
+
+    def finish(self, at_end: AtEnd = "unknown") -> list[tuple[float, Interval]]:
+        """What `step` would still tell if nothing more were seen; it may be asked at any time.
+
+        Args:
+            at_end: What becomes of what is not decided by then.
+
+        Returns:
+            Seconds of each sample of which no verdict has come, and the robustness interval of it.
+        """
+        kept, told = self.state, list[tuple[float, Interval]]()
+        for moment in kept[1][_OPEN].times():
+            found = self.step((moment + self._wait) / TICKS, {})
+            told.append((moment / TICKS, as_ended(found, at_end)))
+        self.state = kept
+        return told
 
 
 def _run(step: Operation, slot: int) -> Run:
@@ -92,7 +146,7 @@ def _run(step: Operation, slot: int) -> Run:
         name = step.node.name
         return _looking(name)
     if step.kind == "number":
-        return lambda v, before, after, now, signals: (first, first)
+        return lambda v, before, after, now, signals: (first, second)
     function = _FUNCTIONS[step.kind]
     if len(step.reads) == 2:
         return lambda v, before, after, now, signals: function(v[one], v[other], first)
@@ -175,6 +229,13 @@ def _update(operator: TemporalOperator) -> Update:
                 return entered, value
 
             return latch
+        case ValueWhenTrue():
+
+            def note(state: Any, now: int, v: Interval, at: Interval) -> tuple[Any, Interval]:
+                kept = v if at[0] > 0 else state or UNKNOWN
+                return kept, kept
+
+            return note
         case BooleanWindow(kind=kind, high=high):
             return SlidingWindow(kind, 0, high).on(_ON)
     return operator.on(_ON)

@@ -252,7 +252,17 @@ class HysteresisLatch:
         return 1
 
 
-PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch
+@dataclass(frozen=True)
+class ValueWhenTrue:
+    """`let x be q at f`: what q was when f was last known to be true; unknown before it ever was."""
+
+    @property
+    def kept(self) -> int:
+        """Most intervals that the state holds for one choice of objects."""
+        return 1
+
+
+PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch | ValueWhenTrue
 """Operators whose state is a few numbers for each choice of objects."""
 WindowOperator = (
     SlidingWindow | SlidingCount | DelayedUnbounded | BegunWindow | EndedWindow | PreviousSample

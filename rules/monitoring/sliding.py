@@ -56,15 +56,22 @@ class Queue(NamedTuple):
 
     def changed(self, change: Callable[[int, Any], Any]) -> Queue:
         """The same queue with every value changed by its time and value."""
+        queue = Queue()
+        for time, value in self._cells():
+            queue = queue.push(time, change(time, value))
+        return queue
+
+    def times(self) -> list[int]:
+        """When each came, oldest first; microseconds."""
+        return [time for time, _ in self._cells()]
+
+    def _cells(self) -> list[tuple[int, Any]]:
         cells = []
         for part in self:
             while part is not None:
                 cells.append((part[0], part[1]))
                 part = part[2]
-        queue = Queue()
-        for time, value in sorted(cells, key=lambda c: c[0]):
-            queue = queue.push(time, change(time, value))
-        return queue
+        return sorted(cells, key=lambda c: c[0])
 
 
 class SlidingState(NamedTuple):

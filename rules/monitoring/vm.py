@@ -45,7 +45,7 @@ CHOICE_BITS = 32
 
 (FACT, SPREAD, NUMBER, NOT, ABS, LEAST, MOST, SHIFT, BELOW, COMPARE, PLUS, MINUS) = range(12)
 (TIMES, OVER, RATE, ROOT, EXP, POWER, SOME, EVERY) = range(12, 20)
-(ALWAYS, ONCE, SINCE, LASTS, HAPPENED, LATCH, RECALL) = range(20, 27)
+(ALWAYS, ONCE, SINCE, LASTS, HAPPENED, LATCH, RECALL, NOTE) = range(20, 28)
 
 
 @compiled
@@ -97,7 +97,7 @@ def run(
                 v = shifted((arena[a + k], arena[a + c + k]), p, q)
                 arena[out + k], arena[out + c + k] = v
         elif op == NUMBER:
-            arena[out], arena[out + 1] = p, p
+            arena[out], arena[out + 1] = p, q
         elif op == FACT:
             _read_facts(facts, code[i], n, arena)
         elif op in (SPREAD, SOME, EVERY):
@@ -199,6 +199,8 @@ def _update_states(
         return _recall(row, now, span, arena, before, after)
     if op == LATCH:
         return _latch(row, arena, before, after)
+    if op == NOTE:
+        return _note(row, arena, before, after)
     if op in (LASTS, HAPPENED):
         return _boolean_window(row, now, span, arena, before, after)
     return _accumulate(row, arena, before, after)
@@ -228,6 +230,19 @@ def _latch(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
         arena[out + k], arena[out + c + k] = v
         after[state + k] = 1.0 if entered else 0.0
         changed |= after[state + k] != before[state + k]
+    return changed
+
+
+@compiled
+def _note(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
+    """What a quantity was when a formula was last true."""
+    c, out, a, b, state, changed = row[CELLS], row[DEST], row[A], row[B], row[STATE], False
+    for k in range(c):
+        holds = arena[b + k] > 0.0
+        for m in (k, c + k):
+            new = arena[a + m] if holds else before[state + m]
+            arena[out + m] = after[state + m] = new
+            changed |= new != before[state + m]
     return changed
 
 

@@ -23,6 +23,7 @@ from visup.rules.formula.nodes import (
 )
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.monitoring.compiler import Compiler, Program, Scope, ValueRef
+from visup.rules.monitoring.early import EarlyCompiler
 from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.states import States
 from visup.rules.monitoring.vm import CHOICE_BITS, Ints, bits
@@ -110,12 +111,15 @@ class CompiledRules:
         rules: The rules.
         compiler: Knows where the value of every formula is found.
         places: Of each rule: `when`, and `unless` if there is one.
+        early: Of each rule: where it is found that it is decided to be true before its verdict comes;
+            None where verdicts are not late, or are not asked for early.
         lines: What `explain` remembers of the texts of evidence, by rule and names of objects.
     """
 
     rules: tuple[Rule, ...]
     compiler: Compiler
     places: tuple[tuple[ValueRef, ...], ...]
+    early: tuple[ValueRef | None, ...] = ()
     _placed: dict[Scope, dict[int, ValueRef]] = field(default_factory=dict, repr=False)
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
     _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
@@ -212,9 +216,15 @@ class CompiledRules:
         """The rules by name."""
         return {rule.name: rule for rule in self.rules}
 
+    @cached_property
+    def _judged(self) -> tuple[tuple[Rule, tuple[ValueRef, ...]], ...]:
+        """What may be found to be true: each rule in the end, then those that may be told early."""
+        early = ((r, (at,)) for r, at in zip(self.rules, self.early, strict=True) if at is not None)
+        return (*zip(self.rules, self.places, strict=True), *early)
+
     def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
         """The rule and the objects of something that `vm.find_true` found of some objects."""
-        rule, rows = self.rules[hit >> CHOICE_BITS], hit & (1 << CHOICE_BITS) - 1
+        rule, rows = self._judged[hit >> CHOICE_BITS][0], hit & (1 << CHOICE_BITS) - 1
         chosen = []
         for _ in rule.variables:
             rows, row = divmod(rows, len(ids))
@@ -241,12 +251,12 @@ class CompiledRules:
         """
         if n not in self._verdicts:
             layout, rows = self.layout(n), []
-            for rule, places in zip(self.rules, self.places, strict=True):
+            for rule, places in self._judged:
                 at = [(layout.places[p.step], bits(p.axes)) for p in places]
                 when, unless = (*at, (-1, 0))[:2]
                 apart = sum(1 << i + j - 1 for i, j in _apart(rule))
                 rows.append((*when, *unless, len(rule.variables), apart))
-            most = sum(n ** len(rule.variables) for rule in self.rules)
+            most = sum(n ** len(rule.variables) for rule, _ in self._judged)
             self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6), most
         return self._verdicts[n]
 
@@ -266,12 +276,15 @@ def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
 
 
 @lru_cache(maxsize=16)
-def compile_rules(rules: tuple[Rule, ...]) -> CompiledRules:
-    """Rules made ready to run; the same object for the same rules."""
+def compile_rules(rules: tuple[Rule, ...], early: bool = False) -> CompiledRules:
+    """Rules made ready to run; the same object for the same rules.
+
+    Args:
+        rules: The rules.
+        early: Whether what they say of the future is told as soon as it is decided.
+    """
     compiler = Compiler()
-    return CompiledRules(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
-
-
-def scope_of(rule: Rule) -> Scope:
-    """The variables of a rule by axis."""
-    return tuple((v, v in rule.may_repeat) for v in rule.variables)
+    places = tuple(compiler.rule(rule) for rule in rules)
+    sooner = EarlyCompiler(compiler)
+    found = [sooner.rule(rule) if early else None for rule in rules]
+    return CompiledRules(rules, compiler, places, tuple(f.first if f else None for f in found))

@@ -19,12 +19,12 @@ from visup.rules.formula.nodes import (
     children,
     placeholder,
 )
-from visup.rules.formula.terms import Measure, Term
+from visup.rules.formula.terms import Measure, Term, Variable
 from visup.rules.formula.units import TICKS, Number
-from visup.rules.monitoring.compiler import Scope, ValueRef
+from visup.rules.monitoring.compiler import Scope, ValueRef, scope_of
 from visup.rules.monitoring.intervals import UNKNOWN, Interval, verdict
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.safety.compiled_rules import CompiledRules, scope_of
+from visup.rules.safety.compiled_rules import CompiledRules
 from visup.rules.safety.verdicts import Evaluation
 from visup.rules.wording.sentences import short
 
@@ -88,7 +88,18 @@ def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleEx
         for word, p in zip(("when", "unless"), parts, strict=False)
     )
     found = Truth.FALSE if suspended else parts[0].verdict
-    return RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+    told = RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+    early = values.prepared.early[values.prepared.rules.index(rule)]
+    return told if early is None else _with_early(told, values.interval(early, reader.rows))
+
+
+def _with_early(late: RuleExplanation, interval: Interval) -> RuleExplanation:
+    """A rule with what is decided of it before its verdict comes, which may make it true already."""
+    early = RuleExplanation("what is decided by now", interval, verdict(interval))
+    told = replace(late, parts=(*late.parts, early))
+    if late.verdict is Truth.TRUE or early.verdict is not Truth.TRUE:
+        return told
+    return replace(told, interval=interval, verdict=Truth.TRUE, late_s=0.0)
 
 
 MAX_LINES = 4096
@@ -174,7 +185,7 @@ class _ExplanationBuilder:
         """What a node came to, with what it is made of."""
         place, interval = self._value(node)
         term = isinstance(node, Term)
-        whole = not isinstance(node, Predicate | Measure | Number)
+        whole = not isinstance(node, Predicate | Measure | Number | Variable)
         return RuleExplanation(
             _text(node, self.names, self.values.prepared),
             interval,
@@ -226,6 +237,8 @@ def _late(seconds: float) -> str:
 
 
 def _unit(node: Node) -> str:
+    if isinstance(node, Variable) and node.part is not None:
+        return _unit(node.part)
     if not isinstance(node, Measure):
         return ""
     return RULES.quantities[node.name].unit

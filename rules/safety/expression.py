@@ -23,12 +23,13 @@ from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
 from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
+from visup.rules.monitoring.compiler import scope_of
 from visup.rules.monitoring.intervals import Interval, verdict
 from visup.rules.monitoring.samples import MIN_SPACING
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.safety.compiled_rules import compile_rules, scope_of
+from visup.rules.safety.compiled_rules import compile_rules
 from visup.rules.safety.explain import RuleExplanation, explain_rule
 from visup.rules.safety.verdicts import Evaluation, remapped
 

@@ -47,7 +47,7 @@ def evaluation_of(mind: Mind) -> Evaluation:
         raise RuleError("no rule has been judged in this mind", hint="let the agent make a step")
     # Rules saw the tasks as they stood a step before.
     facts = Snapshot(replace(mind, tasks=memory.tasks))
-    return Evaluation(compile_rules(memory.rules), facts, memory.now, memory.before)
+    return Evaluation(compile_rules(memory.rules, memory.early), facts, memory.now, memory.before)
 
 
 def rule_named(values: Evaluation, name: str) -> Rule:
@@ -80,12 +80,15 @@ def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     """
     values = evaluation_of(mind)
     rule = rule_named(values, name)
-    places = values.prepared.places[values.prepared.rules.index(rule)]
+    number = values.prepared.rules.index(rule)
+    places, early = values.prepared.places[number], values.prepared.early[number]
     found = {}
     for ids in object_choices(values, rule):
         rows = tuple(values.facts.row[i] for i in ids)
         when, *unless = (verdict(values.interval(p, rows)) for p in places)
         found[ids] = Truth.FALSE if Truth.TRUE in unless else when
+        if early is not None and verdict(values.interval(early, rows)) is Truth.TRUE:
+            found[ids] = Truth.TRUE
     return found
 
 

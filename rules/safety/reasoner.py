@@ -32,6 +32,8 @@ class RuleMemory:
         tasks: What tasks had come to when rules looked; they are matched later in a step.
         held: Concerns that stand, those whose sentences are oldest first.
         cooling: Until when, in seconds, objects raise no concern again.
+        early: Whether what rules say of the future was told as soon as it was decided.
+        since: Microseconds of the first sample of each of its objects.
     """
 
     rules: tuple[Rule, ...] = ()
@@ -45,6 +47,8 @@ class RuleMemory:
         default_factory=lambda: MappingProxyType({})
     )
     cooling: Mapping[AlarmKey, float] = field(default_factory=lambda: MappingProxyType({}))
+    early: bool = False
+    since: Mapping[int, int] = field(default_factory=lambda: MappingProxyType({}))
 
 
 SAFETY = MemoryKey("rules.safety", RuleMemory())
@@ -59,23 +63,26 @@ class RuleReasoner:
     Attributes:
         rules: What is watched.
         memory: Its key; another reasoner of rules in the same agent needs one of its own.
+        early: Whether what rules say of the future is told as soon as it is decided, and not when all of
+            their windows are over.
     """
 
     rules: tuple[Rule, ...]
     memory: MemoryKey[RuleMemory] = SAFETY
+    early: bool = False
     _prepared: CompiledRules = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # Rules are long trees: to look up by them what was prepared costs as much as a rule.
-        object.__setattr__(self, "_prepared", compile_rules(self.rules))
+        object.__setattr__(self, "_prepared", compile_rules(self.rules, self.early))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         old, now = mind.recall(self.memory), ticks(mind.time)
         # To compare the trees costs more than all that is done with them.
-        same = old.rules is self.rules or old.rules == self.rules
+        same = (old.rules is self.rules or old.rules == self.rules) and old.early == self.early
         if not same or (old.now is not None and now < old.now):
-            old = RuleMemory(self.rules)
+            old = RuleMemory(self.rules, early=self.early)
         if old.now is not None and now - old.now < MIN_SPACING:
             told = tuple(h.concern for h in old.held.values())
             return Outcome(mind, conditions=once_per_machine(told, mind))
@@ -83,6 +90,9 @@ class RuleReasoner:
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
             before = remapped(prepared, old.after, now, old.ids, facts.ids)
+        since = old.since
+        if old.ids != facts.ids:
+            since = MappingProxyType({i: since.get(i, now) for i in facts.ids})
         values = Evaluation(prepared, facts, now, before)
         held, cooling = update(values, old.held, old.cooling, old.time)
         mind = mind.remember(
@@ -97,6 +107,8 @@ class RuleReasoner:
                 mind.tasks,
                 held,
                 cooling,
+                self.early,
+                since,
             ),
         )
         told = tuple(h.concern for h in held.values())

@@ -12,6 +12,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     Literal,
     MOfN,
     Not,
@@ -21,6 +22,7 @@ from visup.rules.formula.nodes import (
     Since,
     TimeWindow,
     Until,
+    walk,
 )
 from visup.rules.formula.terms import (
     Arithmetic,
@@ -28,6 +30,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import Number, Unit
@@ -55,10 +58,12 @@ def random_formula(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Form
         return random_formula(rng, depth - 1, words)
 
     # What depends on no object has no first sample of its own.
-    match rng.randrange(14 if words else 15):
+    match rng.randrange(15 if words else 16):
+        case 14:
+            return _let(rng, depth, words)
         case 13:
             return Previous(part())
-        case 14:
+        case 15:
             return rng.choice((Literal(True), Literal(False)))
         case 0:
             return Not(part())
@@ -84,6 +89,22 @@ def random_formula(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Form
             share = Number(float(rng.choice((10, 25, 50, 60, 80, 100))), Unit.PERCENT)
             return MOfN(part(), share, _span(rng))
     return Last(part(), _span(rng))
+
+
+def _let(rng: Random, depth: int, words: tuple[str, ...]) -> Let:
+    """A value noted when something of now or of the past is true, and compared in a formula."""
+    at = random_formula(rng, depth - 1, words)
+    while any(isinstance(n, FutureOperator | Until) for n in walk(at)):
+        at = random_formula(rng, depth - 1, words)
+    name = f"v{rng.randrange(10**6)}"
+    noted = Variable(name, random_term(rng, rng.randint(0, 1), words), at)
+    assert noted.part is not None
+    compared = Comparison(random_term(rng, 1, words), rng.choice("<>"), noted)
+    part = random_formula(rng, depth - 1, words)
+    joined: Formula = rng.choice((compared, And((compared, part)), Or((part, compared))))
+    if rng.random() < 0.3:
+        joined = PastOperator(rng.choice(("always", "once")), joined, _window(rng, 0.3))
+    return Let(name, noted.part, at, joined)
 
 
 def _comparison(rng: Random, words: tuple[str, ...]) -> Comparison:

@@ -17,6 +17,7 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Let,
     Literal,
     MOfN,
     Not,
@@ -33,6 +34,7 @@ from visup.rules.formula.terms import (
     Negative,
     PointwiseFunction,
     Term,
+    Variable,
     WindowFunction,
 )
 from visup.rules.formula.units import Number
@@ -129,6 +131,8 @@ class _Oracle:
                 return self.until(self.formula(left), self.formula(right), a, b)
             case MOfN():
                 return self.often(f)
+            case Let(part=part):
+                return self.formula(part)
             case Last(part=part, duration=age):
                 return self.last(self.formula(part), _micro(age))
         raise TypeError(f"the oracle knows signals, not objects: {f}")
@@ -306,6 +310,11 @@ class _Oracle:
             case Arithmetic(left=left, operator=operator, right=right):
                 sides = zip(self.term(left), self.term(right), strict=True)
                 return [_computed(operator, v, w) for v, w in sides]
+            case Variable(part=part, at=at) if part is not None:
+                values, noted = self.term(part), self.formula(at).values
+                true = [k for k in range(len(noted)) if noted[k][0] > 0]
+                before = ([j for j in true if j <= k] for k in range(len(noted)))
+                return [values[js[-1]] if js else ANYTHING for js in before]
             case WindowFunction(name="last", part=part, duration=age):
                 return self.last(Signal(self.term(part)), _micro(age)).values
             case WindowFunction(name="lowest" | "highest" as name, part=part, duration=span):

@@ -25,6 +25,8 @@ class WatchOptions(TypedDict, total=False):
     rules: Sequence[str | os.PathLike[str]]
     behaviours: Sequence[str | os.PathLike[str]]
     plugins: Sequence[str]
+    early: bool
+    at_end: str
     plugin_settings: Mapping[str, Mapping[str, Any]]
     isolate: Sequence[str]
     budgets: bool

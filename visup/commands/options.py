@@ -25,7 +25,7 @@ SettingsFile = Annotated[
     typer.Option("--settings", metavar="TOML", help="Settings, in tables [behaviours.NAME]."),
 ]
 
-REPLAYED = ("tasks", "rules", "actors", "zones")
+REPLAYED = ("tasks", "rules", "early", "at_end", "actors", "zones")
 """What a recorded run can be reasoned about again with."""
 
 

@@ -106,6 +106,8 @@ def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int
     from visup.terminal.narrator import verdict_line
 
     verdict = Verdict(told.verdict) if told.verdict else None
+    for text in told.at_end:
+        console.print(text, soft_wrap=True, markup=False, style="yellow")
     console.print(verdict_line(verdict, has_task=has_task))
     return RunResult(verdict, told.steps, has_task=has_task).exit_code
 

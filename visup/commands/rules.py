@@ -21,7 +21,7 @@ app = typer.Typer(no_args_is_help=True)
 
 Files = Annotated[list[Path] | None, typer.Argument(help="Rule files; the shipped rules if none.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
-EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical_deg")
+EXPLAINED = ("tasks", "models", "rules", "early", "actors", "every", "fps", "fov_vertical_deg")
 """Settings of a run that bear on what rules say."""
 
 
@@ -64,6 +64,7 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
                     "objects": len(rule.variables),
                     "severity": rule.severity.name.lower(),
                     "delay_s": cost.delay_s,
+                    "early_delay_s": cost.early_delay_s,
                     "most_bytes_per_choice": cost.bytes,
                     "text": str(rule),
                 }
@@ -145,4 +146,10 @@ def _cost(rule: Rule) -> str:
 
     cost = cost_of(rule)
     late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported at once"
-    return f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"
+    told = f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"
+    if cost.early_delay_s == cost.delay_s:
+        return told
+    least = (
+        f"{cost.early_delay_s:g} s late at the least" if cost.early_delay_s else "perhaps at once"
+    )
+    return f"{told}; with --early, {least}"

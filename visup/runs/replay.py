@@ -20,6 +20,7 @@ from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
 from visup.agent.storage.jsonable import event_record, to_jsonable
+from visup.rules.safety.ending import open_rules
 from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict, reasoning_agent
@@ -40,12 +41,14 @@ class Transcript:
         verdict: How it ended; None where nothing was to be judged, or it is not over.
         steps: Frames.
         seconds: Wall time that reasoning took; 0 for a recorded run.
+        at_end: What rules came to that were not decided, as the settings ask.
     """
 
     events: tuple[Line, ...]
     verdict: str | None
     steps: int
     seconds: float = 0.0
+    at_end: tuple[str, ...] = ()
 
     def of(self, kinds: Callable[[str], bool]) -> tuple[Line, ...]:
         """The events of some kinds."""
@@ -146,7 +149,8 @@ def replay(
             journal.note(verdict=verdict, steps=listener.steps, tasks=agent.mind.tasks)
             export_events(journal.path, journal.path.with_name("events.jsonl"))
             journal.note(ended="complete")
-    return Transcript(tuple(listener.events), verdict, listener.steps, seconds)
+    at_end = tuple(map(str, open_rules(agent.mind, settings.at_end)))
+    return Transcript(tuple(listener.events), verdict, listener.steps, seconds, at_end)
 
 
 def recorded_transcript(recording: Recording) -> Transcript:

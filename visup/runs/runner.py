@@ -20,6 +20,7 @@ from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.redaction import redacted
+from visup.rules.safety.ending import open_rules
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.inputs.preflight import check_cast
 from visup.runs.inputs.stop_signals import stop_signals
@@ -320,6 +321,7 @@ class _Run:
             cache_note(),
             self._checkpoints.note if self._checkpoints else None,
             self._pace.note() if self._pace else None,
+            *map(str, open_rules(mind, self._settings.at_end)),
             *self._sinks.end(verdict, self._steps),
         )
         notes = (*self._notes, *filter(None, told))

@@ -13,6 +13,8 @@ from typing import Annotated, Any
 
 from visup.agent.model.errors import SettingsError
 
+VIEWS_AT_END = ("unknown", "weak", "strong")
+"""What may become of rules that are not decided when a run ends; as of `visup.rules`."""
 SECRET_LEFT_OUT = "source_without_secret"
 """The fact of a recorded run that its source had a password, which is not recorded."""
 
@@ -110,6 +112,22 @@ class WatchSettings:
     rules: Annotated[
         tuple[Path, ...], Option("Rules file, instead of the shipped rules.", metavar="FILE")
     ] = ()
+    early: Annotated[
+        bool,
+        Option(
+            "Tell what rules say of the future as soon as it is decided, not when their windows are over.",
+            "--early",
+        ),
+    ] = False
+    at_end: Annotated[
+        str,
+        Option(
+            "What becomes of rules that are not decided at the end: unknown, weak (they count as true) "
+            "or strong (as false).",
+            "--at-end",
+            "VIEW",
+        ),
+    ] = "unknown"
     actors: Annotated[
         Mapping[str, tuple[str, ...]],
         Option(
@@ -198,6 +216,8 @@ class WatchSettings:
     ] = False
 
     def __post_init__(self) -> None:
+        if self.at_end not in VIEWS_AT_END:
+            raise SettingsError(f"--at-end is {self.at_end!r}", expected="unknown, weak or strong")
         if self.every < 1:
             raise SettingsError(f"--every is {self.every}", expected="1 or more")
         if self.pace is not None and not 0 < self.pace <= 1000:

@@ -271,7 +271,7 @@ def _reasoners(
     usual = ReasonerSettings()
     if settings.preset:
         usual = ReasonerSettings(objects=preset_named(settings.preset).objects)
-    interpreting = default_reasoners(usual, _rules(settings), traits=traits)
+    interpreting = default_reasoners(usual, _rules(settings), traits=traits, early=settings.early)
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)
     activation = (ActivationReasoner(rules),) if rules else ()

@@ -149,7 +149,8 @@ def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> R
 def with_rules(reasoners: Reasoners, rules: Sequence[Rule]) -> Reasoners:
     """Reasoners that watch other rules."""
     kept = tuple(t for t in reasoners.cogitate if not isinstance(t, RuleReasoner))
-    return replace(reasoners, cogitate=(*kept, RuleReasoner(tuple(rules))))
+    early = any(t.early for t in reasoners.cogitate if isinstance(t, RuleReasoner))
+    return replace(reasoners, cogitate=(*kept, RuleReasoner(tuple(rules), early=early)))
 
 
 def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:

@@ -31,7 +31,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",
         },
         "Ask many runs": {
-            "archive": "fill a lake with the tables of many runs",
+            "archive": "watch many clips; a lake with the tables of their runs",
         },
         "Extend and measure": {
             "behaviours": "list, check and create plug-ins",

@@ -239,4 +239,8 @@ def test_rule_files_are_served_as_well(editor: Editor, tmp_path: Path) -> None:
     assert editor.told[uri] == []
     assert "touching(object, object)" in editor.at("hover", uri, 1, 12)["contents"]["value"]
     labels = {i["label"] for i in editor.at("completion", uri, 1, 10)}
-    assert {"touching", "gap", "within"} <= labels
+    assert {"touching", "gap", "within", "let", "rising", "rate"} <= labels
+    noted = text.replace("touchng(a, b)", "let x be gap(a, b) at seen(a): gap(a, b) > x")
+    editor.change(uri, noted)
+    assert editor.told[uri] == []
+    assert "last known to be true" in editor.at("hover", uri, 1, 10)["contents"]["value"]

@@ -1,12 +1,14 @@
 """Caught, bounced off, or passing: when two bodies are believed to be one."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 
 from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
-from visup.agent import Observation, Truth
+from visup.agent import Observation, Region, Truth
+from visup.rules.coupling.evidence import common_speed
 
 Place = Callable[[float], float]
 
@@ -18,6 +20,12 @@ def scene(right: Place, left: Place = lambda t: 100.0, seconds: float = 10.0) ->
             yield seen(i, [box_region(n, (x, 200, 80, 60)) for x, n in boxes])
 
     return reason(observations())
+
+
+def moving_as(region: Region | None, velocity: tuple[float, float]) -> Region:
+    """A region with image motion of its own."""
+    assert region is not None
+    return replace(region, velocity=velocity, velocity_sigma=1.0)
 
 
 def told(thoughts: list[Thought]) -> list[tuple[str, float]]:
@@ -117,3 +125,24 @@ def test_what_shows_of_a_hidden_body_at_the_edge_of_what_passes_does_not_couple_
     thoughts = reason(observations())
     assert any(e.kind == "occlusion" for t in thoughts for e in t.events)
     assert told(thoughts) == []
+
+
+def test_what_is_being_covered_goes_no_faster_than_its_image_motion() -> None:
+    """An arm rests and reaches in over the left border; what comes nearer covers it from its tip on."""
+
+    def observations() -> Iterator[Observation]:
+        for i in range(150):
+            near = max(0.0, i / 25 - 2.0)
+            front = 330 - 110 * near
+            nearer = (front, 120 - 40 * near, 140 + 170 * near, 240 + 80 * near)
+            cover = moving_as(box_region(2, nearer), (-25.0, 0.0))
+            arm = (0, 220, min(300.0, front), 40)
+            regions = [moving_as(box_region(1, arm), (0.5, 0.0))] if front > 60 else []
+            yield seen(i, [*regions, cover])
+
+    thoughts = reason(observations())
+    assert told(thoughts) == []
+    minds = [t.mind for t in thoughts if {1, 2} <= t.mind.objects.keys()]
+    seen_now = [m for m in minds if m.objects[1].last_seen == m.time]
+    assert len(seen_now) > 50
+    assert all(common_speed(m, (1, 2)) <= 0.5 for m in seen_now)

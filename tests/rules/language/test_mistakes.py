@@ -59,6 +59,23 @@ CONDITIONS = [
     "abs(gap(a, b) < 3 px",
     "touching(a, b) for -2 s",
     "touching(a, b) before seen(a)",
+    "let p = position_x(a) at touching(a, b): position_x(a) > p + 20 px",
+    "let p be position_x(a) when touching(a, b): position_x(a) > p + 20 px",
+    "let p be position_x(a) at touching(a, b), position_x(a) > p + 20 px",
+    "remember p as gap(a, b) at touching(a, b): gap(a, b) > p",
+    "let p be gap(a, b) at touching(a, b): gap(a, b) > q",
+    "let p be gap(a, b): gap(a, b) > p",
+    "let p be gap(a, b) at henceforth[2 s] touching(a, b): gap(a, b) > p",
+    "let p gap(a, b) at touching(a, b): gap(a, b) > p",
+    "let a be gap(a, b) at touching(a, b): gap(a, b) > a",
+    "let p be gap(a, b) at touching(a, b): gap(a, b) > 3 px",
+    "gap(a, b) in 3 px .. 5 px",
+    "touching(a, b) within 5 frames",
+    "there is c: touching(a, c) and seen(b)",
+    "heading(a) == north and seen(b)",
+    "touching(a, b) == false",
+    "north east_of(a, b)",
+    "3 of 5 samples touching(a, b)",
 ]
 RULES = [
     'rule r(a, b) info\n when touching(a, b)\n say "x"',
@@ -112,6 +129,29 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
         text = fix.applied(text)
         errors = errors_of(text)
     assert errors == [], text
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("touching(a, b) == false", "not touching(a, b)"),
+        ("touching(a, b) != false", "touching(a, b)"),
+        ("touching(a, b) is false", "not touching(a, b)"),
+        ("north east_of(a, b)", "north_east_of(a, b)"),
+        (
+            "let p gap(a, b) at touching(a, b): gap(a, b) > p",
+            "let p be gap(a, b) at touching(a, b): gap(a, b) > p",
+        ),
+        ("touching(a, b) within 5 frames", "touching(a, b) in 1 of 5 samples"),
+    ],
+)
+def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
+    text = rule(written)
+    (error,) = errors_of(text)
+    assert isinstance(error.where, SourceLocation)
+    fix = fix_of(text, error.where, error.hint)
+    assert fix is not None
+    assert fix.applied(text) == rule(meant)
 
 
 def test_a_slip_hides_nothing_of_what_else_is_wrong_with_the_rule() -> None:

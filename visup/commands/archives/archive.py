@@ -1,17 +1,120 @@
-"""`visup archive`: lakes of many runs."""
+"""`visup archive`: lakes of many runs are filled."""
 
 from __future__ import annotations
 
+import os
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from visup.commands.options import Given, SettingsFile, takes
+from visup.commands.watch import watch_settings
+from visup.runs.settings import WatchSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rich.console import Console
+
+    from visup.archive.filling.filling import FillResult
+    from visup.archive.filling.plan import FailedClip, Plan
+    from visup.archive.filling.pool import PoolSettings
+    from visup.archive.filling.watching import ClipOutcome
+    from visup.archive.lake import Lake
 
 Into = Annotated[
     Path, typer.Option("--into", metavar="LAKE", help="The lake; made when it is not there.")
 ]
+FILLED = (
+    "tasks",
+    "models",
+    "rules",
+    "actors",
+    "bystanders",
+    "behaviours",
+    "plugins",
+    "plugin_settings",
+    "isolate",
+    "every",
+    "pace",
+    "fps",
+    "fov_vertical_deg",
+    "zones",
+    "motion",
+    "preset",
+    "attention",
+)
+"""Settings of all clips; those of live sources, and of one clip alone, are left out."""
 
 app = typer.Typer(no_args_is_help=True)
+
+
+@app.command("run")
+@takes(WatchSettings, only=FILLED)
+def run(
+    setting: Given,
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SOURCE...", help="Clips, folders, patterns ('*.mp4'), or manifests (.csv)."
+        ),
+    ],
+    into: Into,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=0, help="Processes; 0 for this one alone (default: one for each core)."
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Use the workers of this Dask scheduler, such as tcp://head:8786.",
+        ),
+    ] = None,
+    memory_gb: Annotated[
+        float | None,
+        typer.Option(metavar="NUMBER", help="What a worker may take, gigabytes."),
+    ] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Only say what would be done.")] = False,
+    retry: Annotated[
+        bool, typer.Option("--retry", help="Try clips again that were put aside.")
+    ] = False,
+    settings_file: SettingsFile = None,
+) -> None:
+    """Watch many clips, on many workers, and put the runs into a lake.
+
+    A clip whose run is in the lake already is left out: stopped anywhere, the same command goes on where it
+    was. Exit code: 0 when all runs are in the lake, 1 when clips failed (the others are there), 2 on bad
+    input, 130 when you stopped it.
+    """
+    from visup.archive.filling.clips import clips_of
+    from visup.archive.filling.filling import begin_anew, only_filler
+    from visup.archive.filling.plan import make_plan
+    from visup.archive.filling.pool import PoolSettings
+    from visup.archive.lake import MARK, Lake
+    from visup.terminal.console import make_console
+
+    console = make_console()
+    settings = watch_settings("", setting, settings_file)
+    count = workers if workers is not None else 0 if scheduler else os.cpu_count() or 1
+    clips = clips_of(sources)
+    if plan:
+        there = Lake.open(into) if (into / MARK).exists() else None
+        _print_plan(console, into, make_plan(there, clips, settings), count)
+        return
+    lake = Lake.create(into)
+    with only_filler(lake):
+        begin_anew(lake, retry=retry)
+        todo = make_plan(lake, clips, settings)
+        _print_plan(console, into, todo, count)
+        result = _filled(console, lake, todo, PoolSettings(count, scheduler, memory_gb))
+    for text in _closing(result):
+        console.print(text, soft_wrap=True, markup=False)
+    raise typer.Exit(1 if result.failed else 0)
 
 
 @app.command("add")
@@ -31,12 +134,114 @@ def add(
     from visup.terminal.console import complain, echo
 
     lake, failed = Lake.create(into), 0
-    for run in runs:
+    for folder in runs:
         try:
-            key, added = add_run(lake, run)
+            key, added = add_run(lake, folder)
         except VisupError as fault:
             complain(str(fault))
             failed += 1
         else:
-            echo(f"{key}  {run}" if added else f"{key}  {run} was there already")
+            echo(f"{key}  {folder}" if added else f"{key}  {folder} was there already")
     raise typer.Exit(1 if failed else 0)
+
+
+def _filled(console: Console, lake: Lake, plan: Plan, where: PoolSettings) -> FillResult:
+    """Watch what is missing, and tell of each clip."""
+    from visup.archive.filling.filling import FillResult, fill
+    from visup.archive.filling.plan import check_settings
+    from visup.archive.filling.pool import open_pool
+
+    for failed in plan.failed:
+        _tell_failure(console, failed)
+    if not plan.jobs:
+        return FillResult(failed=list(plan.failed))
+    for warning in check_settings(plan.jobs):
+        console.print(warning, style="yellow", soft_wrap=True, markup=False)
+    try:
+        with open_pool(where) as pool, _progress(console, plan) as told:
+            if pool.dashboard:
+                console.print(f"Dashboard: {pool.dashboard}", soft_wrap=True, markup=False)
+            return fill(lake, plan, pool, told)
+    except KeyboardInterrupt:
+        console.print("Stopped. The same command goes on from here.")
+        raise typer.Exit(130) from None
+
+
+@contextmanager
+def _progress(console: Console, plan: Plan) -> Iterator[Callable[[ClipOutcome], None]]:
+    """A line for each clip, and below them on a terminal how far it has come; time is reckoned by bytes."""
+    from rich import progress
+
+    sizes = {job.run: job.bytes for job in plan.jobs}
+    bar = progress.Progress(
+        "{task.fields[clips]}",
+        progress.BarColumn(),
+        "{task.fields[speed]}",
+        progress.TimeRemainingColumn(elapsed_when_finished=True),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+    with bar:
+        task = bar.add_task("", total=plan.bytes or 1, clips="", speed="")
+        done, video_s = 0, 0.0
+
+        def tell(outcome: ClipOutcome) -> None:
+            nonlocal done, video_s
+            done, video_s = done + 1, video_s + outcome.video_s
+            _tell_outcome(console, outcome)
+            took = bar.tasks[0].elapsed or 0.0
+            speed = f"{video_s / took:.1f} s of video a second" if took > 1.0 else ""
+            bar.update(
+                task,
+                advance=sizes[outcome.run],
+                clips=f"{done} of {len(plan.jobs)} clips",
+                speed=speed,
+            )
+
+        yield tell
+
+
+def _tell_outcome(console: Console, outcome: ClipOutcome) -> None:
+    if outcome.failure:
+        _tell_failure(console, outcome.failure)
+        return
+    said = f"{outcome.source}: {outcome.verdict or 'watched'}, {outcome.video_s:.0f} s of video"
+    console.print(f"{said} in {outcome.wall_s:.0f} s", soft_wrap=True, markup=False)
+
+
+def _tell_failure(console: Console, failed: FailedClip) -> None:
+    word = "put aside" if failed.put_aside else "failed"
+    text = f"{failed.source}: {word}: {failed.reason}"
+    console.print(text, style="yellow", soft_wrap=True, markup=False)
+
+
+def _print_plan(console: Console, into: Path, plan: Plan, workers: int) -> None:
+    from visup.archive.filling.filling import estimated_s
+
+    said = [f"{len(plan.jobs)} to watch ({plan.bytes / 1e6:.0f} MB)"]
+    said += [f"{plan.present} in the lake already"] if plan.present else []
+    said += [f"{plan.same} the same as others"] if plan.same else []
+    said += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
+    seconds = estimated_s(into, plan.bytes, workers)
+    if plan.jobs and seconds is not None:
+        said.append(f"about {_duration(seconds)} on {max(1, workers)} worker(s)")
+    console.print(f"Clips: {', '.join(said)}.", soft_wrap=True, markup=False)
+
+
+def _closing(result: FillResult) -> Iterator[str]:
+    if result.added and result.work_s:
+        rate = result.video_s / result.work_s
+        yield (
+            f"{result.added} runs added, {_duration(result.video_s)} of video; "
+            f"a worker watches {rate:.2f} s of video a second."
+        )
+    if result.failed:
+        yield f"{len(result.failed)} clips have no run:"
+        yield from (f"  {f.source}: {f.reason.splitlines()[0]}" for f in result.failed)
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

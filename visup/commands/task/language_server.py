@@ -22,7 +22,7 @@ from visup.commands.task.editor_features import (
 from visup.commands.task.format import formatted_source
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic
-from visup.rules.language.typecheck import KEYWORDS as RULE_KEYWORDS
+from visup.rules.language.keywords import FUNCTIONS, KEYWORDS
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
@@ -112,10 +112,15 @@ def _rule_words() -> list[lsp.CompletionItem]:
     words |= {n: f"{', '.join(w.takes)}: {w.meaning}" for n, w in QUANTITIES.items()}
     kinds = lsp.CompletionItemKind
     found = [lsp.CompletionItem(n, kind=kinds.Function, detail=a) for n, a in words.items()]
-    return found + [lsp.CompletionItem(w, kind=kinds.Keyword) for w in sorted(RULE_KEYWORDS)]
+    for kind, entries in ((kinds.Function, FUNCTIONS), (kinds.Keyword, KEYWORDS)):
+        said = ((w, ": ".join(entries[w])) for w in sorted(entries))
+        found += [lsp.CompletionItem(w, kind=kind, detail=text) for w, text in said]
+    return found
 
 
 def _rule_meaning(document: TextDocument, word: NameUse) -> str | None:
+    if entry := KEYWORDS.get(word.name) or FUNCTIONS.get(word.name):
+        return f"`{entry[0]}`: {entry[1]}"
     known = PREDICATES.get(word.name) or QUANTITIES.get(word.name)
     return f"`{word.name}({', '.join(known.takes)})`: {known.meaning}" if known else None
 

@@ -1,0 +1,82 @@
+"""The words of the language itself: how each is written, and what it says; editors show it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+Entry = tuple[str, str]
+"""How it is written, and what it says."""
+
+_WINDOW = ("f for 2 s to 5 s ago", "f was true during all of that time; also with `within`")
+_SHARE = ("f in 60 % of 2 s", "f was true for at least 60 % of the last 2 s")
+_SAMPLES = ("f in 3 of 5 samples", "f was true at three or more of the last five samples")
+_LET = (
+    "let x be q at f: g",
+    "g, in which x is the value that q had when f was last known to be true; f may be `rising(...)`",
+)
+_REPEAT = ("b may repeat", "b may stand for the same object as another variable")
+
+_ENTRIES: dict[str, Entry] = {
+    "rule": ("rule NAME(a, b): warning", "a rule, evaluated for every choice of objects"),
+    "when": ("when f", "what must be true"),
+    "unless": ("unless f", "what suspends the rule"),
+    "hold": ("hold 3 s", "the alert stays open for this long after the rule was last true"),
+    "cooldown": ("cooldown 10 s", "for this long the same objects raise no new alert"),
+    "say": ('say "{a} {is} near {b}."', "the sentence that is reported"),
+    "and": ("f and g", "both are true"),
+    "or": ("f or g", "at least one of them is true"),
+    "not": ("not f", "f is false"),
+    "for": ("f for 2 s", "f has been true during all of the last 2 s"),
+    "within": ("f within 2 s", "f was true at some time in the last 2 s"),
+    "since": ("f since g", "g was true, and f has been true at every sample after that"),
+    "until": ("f until[5 s] g", "g will be true within 5 s, and f is true up to then"),
+    "once": ("once f", "f was true at some time so far; `once[5 s] f` in the last 5 s"),
+    "always": ("always f", "f was true at all times so far; `always[5 s] f` in the last 5 s"),
+    "eventually": ("eventually[5 s] f", "f is true at some time in the next 5 s"),
+    "henceforth": ("henceforth[5 s] f", "f is true at all times in the next 5 s"),
+    "exists": ("exists b: f", "f is true of some other object"),
+    "forall": ("forall b: f", "f is true of all other objects"),
+    "in": _SHARE,
+    "of": _SHARE,
+    "samples": _SAMPLES,
+    "leave": ("q > 5 px/s leave 3 px/s", "becomes true above 5, stays true until q is below 3"),
+    "to": _WINDOW,
+    "ago": _WINDOW,
+    "may": _REPEAT,
+    "repeat": _REPEAT,
+    "true": ("true", "always"),
+    "false": ("false", "never"),
+    "implies": ("f implies g", "f is false or g is true"),
+    "iff": ("f iff g", "both or neither is true"),
+    "xor": ("f xor g", "exactly one of them is true"),
+    "release": ("f release[5 s] g", "g stays true for 5 s, or until f becomes true"),
+    "previous": ("previous f", "f was true at the sample before"),
+    "let": _LET,
+    "be": _LET,
+    "at": _LET,
+}
+KEYWORDS: Mapping[str, Entry] = MappingProxyType(_ENTRIES)
+"""Words of the language itself, which name nothing else."""
+
+FUNCTIONS: Mapping[str, Entry] = MappingProxyType(
+    {
+        "abs": ("abs(q)", "the amount without its sign"),
+        "min": ("min(q, r)", "the least of them"),
+        "max": ("max(q, r)", "the greatest of them"),
+        "sqrt": ("sqrt(q)", "the square root"),
+        "exp": ("exp(q)", "e to the power of a number without unit"),
+        "power": ("power(q, 2)", "the power"),
+        "rate": ("rate(q, 2 s)", "the change over 2 s, per second"),
+        "before": ("before(q, 2 s)", "the value 2 s ago"),
+        "lowest": ("lowest(q, 2 s)", "the least value of the last 2 s"),
+        "highest": ("highest(q, 2 s)", "the greatest value of the last 2 s"),
+        "last": (
+            "last(q, 0.5 s)",
+            "what it was when last known, at most 0.5 s ago; also of formulas",
+        ),
+        "rising": ("rising(f)", "the sample at which f becomes true"),
+        "falling": ("falling(f)", "the sample at which f stops being true"),
+    }
+)
+"""Functions of quantities and formulas."""

@@ -1,0 +1,124 @@
+"""What rules about the future come to when a recording ends before they are decided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from visup.agent import Mind
+from visup.rules.formula.nodes import Rule
+from visup.rules.formula.truth import MAYBE
+from visup.rules.formula.units import ticks
+from visup.rules.monitoring.intervals import AtEnd
+from visup.rules.monitoring.vm import CHOICE_BITS, Floats, Ints, find_true
+from visup.rules.safety.compiled_rules import CompiledRules, compile_rules
+from visup.rules.safety.reasoner import RuleMemory, rule_memory
+from visup.rules.wording.sentences import sentence, with_names
+
+PACE = ticks(0.1)
+"""How far apart the moments are at which verdicts that are still due are looked for, microseconds."""
+MOST_MOMENTS = 20_000
+"""So many are looked at; 33 minutes."""
+DOUBTFUL = 0.4
+"""Confidence of a sentence about what may be."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenRule:
+    """A rule that counts as true of some objects though its verdict has not come.
+
+    Attributes:
+        rule: The rule.
+        objects: In the order of its variables.
+        text: Its sentence.
+        decided: Whether nothing that could still come would change it.
+    """
+
+    rule: Rule
+    objects: tuple[int, ...]
+    text: str
+    decided: bool
+
+    def __str__(self) -> str:
+        how = "true by what was seen" if self.decided else "undecided, and counts as true"
+        return f"At the end rule '{self.rule.name}' is {how}: {self.text}"
+
+
+def open_rules(mind: Mind, at_end: AtEnd | str) -> tuple[OpenRule, ...]:
+    """The rules that are true of the last moments of a recording, after which nothing is seen.
+
+    Args:
+        mind: The mind after the last step.
+        at_end: 'strong': those that are decided already. 'weak': also those that may still become true
+            and are not suspended. 'unknown': none.
+
+    Returns:
+        One for each rule and set of objects of which no alert stands; in the order of the rules.
+    """
+    memory = rule_memory(mind)
+    if at_end == "unknown" or memory.now is None or memory.after is None:
+        return ()
+    prepared = compile_rules(memory.rules, memory.early)
+    strong = dict.fromkeys(_found(prepared, memory, 0))
+    weak = {} if at_end == "strong" else dict.fromkeys(_found(prepared, memory, 1))
+    found = {**strong, **weak}
+    standing = {key for key, held in memory.held.items() if held.until == inf}
+    told: dict[tuple[str, frozenset[int]], OpenRule] = {}
+    for rule, ids in found:
+        key = (rule.name, frozenset(ids))
+        if key not in standing and key not in told:
+            decided = (rule, ids) in strong
+            words = with_names(rule.say, rule.variables)
+            text = sentence(mind, words, *ids, confidence=1.0 if decided else DOUBTFUL)
+            told[key] = OpenRule(rule, ids, text, decided)
+    return tuple(told.values())
+
+
+def _found(
+    prepared: CompiledRules, memory: RuleMemory, bound: int
+) -> Iterator[tuple[Rule, tuple[int, ...]]]:
+    """What is true of the moments of which verdicts are due.
+
+    Args:
+        prepared: The rules.
+        memory: What they remember.
+        bound: Whether the lower bounds count (0) or the upper ones (1).
+    """
+    n, delays = len(memory.ids), [places[0].delay for places in prepared.places]
+    layout, rows = prepared.layout(n), prepared.verdicts(n)[0]
+    assert memory.now is not None
+    assert memory.after is not None
+    states, found = memory.after, np.empty(max(1, prepared.verdicts(n)[1]), dtype=np.int64)
+    for k in range(1, min(max(delays) // PACE, MOST_MOMENTS) + 1):
+        now, arena = memory.now + k * PACE, _unseen(prepared, n, layout.size)
+        states = layout.step(states, now, np.full(layout.codes, MAYBE, dtype=np.int8), arena)
+        for number, (rule, delay) in enumerate(zip(prepared.rules, delays, strict=True)):
+            if now - delay > memory.now or not delay:
+                continue
+            row = _bounds(rows[number], prepared, number, n, bound)
+            for hit in found[: find_true(row, n, arena, found)].tolist():
+                ids = prepared.choice((number << CHOICE_BITS) + hit, memory.ids)[1]
+                if all(memory.since.get(i, memory.now) <= now - delay for i in ids):
+                    yield rule, ids
+
+
+def _bounds(row: Ints, prepared: CompiledRules, number: int, n: int, bound: int) -> Ints:
+    """Where one bound of `when` and of `unless` stands."""
+    shifted = row.copy().reshape(1, -1)
+    for column, place in zip((0, 2), prepared.places[number], strict=False):
+        shifted[0, column] += bound * n ** len(place.axes)
+    return shifted
+
+
+def _unseen(prepared: CompiledRules, n: int, size: int) -> Floats:
+    """All intervals before a sample in which nothing is known of any quantity."""
+    arena, begin = np.empty(size), 0
+    for look in prepared.quantities:
+        cells = n**look.axes
+        arena[begin : begin + cells] = -inf
+        arena[begin + cells : begin + 2 * cells] = inf
+        begin += 2 * cells
+    return arena

@@ -1,0 +1,114 @@
+"""A lake filled with the runs of many clips; to be stopped and begun again at any time."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.file_lock import acquire_lock
+from visup.archive.filling.attempts import forget_interrupted
+from visup.archive.filling.plan import FailedClip, Plan
+from visup.archive.filling.pool import Pool
+from visup.archive.filling.watching import WORK, ClipOutcome, Watch, watch_into
+from visup.archive.lake import MARK, Lake
+
+RATE = "rate.json"
+"""How fast clips of this lake were watched, for estimates."""
+
+
+@contextmanager
+def only_filler(lake: Lake) -> Iterator[None]:
+    """Be the only one to fill a lake.
+
+    Raises:
+        OutputError: Another process is filling it.
+    """
+    lock = acquire_lock(lake.path / MARK, "this lake")
+    try:
+        shutil.rmtree(lake.path / WORK, ignore_errors=True)  # of who was killed
+        yield
+    finally:
+        lock.release()
+
+
+@dataclass(slots=True)
+class FillResult:
+    """How filling a lake ended.
+
+    Attributes:
+        added: How many runs were added.
+        failed: Clips without a run.
+        video_s: Seconds of video that were watched.
+        work_s: Seconds that workers took for that, added up.
+    """
+
+    added: int = 0
+    failed: list[FailedClip] = field(default_factory=list)
+    video_s: float = 0.0
+    work_s: float = 0.0
+
+    def take(self, outcome: ClipOutcome) -> None:
+        """Count one clip."""
+        if outcome.failure:
+            self.failed.append(outcome.failure)
+            return
+        self.added += 1
+        self.video_s += outcome.video_s
+        self.work_s += outcome.wall_s
+
+
+def fill(
+    lake: Lake,
+    plan: Plan,
+    pool: Pool,
+    tell: Callable[[ClipOutcome], None],
+    watch: Watch = watch_into,
+) -> FillResult:
+    """Do what is planned; `only_filler` is held, and old marks are forgotten.
+
+    Args:
+        lake: Where to.
+        plan: What is missing.
+        pool: Who watches.
+        tell: Told what became of each clip.
+        watch: How a clip is watched.
+    """
+    result = FillResult(failed=list(plan.failed))
+    sizes = {job.run: job.bytes for job in plan.jobs}
+    rate = read_rate(lake.path)
+    try:
+        for outcome in pool.outcomes(lake, plan.jobs, watch):
+            result.take(outcome)
+            if not outcome.failure:
+                rate = rate[0] + sizes[outcome.run], rate[1] + outcome.wall_s
+            tell(outcome)
+    finally:
+        with suppress(OSError):  # it is only for estimates
+            known = json.dumps({"bytes": rate[0], "seconds": rate[1]})
+            write_whole(lake.path / RATE, known.encode())
+    return result
+
+
+def begin_anew(lake: Lake, *, retry: bool) -> None:
+    """Forget which clips were under way when all was stopped; with `retry` those put aside, too."""
+    forget_interrupted(lake.path, also_put_aside=retry)
+
+
+def read_rate(lake: Path) -> tuple[int, float]:
+    """Bytes that were watched so far, and the seconds that one worker took for them; (0, 0.0) before."""
+    try:
+        told = json.loads((lake / RATE).read_text(encoding="utf-8"))
+        return int(told["bytes"]), float(told["seconds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return 0, 0.0
+
+
+def estimated_s(lake: Path, bytes_left: int, workers: int) -> float | None:
+    """How long so much takes on so many workers; None before the first clip of a lake."""
+    known, seconds = read_rate(lake)
+    return bytes_left * seconds / known / max(1, workers) if known and seconds else None
