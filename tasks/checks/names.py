@@ -23,6 +23,7 @@ from visup.tasks.grammar.conditions import (
     action_of,
     bounds_of,
     facts_of,
+    is_periodic,
 )
 from visup.tasks.grammar.criteria import Extent
 from visup.tasks.grammar.nodes import (
@@ -107,10 +108,10 @@ class NameCheck:
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
-            wanted = meaning.measures if meaning else ""
+            wanted = TIME if is_periodic(comparison) else meaning.measures if meaning else ""
             for amount in bounds_of(comparison):
                 on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
-                of_signal = action_of(comparison).name in SIGNAL_WORDS
+                of_signal = wanted != TIME and action_of(comparison).name in SIGNAL_WORDS
                 # A signal has the unit of whoever tells it, or none.
                 yield amount, SIZE if on_floor else ANY if of_signal else wanted
 
@@ -175,7 +176,7 @@ class NameCheck:
 
     def compared(self) -> Iterator[Diagnostic]:
         """Quantities that are not compared, comparisons of what is none."""
-        compared = {id(action_of(c).span) for c in self.comparisons}
+        compared = {id(action_of(c).span) for c in self.comparisons if not is_periodic(c)}
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
             if meaning is None:

@@ -82,6 +82,27 @@ class Range:
         return f"{self.low} and {self.high}"
 
 
+EVERY = "every"
+"""In place of the sign of a comparison: an action that happens again and again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """`2 s to 4 s`: what stands behind `every`, from one time that something happens to the next.
+
+    Attributes:
+        least: The shortest, or None when it may happen again at any time.
+        most: The longest.
+    """
+
+    least: Amount | None
+    most: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.least} to {self.most}" if self.least else str(self.most)
+
+
 Fact: TypeAlias = Predicate | Comparison
 Condition: TypeAlias = Predicate | Comparison | Not | And | Or
 
@@ -97,9 +118,22 @@ def action_of(fact: Fact) -> Predicate | Measure:
 
 
 def bounds_of(comparison: Comparison) -> tuple[Amount, ...]:
-    """What a quantity is compared with: one amount, or the two ends of a range."""
-    right = cast("Amount | Range", comparison.right)
+    """What a quantity is compared with: one amount, or the two ends of a range; or the ends of a period."""
+    right = cast("Amount | Range | Period", comparison.right)
+    if isinstance(right, Period):
+        return (right.most,) if right.least is None else (right.least, right.most)
     return (right.low, right.high) if isinstance(right, Range) else (right,)
+
+
+def is_periodic(fact: Fact) -> bool:
+    """Whether a fact is an action that happens again and again."""
+    return isinstance(fact, Comparison) and fact.operator == EVERY
+
+
+def once(periodic: Comparison) -> Predicate:
+    """The action that happens again and again."""
+    again = action_of(periodic)
+    return Predicate(again.name, again.words, again.span)
 
 
 def actors_of(fact: Fact) -> tuple[Name, ...]:

@@ -13,7 +13,7 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span, Unit
 from visup.tasks.grammar.ast_courses import ConditionKind
-from visup.tasks.grammar.conditions import Condition, PartName, Range
+from visup.tasks.grammar.conditions import EVERY, Condition, PartName, Period, Range
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -341,6 +341,13 @@ class _TaskBuilder(Transformer[Token, Any]):
         span = quantity.span.to(items[-1].span)
         right = items[2] if len(items) == 3 else Range(items[2], items[3], _all(items[2:]))
         return Comparison(quantity, str(items[1]), cast("Term", right), span=span)
+
+    def periodic(self, items: list[Any]) -> Comparison:
+        action, _, *amounts = items
+        again = Measure(action.name, action.words, action.span)
+        span = amounts[0].span.to(amounts[-1].span)
+        period = Period(amounts[0] if len(amounts) > 1 else None, amounts[-1], span)
+        return Comparison(again, EVERY, cast("Term", period), span=action.span.to(span))
 
     def reference(self, items: list[Token]) -> Reference:
         return Reference(_bare(items[0]), _of(items[0]))
