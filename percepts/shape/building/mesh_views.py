@@ -135,14 +135,14 @@ def load_mesh(path: Path) -> Any:
         raise DatabaseError("there is no such mesh file", where=str(path), expected="a mesh file")
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
-        faces = len(mesh.faces)
+        vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     except Exception as e:  # trimesh's readers raise errors of every kind
         raise DatabaseError(
             f"this is not a mesh that can be read ({type(e).__name__}: {e})",
             where=str(path),
             expected="a mesh file such as PLY, STL, OBJ or OFF",
         ) from e
-    if not _has_size(np.asarray(mesh.vertices), np.asarray(mesh.faces)):
+    if not _has_size(vertices, faces):
         raise DatabaseError(
             "this mesh has no triangles of finite size", where=str(path), expected="a triangle mesh"
         )
