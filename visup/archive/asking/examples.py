@@ -41,7 +41,7 @@ EXAMPLES = (
         "How long does each stage take (median, and the slowest tenth)?",
         "SELECT task, stage, count(*) AS runs, median(took) AS median_s, quantile_cont(took, 0.9) AS p90_s"
         " FROM (SELECT run, task, stage, sum(seconds) AS took FROM stages"
-        " WHERE status IN ('active', 'progressing', 'stalled') GROUP BY ALL)"
+        " WHERE status IN ('active', 'progressing', 'paused', 'stalled') GROUP BY ALL)"
         " GROUP BY ALL ORDER BY task, stage",
     ),
     ExampleQuestion(
