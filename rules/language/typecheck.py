@@ -301,7 +301,8 @@ def _time(number: Number | None, word: str) -> Iterator[Fault]:
     if number is None:
         return
     if number.dimension != TIME:
-        hint = f"write `{Number(abs(number.value) or 2.0, Unit.S)}`"
+        unit = Unit.MIN if number.unit == Unit.M else Unit.S
+        hint = f"write `{Number(abs(number.value) or 2.0, unit)}`"
         yield number.span, f"'{word}' needs a time", "such as 2 s", hint
     elif number.value <= 0:
         hint = f"write `{Number(abs(number.value) or 2.0, number.unit)}`"

@@ -12,7 +12,16 @@ import numpy as np
 
 from visup.agent import HealthStatus, ObjectBelief, Presence
 from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
-from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
+from visup.rules.formula.units import (
+    ANGLE,
+    ANGULAR_SPEED,
+    LENGTH,
+    REAL_LENGTH,
+    SHARE,
+    SPEED,
+    TIME,
+    Dimension,
+)
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
@@ -94,7 +103,7 @@ class QuantityDefinition:
         if self.plain:
             return ""
         units = {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}
-        return {**units, ANGLE: "deg"}[self.dimension]
+        return {**units, ANGLE: "deg", REAL_LENGTH: "m"}[self.dimension]
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,6 +358,9 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
             _TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"
         ),
         "speed": QuantityDefinition(_ONE, SPEED, lambda f: exact(f.one("speed")), "in the image"),
+        "depth": QuantityDefinition(
+            _ONE, REAL_LENGTH, image.depth, "how far away it is, by the size of its model"
+        ),
         "depth_difference": QuantityDefinition(
             _TWO, SHARE, depth_difference, "of the smaller depth"
         ),
