@@ -55,6 +55,19 @@ def depth(facts: Snapshot) -> Floats:
     return interval_between(np.maximum(away - spread, 0.0), away + spread)
 
 
+def depth_difference(facts: Snapshot) -> Floats:
+    """Difference of depth as a share of the smaller one; both depths within their deviations."""
+    depth = facts.one("depth")
+    if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
+        return facts.unknown(2)
+    spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
+    apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
+    least = np.minimum(depth[:, None], depth[None])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(least > 0, 1.0 / least, np.nan)
+        return interval_between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
+
+
 def confidence(facts: Snapshot) -> Floats:
     """How sure the identity of each object is, 0 to 1; also of those out of sight."""
     return exact(np.array([b.confidence for b in facts.beliefs], dtype=float))

@@ -205,19 +205,6 @@ def healthy(facts: Snapshot) -> Codes:
     return np.array(code(facts.mind.health.status is HealthStatus.OK), dtype=np.int8)
 
 
-def depth_difference(facts: Snapshot) -> Floats:
-    """Difference of depth as a share of the smaller one; both depths within their deviations."""
-    depth = facts.one("depth")
-    if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
-        return facts.unknown(2)
-    spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
-    apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
-    least = np.minimum(depth[:, None], depth[None])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(least > 0, 1.0 / least, np.nan)
-        return interval_between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
-
-
 def spin(facts: Snapshot) -> Floats:
     """How fast an object turns about itself, degrees per second.
 
@@ -362,7 +349,7 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
             _ONE, REAL_LENGTH, image.depth, "how far away it is, by the size of its model"
         ),
         "depth_difference": QuantityDefinition(
-            _TWO, SHARE, depth_difference, "of the smaller depth"
+            _TWO, SHARE, image.depth_difference, "of the smaller depth"
         ),
         "spin": QuantityDefinition(_ONE, ANGULAR_SPEED, spin, "about itself"),
         "out_of_sight": QuantityDefinition(_ONE, TIME, _since("last_seen"), "since last seen"),
