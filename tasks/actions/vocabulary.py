@@ -23,10 +23,11 @@ from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.relations.zones import contains, zone_truth
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.actions.floor import floor_distance, floor_polygon, stands_in
-from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
+from visup.tasks.actions.rhythm import Rhythm
+from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of, is_periodic, once
 from visup.tasks.grammar.nodes import Action, Actors, Comparison, Conditioned, Task, walk
 from visup.tasks.grammar.statement import RESERVED_WORDS as RESERVED
-from visup.tasks.grammar.structure import fact_key
+from visup.tasks.grammar.structure import fact_key, period_of
 from visup.tasks.grammar.units import MEASURES, SIZE, dimension, value
 
 OF_TASKS = frozenset({"unexpected", "expected", "actor", "bystander", "one_machine"})
@@ -96,10 +97,12 @@ class TaskVocabulary:
     Attributes:
         meanings: Actions by name, and comparisons and actions on zones by key.
         looks: Key or word -> whether it holds; plain relations of the mind are not among them.
+        rhythms: Keys of what is to happen again and again, and of its failing to.
     """
 
     meanings: Mapping[str, ActionDefinition]
     looks: Mapping[str, FactEvaluator]
+    rhythms: Mapping[str, Rhythm]
 
 
 def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> TaskVocabulary:
@@ -111,9 +114,16 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
     """
     zones = {z.name for z in task.zones}
     meanings, looks = dict(actions), {n: _word(n) for n in PREDICATES if n not in ACTIONS}
+    rhythms: dict[str, Rhythm] = {}
     for fact in _facts(task):
         name, key = action_of(fact).name, fact_key(task, fact)[0]
         if key == name or name not in actions:
+            continue
+        if isinstance(fact, Comparison) and is_periodic(fact):
+            of = meanings[fact_key(task, once(fact))[0]]
+            found = _again(key, of, period_of(task, fact), str(fact.right))
+            meanings |= {m.name: m for m, _ in found}
+            rhythms |= {m.name: r for m, r in found}
             continue
         text = actions[name].text
         if isinstance(fact, Comparison):
@@ -142,10 +152,43 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             outside = f"outside {key}"
             looks[outside] = _outside(looks[key])
             meanings[key] = replace(meanings[key], lasts=True, contrary=(outside,))
-    return TaskVocabulary(MappingProxyType(meanings), MappingProxyType(looks))
+    return TaskVocabulary(
+        MappingProxyType(meanings), MappingProxyType(looks), MappingProxyType(rhythms)
+    )
+
+
+def _again(
+    key: str, of: ActionDefinition, period: tuple[float, float], said: str
+) -> tuple[tuple[ActionDefinition, Rhythm], tuple[ActionDefinition, Rhythm]]:
+    """An action that happens again and again, which lasts while it keeps time, and its contrary."""
+    late = f"out of time {key}"
+    expects = tuple(dict.fromkeys((of.name, *of.helps, *of.expects)))
+    again = replace(
+        of,
+        name=key,
+        holds=(key,),
+        lasts=True,
+        hold_s=2 * period[1],
+        entry=(),
+        progress=(),
+        contrary=(late,),
+        expects=expects,
+        text=f"{of.text} every {said}",
+    )
+    lost = replace(again, name=late, holds=(late,), contrary=(), text="out of time")
+    rhythm = Rhythm(key, of.holds, period)
+    return (again, rhythm), (lost, replace(rhythm, late=True))
 
 
 def _facts(task: Task) -> Iterator[Fact]:
+    """The facts of a task; of what happens again and again first what happens."""
+    for fact in _said(task):
+        if isinstance(fact, Comparison) and is_periodic(fact):
+            yield once(fact)
+        yield fact
+
+
+def _said(task: Task) -> Iterator[Fact]:
     for stage in task.stages:
         if isinstance(stage.body, Actors):
             yield Action(stage.name, stage.body.names)

@@ -18,11 +18,14 @@ from visup.tasks.actions.floor import floor_map
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.conditions import (
     Amount,
+    Condition,
     Name,
     ParameterRef,
     action_of,
     bounds_of,
+    durations_of,
     facts_of,
+    is_periodic,
 )
 from visup.tasks.grammar.criteria import Extent
 from visup.tasks.grammar.nodes import (
@@ -78,10 +81,15 @@ class NameCheck:
     @cached_property
     def comparisons(self) -> list[Comparison]:
         """Every comparison of the file."""
-        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
-        conditions = [s.condition for s in signs] + [i.condition for i in self.task.invariants]
         found = [c for c in self.courses if isinstance(c, Comparison)]
-        return found + [f for c in conditions for f in facts_of(c) if isinstance(f, Comparison)]
+        facts = (f for c in self.conditions for f in facts_of(c))
+        return found + [f for f in facts if isinstance(f, Comparison)]
+
+    @cached_property
+    def conditions(self) -> list[Condition]:
+        """Every condition of the file, of stages and of invariants."""
+        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
+        return [s.condition for s in signs] + [i.condition for i in self.task.invariants]
 
     def faults(self) -> Iterator[Diagnostic]:
         """All faults of the words."""
@@ -102,15 +110,16 @@ class NameCheck:
             if isinstance(course, Conditioned):
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
+        yield from ((d, TIME) for c in self.conditions for d in durations_of(c))
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
         criteria = (c for a in (*self.task.actors, *self.task.bystanders) for c in a.criteria)
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
-            wanted = meaning.measures if meaning else ""
+            wanted = TIME if is_periodic(comparison) else meaning.measures if meaning else ""
             for amount in bounds_of(comparison):
                 on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
-                of_signal = action_of(comparison).name in SIGNAL_WORDS
+                of_signal = wanted != TIME and action_of(comparison).name in SIGNAL_WORDS
                 # A signal has the unit of whoever tells it, or none.
                 yield amount, SIZE if on_floor else ANY if of_signal else wanted
 
@@ -175,7 +184,7 @@ class NameCheck:
 
     def compared(self) -> Iterator[Diagnostic]:
         """Quantities that are not compared, comparisons of what is none."""
-        compared = {id(action_of(c).span) for c in self.comparisons}
+        compared = {id(action_of(c).span) for c in self.comparisons if not is_periodic(c)}
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
             if meaning is None:

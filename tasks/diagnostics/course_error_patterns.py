@@ -116,12 +116,12 @@ def no_actors(text: str) -> RecognisedError | None:
 
 def clause(text: str) -> RecognisedError | None:
     """`for` or `within` without a proper duration."""
-    m = re.search(r"\b(for|within|after)\b\s*(-\s*\d\S*)", text)
+    m = re.search(r"\b(for|within|after|every)\b\s*(-\s*\d\S*)", text)
     if m is not None:
         return RecognisedError(
             "E115", m.start(2), len(m[2]), "a duration is never negative", "a number and a unit"
         )
-    m = re.search(r"\b(for|within|after)\b(?!\s*[\d-])(?!\s*\()", text)
+    m = re.search(r"\b(for|within|after|every)\b(?!\s*[\d-])(?!\s*\()", text)
     if m is not None:
         what = f"`{m[1]}` is not followed by a duration"
         return RecognisedError("E115", m.start(1), len(m[1]), what, f"such as `{m[1]} 5 s`")
@@ -131,7 +131,7 @@ def clause(text: str) -> RecognisedError | None:
         return RecognisedError(
             "E116", m.start(2), len(m[2]), what, "a unit, such as `5 px` or `3 px/s`"
         )
-    m = re.search(r"\b(for|within|after)\s+(\d+(?:\.\d+)?)(?![\d.]|[ ]*[^\W\d])", text)
+    m = re.search(r"\b(for|within|after|every)\s+(\d+(?:\.\d+)?)(?![\d.]|[ ]*[^\W\d])", text)
     if m is not None:
         what = f"`{m[0]}` has no unit"
         expected = f"`s`, `min`, `ms` or `h`, such as `{m[1]} {m[2]} s`"
@@ -155,6 +155,29 @@ def commas(text: str) -> RecognisedError | None:
         what = f"`{m[1]}` between stages"
         hint = "what comes next simply follows; at the same time is `&`"
         return RecognisedError("E119", m.start(1), 1, what, "the next stage", hint)
+    return None
+
+
+AGAIN = "such as `touching(wiper, glass) every 2 s to 4 s`"
+
+
+def periodic(text: str) -> RecognisedError | None:
+    """What happens again and again, said otherwise, or of more than one action."""
+    m = re.search(r"\b(periodic|periodically|repeating|cyclic)\b", text)
+    if m is not None:
+        what = f"`{m[1]}` is not part of the language"
+        return RecognisedError("E127", m.start(1), len(m[1]), what, AGAIN)
+    m = re.search(r"\b(every|each)\s+(?=\d)", text)
+    if m is None:
+        return None
+    if m[1] == "each":
+        return RecognisedError(
+            "E101", m.start(1), 4, "unexpected `each`", AGAIN, "did you mean `every`?"
+        )
+    before = text[: m.start()].rstrip()
+    if re.search(rf"(?<![<>=] ){NAME}[ ]*\([^()]*\)$", before) is None:
+        what = "`every` does not stand behind one action"
+        return RecognisedError("E101", m.start(1), 5, what, AGAIN)
     return None
 
 
@@ -198,6 +221,10 @@ def times(text: str) -> RecognisedError | None:
     if m is not None:
         what = f"`{m[1]}` already says that, without `{m[2]}`"
         return RecognisedError("E115", m.start(2), len(m[2]), what, f"such as `{m[1]} 5 s`")
+    m = re.search(r"\bfor\s+each\s+of\s+([01])\b", text)
+    if m is not None:
+        what, expected = f"{m[1]} is not several", "a whole number of at least 2"
+        return RecognisedError("E134", m.start(1), 1, what, expected)
     m = re.search(r"\brepeat(?:ed|s)?\b(?!\s*[(>])", text)
     if m is not None:
         what = f"`{m[0]}` is not how repetitions are written"

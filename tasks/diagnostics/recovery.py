@@ -29,7 +29,7 @@ OPENS = re.compile(  # a line that begins a statement, well written or not
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
-    r"(?:::=|[|&(,]|\b(?:for|within|after|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
+    r"(?:::=|[|&(,]|\b(?:for|within|after|every|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
 LONGEST = 4000  # characters of a statement that mistakes are looked for in
@@ -194,6 +194,7 @@ SAID = {
     "ACTOR": "`actor`",
     "UNIT": "a unit",
     "COUNT": "a whole number",
+    "SEVERAL": "a whole number of at least 2",
     "TEXT": "a text in double quotes",
     "SIGN": STAGE_CONDITIONS,
     "COMPARE": "`<` or `>`",
@@ -201,6 +202,7 @@ SAID = {
     "BYSTANDERS": "`bystanders ignored`",
     "GROUND": "`ground`",
     "BETWEEN": "`between`",
+    "EVERY": "`every`",
     "_TIMES": "`times`",
     "AT": "`at least` or `at most`",
     "ANY": "`any order`",
@@ -215,7 +217,7 @@ SAID = {
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "pauses",
-    "when", "and", "not", "another", "larger", "smaller", "than", "what",
+    "every", "when", "and", "not", "another", "larger", "smaller", "than", "what",
     "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
     "already", "each", "on", "failure", "first", "rests", "from", "part", "of", "the", "other",
 )  # fmt: skip

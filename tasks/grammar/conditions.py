@@ -13,7 +13,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
-from visup.rules.formula.nodes import And, Comparison, Not, Or, Predicate, walk
+from visup.rules.formula.nodes import (
+    ZERO,
+    And,
+    Comparison,
+    Not,
+    Or,
+    PastOperator,
+    Predicate,
+    TimeWindow,
+    walk,
+)
 from visup.rules.formula.terms import Measure
 from visup.rules.formula.units import NOWHERE, Number, Span
 
@@ -82,13 +92,60 @@ class Range:
         return f"{self.low} and {self.high}"
 
 
+EVERY = "every"
+"""In place of the sign of a comparison: an action that happens again and again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """`2 s to 4 s`: what stands behind `every`, from one time that something happens to the next.
+
+    Attributes:
+        least: The shortest, or None when it may happen again at any time.
+        most: The longest.
+    """
+
+    least: Amount | None
+    most: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.least} to {self.most}" if self.least else str(self.most)
+
+
+@dataclass(frozen=True, slots=True)
+class Lasted(PastOperator):
+    """`(touching(a, b) for 2 s)`: a condition, within one, that must have held for so long."""
+
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    @property
+    def duration(self) -> Amount:
+        """How long."""
+        assert self.window is not None
+        return cast("Amount", self.window.high)
+
+    def __str__(self) -> str:
+        return f"({self.part} for {self.duration})"
+
+
+def lasted(part: Condition, duration: Amount, span: Span = NOWHERE) -> Lasted:
+    """A condition that must have held for so long."""
+    return Lasted("always", part, TimeWindow(ZERO, cast("Number", duration)), span)
+
+
 Fact: TypeAlias = Predicate | Comparison
-Condition: TypeAlias = Predicate | Comparison | Not | And | Or
+Condition: TypeAlias = Predicate | Comparison | Not | And | Or | Lasted
 
 
 def facts_of(condition: Condition) -> Iterator[Fact]:
     """The actions and comparisons of a condition, in the order of the text."""
     return (n for n in walk(condition) if isinstance(n, Predicate | Comparison))
+
+
+def durations_of(condition: Condition) -> Iterator[Amount]:
+    """How long conditions within a condition must have held."""
+    return (n.duration for n in walk(condition) if isinstance(n, Lasted))
 
 
 def action_of(fact: Fact) -> Predicate | Measure:
@@ -97,9 +154,22 @@ def action_of(fact: Fact) -> Predicate | Measure:
 
 
 def bounds_of(comparison: Comparison) -> tuple[Amount, ...]:
-    """What a quantity is compared with: one amount, or the two ends of a range."""
-    right = cast("Amount | Range", comparison.right)
+    """What a quantity is compared with: one amount, or the two ends of a range; or the ends of a period."""
+    right = cast("Amount | Range | Period", comparison.right)
+    if isinstance(right, Period):
+        return (right.most,) if right.least is None else (right.least, right.most)
     return (right.low, right.high) if isinstance(right, Range) else (right,)
+
+
+def is_periodic(fact: Fact) -> bool:
+    """Whether a fact is an action that happens again and again."""
+    return isinstance(fact, Comparison) and fact.operator == EVERY
+
+
+def once(periodic: Comparison) -> Predicate:
+    """The action that happens again and again."""
+    again = action_of(periodic)
+    return Predicate(again.name, again.words, again.span)
 
 
 def actors_of(fact: Fact) -> tuple[Name, ...]:

@@ -8,7 +8,7 @@ from functools import wraps
 from typing import TypeVar
 
 from visup.rules.formula.nodes import SIGNAL_WORDS, Comparison
-from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
+from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of, is_periodic
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -203,9 +203,16 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     actors = tuple(str(a) for a in action.words if a not in zones)
     key = " ".join([action.name, *(a for a in action.words if a in zones)])
     if isinstance(fact, Comparison):
-        amounts = " and ".join(str(task.amount(a)) for a in bounds_of(fact))
+        between = " to " if is_periodic(fact) else " and "
+        amounts = between.join(str(task.amount(a)) for a in bounds_of(fact))
         key = f"{key} {fact.operator} {amounts}"
     return key, actors
+
+
+def period_of(task: Task, periodic: Comparison) -> tuple[float, float]:
+    """The shortest and the longest time from one beat of a periodic action to the next, seconds."""
+    ends = [value(task.amount(a)) for a in bounds_of(periodic)]
+    return (ends[0] if len(ends) > 1 else 0.0), ends[-1]
 
 
 def _names(task: Task, node: Course) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from functools import cached_property
 from visup.agent import Relation, Status
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.actions.rhythm import Rhythm
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.backpointers import behind
@@ -51,6 +52,7 @@ class MonitoredPhases:
         actions: Meanings of its actions, with those of comparisons and zones (see `task_vocabulary`).
         settings: Patience.
         looks: Whether what is no plain relation of the mind holds.
+        rhythms: What is to happen again and again.
         hmm: The probabilities of the model.
     """
 
@@ -58,6 +60,7 @@ class MonitoredPhases:
     actions: Mapping[str, ActionDefinition]
     settings: TaskSettings
     looks: Mapping[str, FactEvaluator] = field(default_factory=dict)
+    rhythms: Mapping[str, Rhythm] = field(default_factory=dict)
     hmm: StageHmm = SUPERVISION_HMM
 
     @cached_property

@@ -35,7 +35,7 @@ class TaskSnapshot:
         self.bindings = bindings
         self._actions = model.actions
         self._objects = {b.actor: b.object_id for b in bindings}
-        self._relations = RelationLookup(mind, model.looks, dict(before.lasting))
+        self._relations = RelationLookup(mind, model.looks, before, model.rhythms)
         self._conditions = ConditionEvaluator(model.task, self._holds, self._relations)
         self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
         self._judged: dict[TaskStep, ActionObservation] = {}
@@ -70,11 +70,8 @@ class TaskSnapshot:
     @property
     def kept(self) -> Kept:
         """What is to be kept of the facts for the next step."""
-        lasting = self._relations.after
-        if self.pauses.now(self._pausing) is not None:
-            # Nobody asks for what is paused: it is so after the pause since it was so before.
-            lasting = self._relations.unjudged() | lasting
-        return Kept(self.mind.time, tuple(lasting.items()), self.pauses)
+        # Nobody asks for what is paused: it is so after the pause since it was so before.
+        return self._relations.kept(self.pauses, self.pauses.now(self._pausing) is not None)
 
     def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
         key = (action, actors)

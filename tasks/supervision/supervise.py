@@ -143,7 +143,7 @@ def _model(
     task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
 ) -> MonitoredPhases:
     words = task_vocabulary(task, actions)
-    model = MonitoredPhases(task, words.meanings, settings, words.looks)
+    model = MonitoredPhases(task, words.meanings, settings, words.looks, words.rhythms)
     model.filter.success(model.filter.start())  # so that no step has to work out the whole course
     return model
 

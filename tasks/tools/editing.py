@@ -32,6 +32,7 @@ STATEMENTS = (
     "include",
     "never",
     "always",
+    "on failure of",
     "task",
 )
 WORDS = {
@@ -39,8 +40,12 @@ WORDS = {
     "within": "must be over so long after it began: `within 60 s`",
     "after": "begins so long after what comes before it is over: `after 10 s to 60 s`",
     "between": "a quantity stays within a range: `gap(arm, satellite) between 20 px and 100 px`",
+    "every": "again and again, from one time to the next so long: `touching(wiper, glass) every 2 s to 4 s`",
     "at least": "how often at least: `at least 2 times`",
     "at most": "how often at most: `at most 5 times`",
+    "any 2 of": "so many of them, one after the other: `any 2 of (<a>, <b>, <c>)`",
+    "for each": "for each of some actors, in any order: `for each leg of (leg_1, leg_2) <mount(leg)>`",
+    "already": "done also by what has been so since before its turn: `already touching(leg, top)`",
     "any order": "each once, one after the other: `any order (<a>, <b>)`",
     "begins when": "by what it begins: `begins when touching(arm, satellite)`",
     "ends when": "by what it ends",
@@ -120,7 +125,8 @@ def hover(text: str, file: str, word: NameUse) -> str | None:
             return f"`{declared}`"
     if word.kind == "name" and any(w.name == word.name for w in _actors(text)):
         return f"actor `{word.name}`: stands for the model of its own name"
-    return None
+    said = [f"`{w}`: {about}" for w, about in WORDS.items() if word.name in w.split()]
+    return "\n\n".join(said) if word.kind == "name" and said else None
 
 
 def definition(text: str, file: str, word: NameUse) -> Span | None:

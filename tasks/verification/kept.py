@@ -1,9 +1,10 @@
-"""What is kept of facts from step to step: how long they have been so, and when they paused work."""
+"""What is kept of facts from step to step: how long they are so, how often, when they paused work."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from visup.tasks.actions.rhythm import Beats
 from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 
 
@@ -14,11 +15,13 @@ class Kept:
     Attributes:
         time: Seconds of that moment, or None before the first.
         lasting: Since when what is no plain relation of the mind has been true, by key.
+        beats: Of what is to happen again and again when it did, by key.
         pauses: When work was paused.
     """
 
     time: float | None = None
     lasting: tuple[tuple[str, float], ...] = ()
+    beats: tuple[tuple[str, Beats], ...] = ()
     pauses: PauseRecord = NO_PAUSES
 
 

@@ -10,16 +10,19 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
+from visup.rules.formula.truth import truth_if
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.relations.reasoner import kinematics
 from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.actions.rhythm import Beats, Rhythm, heard
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.states import TaskStep
+from visup.tasks.verification.kept import NOTHING_KEPT, Kept
 from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
-NEVER: Mapping[str, float] = MappingProxyType({})
+NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
 
 CARRIED_SPEED = 0.005
@@ -76,22 +79,28 @@ class RelationLookup:
     Args:
         mind: The mind.
         looks: Words and keys that are not plain relations of the mind (see `task_vocabulary`).
-        before: Since when what `lasting` was told of has been true, by key.
+        before: What was kept of the moment before.
+        rhythms: What is to happen again and again, by key.
     """
 
     def __init__(
         self,
         mind: Mind,
         looks: Mapping[str, FactEvaluator] = NOTHING,
-        before: Mapping[str, float] = NEVER,
+        before: Kept = NOTHING_KEPT,
+        rhythms: Mapping[str, Rhythm] = NO_RHYTHMS,
     ) -> None:
         self._mind = mind
         self._looks = looks
-        self._before = before
+        self._rhythms = rhythms
+        self._looked_at = mind.time if before.time is None else before.time
+        self._before = dict(before.lasting)
+        self._beats_before = dict(before.beats)
+        self._beats: dict[str, tuple[Beats, Truth]] = {}
         self._looked: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._judged: set[str] = set()
-        self.after: dict[str, float] = {}
+        self._after: dict[str, float] = {}
 
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
         """The relation of that name between these objects; one of unknown truth when there is none.
@@ -101,6 +110,8 @@ class RelationLookup:
         """
         if name in self._looks:
             return self._look(name, objects)
+        if name in self._rhythms:
+            return self._in_time(self._rhythms[name], name, objects)
         found = self._found.get((name, objects))
         if found is None:
             found = self._found[name, objects] = self._given_or_derived(name, objects)
@@ -169,12 +180,37 @@ class RelationLookup:
         self._judged.add(key)
         since = self._before.get(key, self._mind.time)
         if truth is Truth.TRUE or (truth is Truth.UNKNOWN and key in self._before):
-            self.after[key] = since
+            self._after[key] = since
         return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
 
-    def unjudged(self) -> dict[str, float]:
-        """Since when what nobody asked for at this moment was true before it, by key."""
-        return {key: since for key, since in self._before.items() if key not in self._judged}
+    def kept(self, pauses: PauseRecord, carry: bool) -> Kept:
+        """What is to be kept of this moment.
+
+        Args:
+            pauses: When work was paused.
+            carry: Whether what nobody asked for is kept as it was before.
+        """
+        lasting, beats = self._after, {key: b for key, (b, _) in self._beats.items()}
+        if carry:
+            unasked = {k: s for k, s in self._before.items() if k not in self._judged}
+            lasting, beats = unasked | lasting, self._beats_before | beats
+        return Kept(self.time, tuple(lasting.items()), tuple(beats.items()), pauses)
+
+    def _in_time(self, rhythm: Rhythm, name: str, objects: tuple[int, ...]) -> Relation:
+        """Whether what is to happen again and again keeps time, or does not."""
+        key = f"{rhythm.key} {objects}"
+        if key not in self._beats:
+            held_by = self.first_true(rhythm.holds, objects)
+            known = held_by is not None or self.known(rhythm.holds, objects)
+            truth = truth_if(held_by is not None) if known else Truth.UNKNOWN
+            since = self.time if held_by is None else held_by.since
+            moment = self._looked_at, self.time
+            before = self._beats_before.get(key)
+            self._beats[key] = heard(before, truth, since, moment, rhythm.period), truth
+        beats, truth = self._beats[key]
+        told = truth_if(beats.late if rhythm.late else beats.keeps)
+        told = told if truth is not Truth.UNKNOWN else truth
+        return Relation(name, objects, told, beats.since)
 
     def first_true(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
         """The first of some relations that is true, or None."""
@@ -191,8 +227,8 @@ class RelationLookup:
         """
         for name in names:
             relation = self._mind.relation(name, *objects)
-            if name in self._looks:
-                relation = self._look(name, objects)
+            if name in self._looks or name in self._rhythms:
+                relation = self.find(name, objects)
             if relation is not None and relation.truth is Truth.TRUE:
                 return relation
         return None

@@ -99,6 +99,8 @@ def _look_up_visup(words: list[str], where: str) -> None:
     while isinstance(command, click.Group) or hasattr(command, "commands"):
         if not words or words[0].startswith("-"):
             break
+        if words[0] not in command.commands and hasattr(command, "default_command"):
+            words = [command.default_command, *words]
         assert words[0] in command.commands, where
         command, words = command.commands[words[0]], words[1:]
     options = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}

@@ -13,8 +13,8 @@ from tests.clips import moving_disc, write_clip
 from visup.agent.model.errors import SettingsError
 from visup.runs.inputs.speed import Speed
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.serving.site import ProcessLimits, SiteCamera
-from visup.serving.site_check import CameraCheck, load_lines
+from visup.serving.site.checking import CameraCheck, load_lines
+from visup.serving.site.records import ProcessLimits, SiteCamera
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ from tests.docs.blocks import blocks
 from tests.paths import ROOT
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.runs.settings import WatchSettings
-from visup.serving.site import SiteCamera
-from visup.serving.site_file import read_site
-from visup.serving.site_form import CameraTable, LimitsTable, RecordingTable, SiteTable, schema_text
+from visup.serving.site.form import CameraTable, LimitsTable, RecordingTable, SiteTable, schema_text
+from visup.serving.site.reading import read_site
+from visup.serving.site.records import SiteCamera
 
 ONE = '[[camera]]\nname = "cell"\nsource = "clip.avi"\n'
 

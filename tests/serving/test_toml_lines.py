@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.serving.toml_lines import locate, syntax_location
+from visup.serving.site.toml_lines import locate, syntax_location
 
 NAMES = st.from_regex(r"[a-z][a-z0-9_-]{0,6}", fullmatch=True)
 KEYS = st.lists(NAMES, min_size=0, max_size=4, unique=True)

@@ -8,7 +8,7 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure
 from visup.rules.traits.colours import SHADES, TERMS
 from visup.tasks.diagnostics.actor_error_patterns import RANKS
-from visup.tasks.grammar.conditions import Condition, Range
+from visup.tasks.grammar.conditions import EVERY, Condition, Period, Range, lasted
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -82,13 +82,20 @@ comparisons = st.one_of(
         Comparison, measures, st.just("between"), st.builds(Range, amounts_said, amounts_said)
     ),
 )
+periods = st.builds(Period, st.none() | amounts_said, amounts_said)
+periodic = st.builds(Comparison, measures, st.just(EVERY), periods)
 references = st.builds(Reference, names)
-facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
+facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons, periodic)
 
 
 def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]:
     several = st.lists(inner, min_size=2, max_size=3).map(tuple)
-    return st.one_of(st.builds(And, several), st.builds(Or, several), st.builds(Not, inner))
+    return st.one_of(
+        st.builds(And, several),
+        st.builds(Or, several),
+        st.builds(Not, inner),
+        st.builds(lasted, inner, amounts_said),
+    )
 
 
 conditions = st.recursive(facts, _joined, max_leaves=4)
@@ -113,7 +120,7 @@ def _larger(inner: st.SearchStrategy[Course]) -> st.SearchStrategy[Course]:
     )
 
 
-atoms: st.SearchStrategy[Course] = st.one_of(actions, references, comparisons)
+atoms: st.SearchStrategy[Course] = st.one_of(actions, references, comparisons, periodic)
 courses = st.recursive(atoms, _larger, max_leaves=8)
 texts = st.text(st.characters(exclude_characters='"\n', exclude_categories=["Cs"]), max_size=12)
 stages = st.builds(

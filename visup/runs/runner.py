@@ -123,6 +123,7 @@ def supervise(
     audience: Audience | None = None,
     options: RunOptions | None = None,
     past: InterruptedRun | None = None,
+    at_once: bool = True,
 ) -> RunResult:
     """Watch a source from start to end.
 
@@ -132,6 +133,7 @@ def supervise(
         audience: Who follows the run.
         options: How it is recorded, and where alerts go.
         past: The run to go on with; `settings` are its own.
+        at_once: Whether a stop signal ends the step that it comes in; else the step is finished first.
 
     Returns:
         How it ended. A source that breaks off is told in `problem`; all that was seen is kept.
@@ -140,11 +142,12 @@ def supervise(
         VisupError: Something given is not as it should be.
     """
     run = supervised(settings, folder, audience or Audience(), options, past)
-    with stop_signals() as stop:
+    with stop_signals(at_once=at_once) as stop:
         try:
             with suppress(KeyboardInterrupt):  # it may come between two steps
                 while not stop.received:
                     next(run)
+            stop.closing = True
             run.throw(KeyboardInterrupt())
         except StopIteration as end:
             result: RunResult = end.value
@@ -211,7 +214,7 @@ class _Run:
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
         # Before the journal: what is refused leaves no run behind.
-        self._sinks = Sinks(options.sinks, settings.source)
+        self._sinks = Sinks(options.sinks, settings.source, options.closing_s)
         stack.callback(self._sinks.close)
         self._recorder = (
             Recorder(settings, self.source, folder, options, resume=past is not None)

@@ -245,6 +245,8 @@ class RunOptions:
     video: Annotated[bool, Option("Write the annotated video.")] = True
     report: bool = True
     """Whether to write the report."""
+    closing_s: float = 5.0
+    """How long each sink may take to deliver what is left when the run ends, seconds."""
     sinks: Annotated[
         tuple[str, ...],
         Option("Also send alerts there: jsonl:-, webhook:URL, ...", "--sink", "KIND:PLACE"),

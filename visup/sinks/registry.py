@@ -11,7 +11,7 @@ from visup.agent.model.step import Observer, Step
 from visup.redaction import redacted
 from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
-from visup.sinks.outbox import MOST_WAITING, Outbox, Sink
+from visup.sinks.outbox import CLOSING_S, MOST_WAITING, Outbox, Sink
 
 MOST_STEPS = 64
 """Whole steps that may wait, with their frames: some tens of megabytes."""
@@ -45,12 +45,14 @@ class Sinks:
     Args:
         wanted: As of `--sink`.
         source: What is watched.
+        closing_s: How long each may take to deliver what is left at the end, seconds.
 
     Attributes:
         outboxes: One for each.
     """
 
-    def __init__(self, wanted: Sequence[str], source: str) -> None:
+    def __init__(self, wanted: Sequence[str], source: str, closing_s: float = CLOSING_S) -> None:
+        self._closing_s = closing_s
         made = [open_sink(w) for w in wanted]
         self.outboxes = [Outbox(s, _room(s)) for s in made]
         self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
@@ -87,7 +89,7 @@ class Sinks:
     def close(self) -> None:
         """Close all sinks; once is enough."""
         for outbox in self.outboxes:
-            outbox.close()
+            outbox.close(self._closing_s)
 
 
 def _jsonl(wanted: str, place: str) -> Sink:

@@ -148,6 +148,22 @@ def test_names_are_explained_and_lead_to_where_they_are_defined(
     assert editor.at("hover", uri, 0, 3) is None
 
 
+def test_the_words_of_the_language_are_completed_and_explained(
+    editor: Editor, tmp_path: Path
+) -> None:
+    text = """<put> ::= <grasp> <wipe> pauses when touching(arm, guard)
+<grasp> ::= already touching(arm, part)
+<wipe> ::= touching(arm, part) every 2 s to 4 s
+"""
+    uri = editor.write(tmp_path / "w.task", text)
+    assert editor.told[uri] == []
+    words = {i["label"] for i in editor.at("completion", uri, 1, 39)}
+    assert words >= {"pauses when", "fails when", "every", "already", "for each", "any 2 of"}
+    assert "no clock runs" in editor.at("hover", uri, 0, 26)["contents"]["value"]
+    assert "again and again" in editor.at("hover", uri, 2, 32)["contents"]["value"]
+    assert "before its turn" in editor.at("hover", uri, 1, 13)["contents"]["value"]
+
+
 def test_files_are_laid_out_and_names_changed_everywhere(editor: Editor, tmp_path: Path) -> None:
     uri = editor.write(tmp_path / "e.task", TEXT.replace("(arm, ", "(arm ,"))
     options = {"tabSize": 4, "insertSpaces": True}

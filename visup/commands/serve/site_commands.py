@@ -2,19 +2,78 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from visup.runs.result import ExitCode
 
 if TYPE_CHECKING:
-    from visup.serving.site_check import CameraCheck
+    from visup.serving.camera_supervisor import Tell
+    from visup.serving.site.checking import CameraCheck
 
 SiteFile = Annotated[Path, typer.Argument(metavar="SITE.toml", help="The site file.")]
 
-app = typer.Typer(no_args_is_help=True)
+RUN = "run"
+
+
+class SiteFirst(TyperGroup):
+    """Commands about sites; a word that is none of them is a site file, to be watched."""
+
+    default_command = RUN
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As of any group, with `run` before the name of a site file."""
+        named = next((word for word in args if not word.startswith("-")), None)
+        if named is not None and named not in self.commands:
+            args = [RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(no_args_is_help=True, cls=SiteFirst)
+
+
+@app.command(RUN)
+def run(
+    site_file: SiteFile,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Write what happens as JSON, one object a line.")
+    ] = False,
+) -> None:
+    """Watch all cameras of a site until it is stopped.
+
+    Each camera has a process of its own, which is begun again when it dies, hangs or takes too much memory,
+    and goes on with all that was believed. SIGTERM or Ctrl-C closes all runs within 5 s; SIGHUP reads the
+    file again, and touches only the cameras that changed. Exit code: 0 when it was stopped or every source
+    was seen to its end, 2 when the file is not as it should be or another service uses its store, 5 when a
+    process did not close in time.
+    """
+    from visup.runs.inputs.stop_signals import stop_signals
+    from visup.serving.site.reading import read_site
+    from visup.serving.site_supervisor import serve_site
+
+    site = read_site(site_file)
+    with stop_signals(at_once=False, reload=True) as stop:
+        code = serve_site(site, _teller(as_json=as_json), stop)
+    raise typer.Exit(code)
+
+
+def _teller(*, as_json: bool) -> Tell:
+    """What writes each message to standard error with the time, in UTC."""
+    from visup.terminal.console import make_console
+    from visup.wording import escaped_json
+
+    console = make_console(stderr=True, soft_wrap=True, markup=False)
+
+    def tell(camera: str, text: str) -> None:
+        now = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        record = {"time": now, "camera": camera, "text": text}
+        console.print(escaped_json(record) if as_json else f"{now} {camera}: {text}")
+
+    return tell
 
 
 @app.command()
@@ -30,8 +89,8 @@ def check(
     task are looked for among the models; and some frames are looked at. Exit code: 0 when all can be
     watched, 2 when the file is not as it should be or a camera cannot be watched.
     """
-    from visup.serving.site_check import check_camera, load_lines, store_fault
-    from visup.serving.site_file import read_site
+    from visup.serving.site.checking import check_camera, load_lines, store_fault
+    from visup.serving.site.reading import read_site
     from visup.terminal.console import complain, echo
 
     site = read_site(site_file)
@@ -53,7 +112,7 @@ def check(
 
 
 def _tell(checked: CameraCheck) -> None:
-    from visup.serving.site_check import speed_line
+    from visup.serving.site.checking import speed_line
     from visup.terminal.console import complain, echo
 
     for line in checked.lines:
@@ -67,7 +126,7 @@ def _tell(checked: CameraCheck) -> None:
 @app.command()
 def schema() -> None:
     """Print the JSON Schema of site files, by which editors complete and check them."""
-    from visup.serving.site_form import schema_text
+    from visup.serving.site.form import schema_text
     from visup.terminal.console import echo
 
     echo(schema_text())

@@ -223,7 +223,11 @@ def inlays(ls: LanguageServer, params: lsp.InlayHintParams) -> list[lsp.InlayHin
             action = known_actions().get(m[1])
             if action is None or action.measures or re.match(r"\s*(?:for|ends)\b", code[m.end() :]):
                 continue
-            said = "until the next begins" if action.lasts else f"held {action.hold_s:g} s"
+            again = re.match(r"\s*every\b(?P<more>[^|&<()]*)", code[m.end() :])
+            if again is not None and re.search(r"\b(?:for|ends)\b", again["more"]):
+                continue
+            lasts = action.lasts or again is not None
+            said = "until the next begins" if lasts else f"held {action.hold_s:g} s"
             at = document.range_to_client_units(
                 ServerTextRange(ServerTextPosition(row, m.end()), ServerTextPosition(row, m.end()))
             )

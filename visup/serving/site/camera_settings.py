@@ -14,13 +14,15 @@ from visup.percepts.video.open import URL
 from visup.redaction import redacted
 from visup.runs.inputs.signals import BROKER
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.serving.placeholders import filled
-from visup.serving.site import ProcessLimits, SiteCamera
-from visup.serving.site_form import CameraTable, SiteTable
+from visup.serving.site.form import CameraTable, SiteTable
+from visup.serving.site.placeholders import filled
+from visup.serving.site.records import ProcessLimits, SiteCamera
 from visup.tasks import shipped_tasks
 from visup.version import __version__
 
 PIECE_BYTES = 2**20
+CLOSING_S = 2.0
+"""For a sink at the end of a run, seconds: a service that is stopped closes within five."""
 
 
 def camera_of(
@@ -67,6 +69,7 @@ def camera_of(
         sinks=tuple(_sink(s, folder) for s in dict.fromkeys(sinks)),
         keep_gb=site.recording.keep_gb,
         state_every_s=site.recording.state_every,
+        closing_s=CLOSING_S,
     )
     limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
     return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))

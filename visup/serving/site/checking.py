@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from visup.agent.model.errors import VisupError
 from visup.runs.inputs.preflight import WARNING, preflight
 from visup.runs.inputs.speed import Speed, measured_speed
-from visup.serving.site import Site, SiteCamera
+from visup.serving.site.records import Site, SiteCamera
 from visup.sinks import open_sink
 
 FRAMES = 15

@@ -14,16 +14,16 @@ from pydantic import BaseModel, ValidationError
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.agent.storage.text_file import read_text_file
-from visup.serving.site import Site
-from visup.serving.site_form import (
+from visup.serving.site.camera_settings import camera_of
+from visup.serving.site.form import (
     MOST_CAMERAS,
     CameraTable,
     LimitsTable,
     RecordingTable,
     SiteTable,
 )
-from visup.serving.site_paths import camera_of
-from visup.serving.toml_lines import locate, syntax_location
+from visup.serving.site.records import Site
+from visup.serving.site.toml_lines import locate, syntax_location
 
 LONGEST_VALUE = 80
 

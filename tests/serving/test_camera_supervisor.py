@@ -1,0 +1,252 @@
+"""One camera's supervisor: whatever its process does, one is running, and never two."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.serving.fakes import Bench, begun_journal, site_camera
+from visup.serving.backoff import CALM_S, LONGEST_WAIT_S, Backoff
+from visup.serving.camera_supervisor import CLOSE_S, CameraState, CameraSupervisor
+from visup.serving.reports import ReportKind
+
+STEP, NOTICE = ReportKind.STEP, ReportKind.NOTICE
+ENDED, REFUSED = ReportKind.ENDED, ReportKind.REFUSED
+
+
+@given(st.lists(st.floats(0.0, 2 * CALM_S), min_size=1, max_size=60))
+def test_waits_grow_up_to_a_bound_and_are_short_again_after_calm(ran: list[float]) -> None:
+    backoff, last = Backoff(), 0.0
+    for ran_s in ran:
+        backoff = backoff.after(ran_s)
+        expected = 1.0 if ran_s >= CALM_S or not last else min(LONGEST_WAIT_S, 2 * last)
+        assert backoff.wait_s == expected
+        last = backoff.wait_s
+
+
+class Cell:
+    """A camera that is watched over, and the clock."""
+
+    def __init__(self, store: Path) -> None:
+        self.bench = Bench()
+        self.now = 0.0
+        self.store = store
+        self.supervisor = CameraSupervisor(site_camera(), store, self.bench.tell, self.bench.start)
+
+    def turn(self, later_s: float = 0.0) -> None:
+        self.now += later_s
+        self.supervisor.turn(self.now)
+
+    def step(self) -> None:
+        begun_journal(self.bench.last.job.folder)
+        self.bench.last.tell(STEP, steps=1)
+        self.turn()
+
+    @property
+    def state(self) -> CameraState:
+        return self.supervisor.state
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    made = Cell(tmp_path / "store")
+    made.turn()
+    return made
+
+
+def test_it_is_begun_at_once_and_watched_from_its_first_step(cell: Cell) -> None:
+    states = [cell.state]
+    assert not cell.bench.last.job.resume
+    cell.step()
+    states.append(cell.state)
+    assert states == [CameraState.STARTING, CameraState.WATCHING]
+
+
+def test_a_process_that_dies_goes_on_with_its_run(cell: Cell) -> None:
+    cell.step()
+    cell.bench.last.code = -9
+    cell.turn(5.0)
+    assert cell.state is CameraState.WAITING
+    assert "its process died (signal 9); it is begun again in 1 s" in cell.bench.lines[-1]
+    cell.turn(0.9)
+    assert len(cell.bench.children) == 1
+    cell.turn(0.2)
+    first, second = cell.bench.children
+    assert second.job.resume
+    assert second.job.folder == first.job.folder
+    assert first.closed
+
+
+@pytest.mark.parametrize(
+    ("stepped", "away", "most"), [(False, False, 30.0), (True, False, 10.0), (True, True, 30.0)]
+)
+def test_a_process_that_hangs_is_ended(cell: Cell, stepped: bool, away: bool, most: float) -> None:
+    """A camera that dropped is tried again for its patience, in which no step can be."""
+    if stepped:
+        cell.step()
+    if away:
+        cell.bench.last.tell(NOTICE, text="it delivers nothing; it is tried again.")
+        cell.turn()
+    cell.turn(most)
+    assert cell.bench.running
+    cell.turn(0.1)
+    assert not cell.bench.running
+    cell.turn()
+    assert cell.state is CameraState.WAITING
+
+
+def test_a_sign_of_life_is_enough(cell: Cell) -> None:
+    for _ in range(20):
+        cell.step()
+        cell.turn(9.0)
+    assert len(cell.bench.children) == 1
+    assert cell.bench.running
+
+
+def test_a_process_that_swells_closes_and_goes_on_smaller(cell: Cell) -> None:
+    cell.step()
+    cell.bench.last.memory = 1000.1
+    cell.turn(1.0)
+    assert cell.bench.last.asked == 1
+    cell.turn()
+    cell.turn()
+    assert len(cell.bench.children) == 2
+    assert cell.bench.last.job.resume
+    assert any("1000 MB in use, 1000 allowed" in line for line in cell.bench.lines)
+
+
+def test_a_state_that_ends_every_process_is_left(cell: Cell) -> None:
+    cell.step()
+    first = cell.bench.last.job.folder
+    resumed = []
+    for _ in range(5):
+        cell.bench.last.code = -11
+        cell.turn()
+        cell.turn(LONGEST_WAIT_S)
+        resumed.append(cell.bench.last.job.resume)
+    assert resumed == [True, True, True, False, False]
+    assert cell.bench.last.job.folder != first
+
+
+@pytest.mark.parametrize(("because_of_the_source", "goes_on"), [(True, True), (False, False)])
+def test_a_run_that_is_refused_is_left_but_not_for_a_camera_that_is_away(
+    cell: Cell, because_of_the_source: bool, goes_on: bool
+) -> None:
+    cell.step()
+    cell.bench.last.code = -9
+    cell.turn()
+    cell.turn(1.0)
+    cell.bench.last.tell(REFUSED, text="no", source=because_of_the_source)
+    cell.bench.last.code = 2
+    cell.turn()
+    cell.turn(10.0)
+    assert cell.bench.last.job.resume is goes_on
+
+
+@pytest.mark.parametrize(
+    ("live", "state"), [(False, CameraState.OVER), (True, CameraState.WAITING)]
+)
+def test_a_file_is_seen_once_and_a_camera_for_ever(
+    cell: Cell, live: bool, state: CameraState
+) -> None:
+    cell.step()
+    cell.bench.last.tell(ENDED, live=live, verdict=None, steps=7, problem=None)
+    cell.bench.last.code = 0
+    cell.turn()
+    assert cell.state is state
+    assert "verdict none after 7 frames" in cell.bench.lines[-1]
+
+
+@pytest.mark.parametrize("stubborn", [False, True])
+def test_a_stop_takes_no_longer_than_it_may(cell: Cell, stubborn: bool) -> None:
+    cell.step()
+    cell.bench.last.stubborn = stubborn
+    cell.supervisor.stop(cell.now)
+    begun = cell.now
+    while cell.state is not CameraState.OVER:
+        cell.turn(0.1)
+        assert cell.now - begun <= CLOSE_S + 0.3
+    assert cell.supervisor.killed_at_close is stubborn
+    assert cell.bench.last.asked == (2 if stubborn else 1)
+    assert cell.bench.last.closed
+
+
+def test_other_settings_are_taken_up_after_a_good_end(cell: Cell) -> None:
+    cell.step()
+    cell.supervisor.replace(site_camera(source="1", fingerprint="b"), cell.now)
+    cell.turn(0.1)
+    cell.turn(0.1)
+    first, second = cell.bench.children
+    assert (first.asked, first.closed) == (1, True)
+    assert second.job.settings.source == "1"
+    assert not second.job.resume
+
+
+def test_another_sink_is_taken_up_with_all_that_is_believed(cell: Cell) -> None:
+    cell.step()
+    cell.supervisor.replace(site_camera(source="1", fingerprint="a"), cell.now)
+    cell.turn(0.1)
+    cell.turn(0.1)
+    assert cell.bench.last.job.resume
+
+
+def test_a_store_that_cannot_be_written_is_tried_again(tmp_path: Path) -> None:
+    (tmp_path / "store").write_text("no folder")
+    cell = Cell(tmp_path / "store")
+    cell.turn()
+    assert not cell.bench.children
+    assert "it is tried again in 1 s" in cell.bench.lines[-1]
+    (tmp_path / "store").unlink()
+    cell.turn(1.0)
+    assert cell.bench.running
+
+
+ACTS = st.sampled_from(
+    ["step", "notice", "die", "end", "refuse", "swell", "replace", "wait", "long", "stubborn"]
+)
+COUNT = itertools.count()
+
+
+@settings(max_examples=30)
+@given(acts=st.lists(ACTS, max_size=30))
+def test_whatever_happens_there_is_one_process_and_it_can_be_stopped(
+    tmp_path_factory: pytest.TempPathFactory, acts: list[str]
+) -> None:
+    cell = Cell(tmp_path_factory.mktemp("store") / str(next(COUNT)))
+    for number, act in enumerate(acts):
+        cell.turn(0.5)
+        running = cell.bench.running
+        assert len(running) <= 1
+        later = {"wait": 2.0, "long": LONGEST_WAIT_S}.get(act, 0.0)
+        for child in running:
+            if act == "step":
+                cell.step()
+            elif act == "notice":
+                child.tell(NOTICE, text="it is away")
+            elif act in ("end", "refuse"):
+                child.tell(ENDED if act == "end" else REFUSED, live=True, text="no")
+                child.code = 2
+            elif act == "die":
+                child.code = -9
+            elif act == "swell":
+                child.memory = 2000.0
+            elif act == "stubborn":
+                child.stubborn = True
+        if act == "replace":
+            cell.supervisor.replace(site_camera(source=str(number)), cell.now)
+        cell.turn(later)
+    for _ in range(200):  # left alone it is watched, or begun again soon
+        cell.turn(0.5)
+        if cell.bench.running:
+            break
+    assert cell.bench.running
+    cell.supervisor.stop(cell.now)
+    for _ in range(20):
+        cell.turn(0.5)
+    assert cell.state is CameraState.OVER
+    assert not cell.bench.running
+    assert all(child.closed for child in cell.bench.children)

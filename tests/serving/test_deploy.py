@@ -1,0 +1,48 @@
+"""What `deploy/` says agrees with what the service does."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from tests.paths import ROOT
+from visup.serving.camera_supervisor import CLOSE_S
+from visup.serving.site_supervisor import TURN_S
+
+DEPLOY = ROOT / "deploy"
+
+
+def unit() -> dict[str, str]:
+    text = (DEPLOY / "visup-serve.service").read_text(encoding="utf-8")
+    pairs = re.findall(r"^(\w+)=(.*)$", text, re.MULTILINE)
+    return dict(pairs)
+
+
+def test_the_service_manager_waits_longer_than_the_service_needs() -> None:
+    told = unit()
+    assert told["Type"] == "notify"
+    assert float(told["WatchdogSec"]) > 100 * TURN_S
+    assert float(told["TimeoutStopSec"]) > CLOSE_S + 5.0
+    # The processes of cameras are the supervisor's to end.
+    assert told["KillMode"] == "mixed"
+    assert told["ExecReload"].endswith("-HUP $MAINPID")
+    assert told["ExecStart"] == "/opt/visup/bin/visup serve /etc/visup/site.toml"
+
+
+def test_what_is_kept_lies_where_the_service_may_write() -> None:
+    text = (DEPLOY / "visup-serve.service").read_text(encoding="utf-8")
+    assert "VISUP_STATE_KEY=/var/lib/visup/" in text
+    assert "StateDirectory=visup" in text
+    image = (DEPLOY / "Dockerfile").read_text(encoding="utf-8")
+    (volume,) = re.findall(r"^VOLUME (\S+)$", image, re.MULTILINE)
+    kept = re.findall(r"(?:VISUP_STATE_KEY|NUMBA_CACHE_DIR)=(\S+)", image)
+    assert len(kept) == 2
+    assert all(Path(volume) in Path(path).parents for path in kept)
+
+
+def test_the_image_installs_extras_that_there_are() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    image = (DEPLOY / "Dockerfile").read_text(encoding="utf-8")
+    (extras,) = re.findall(r"pip install .*'\.\[([\w,]+)\]'", image)
+    assert set(extras.split(",")) <= set(project["optional-dependencies"])

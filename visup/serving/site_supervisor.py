@@ -1,0 +1,176 @@
+"""All cameras of a site: each with a supervisor of its own; the site file can change under them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from visup.agent.model.errors import OutputError, VisupError
+from visup.agent.storage.file_lock import acquire_lock
+from visup.runs.inputs.stop_signals import StopRequest
+from visup.runs.result import ExitCode
+from visup.serving.camera_child import CameraChild
+from visup.serving.camera_supervisor import CameraState, CameraSupervisor, Child, Tell
+from visup.serving.reports import CameraJob
+from visup.serving.service_manager import notify_manager
+from visup.serving.site.reading import read_site
+from visup.serving.site.records import Site
+
+TURN_S = 0.1
+"""Seconds between two looks at all cameras."""
+
+SITE = "site"
+"""What messages that are about no camera are about."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceClock:
+    """By what a service goes; arguments for tests.
+
+    Attributes:
+        now: Seconds from any start.
+        wait: Waits so many seconds.
+    """
+
+    now: Callable[[], float] = time.monotonic
+    wait: Callable[[float], None] = time.sleep
+
+
+class SiteSupervisor:
+    """The supervisors of all cameras.
+
+    Args:
+        site: What is watched.
+        tell: Told what happens.
+        start: Begins a process.
+
+    Attributes:
+        cameras: By name; those that are watched no more are gone once their processes have ended.
+    """
+
+    def __init__(
+        self, site: Site, tell: Tell, start: Callable[[CameraJob], Child] = CameraChild
+    ) -> None:
+        self._site, self._tell, self._start = site, tell, start
+        self.cameras = {c.name: self._supervisor(c.name, site) for c in site.cameras}
+        self._left: list[CameraSupervisor] = []
+        self._killed_at_close = False
+
+    def turn(self, now: float) -> None:
+        """See to every camera once."""
+        for one in (*self.cameras.values(), *self._left):
+            one.turn(now)
+        self._killed_at_close |= any(one.killed_at_close for one in self._left)
+        self._left = [one for one in self._left if one.state is not CameraState.OVER]
+
+    def reload(self, site: Site, now: float) -> None:
+        """Watch what a changed site file says; cameras that did not change are not touched.
+
+        A camera whose name was given to other settings ends in good order and begins with these.
+        """
+        if site.store != self._site.store:
+            self._tell(SITE, "another store is used once the service is begun anew")
+        wanted = {c.name: c for c in site.cameras}
+        for name in [n for n in self.cameras if n not in wanted]:
+            gone = self.cameras.pop(name)
+            gone.stop(now)
+            self._left.append(gone)
+        for name, camera in wanted.items():
+            if name not in self.cameras:
+                self.cameras[name] = self._supervisor(name, site)
+            elif self.cameras[name].camera != camera:
+                self.cameras[name].replace(camera, now)
+        self._site = site
+
+    def stop(self, now: float) -> None:
+        """Watch nothing any more."""
+        for one in self.cameras.values():
+            one.stop(now)
+
+    @property
+    def over(self) -> bool:
+        """Whether no process is left, and none will be begun."""
+        every = (*self.cameras.values(), *self._left)
+        return all(one.state is CameraState.OVER for one in every)
+
+    @property
+    def closed_well(self) -> bool:
+        """Whether no process had to be killed when it was asked to end."""
+        return not (self._killed_at_close or any(o.killed_at_close for o in self.cameras.values()))
+
+    def _supervisor(self, name: str, site: Site) -> CameraSupervisor:
+        (camera,) = (c for c in site.cameras if c.name == name)
+        store = self._site.store  # one store for the whole life of a service
+        return CameraSupervisor(camera, store, self._tell, self._start)
+
+
+def serve_site(
+    site: Site,
+    tell: Tell,
+    stop: StopRequest,
+    start: Callable[[CameraJob], Child] = CameraChild,
+    clock: ServiceClock | None = None,
+) -> ExitCode:
+    """Watch a site until a stop is asked for, or every source was seen to its end.
+
+    Args:
+        site: What is watched.
+        tell: Told what happens.
+        stop: What signals ask for; a reload reads the site file again.
+        start: Begins a process.
+        clock: By what it goes.
+
+    Returns:
+        `GOOD`, or `NOT_RECORDED` when a process had to be killed as it did not close in time.
+
+    Raises:
+        OutputError: The store cannot be written, or another service uses it.
+    """
+    clock = clock or ServiceClock()
+    with _only_service(site.store):
+        supervisor = SiteSupervisor(site, tell, start)
+        supervisor.turn(clock.now())
+        notify_manager("READY=1")
+        stopping = False
+        while not supervisor.over:
+            if stop.received and not stopping:
+                stopping = True
+                notify_manager("STOPPING=1")
+                supervisor.stop(clock.now())
+            if stop.reload and not stopping:
+                stop.reload = False
+                _reload(supervisor, site.path, tell, clock.now())
+            supervisor.turn(clock.now())
+            notify_manager("WATCHDOG=1")
+            clock.wait(TURN_S)
+    return ExitCode.GOOD if supervisor.closed_well else ExitCode.NOT_RECORDED
+
+
+def _reload(supervisor: SiteSupervisor, path: Path, tell: Tell, now: float) -> None:
+    try:
+        site = read_site(path)
+    except VisupError as fault:
+        tell(SITE, f"the file has mistakes, so that all stays as it was: {fault}")
+        return
+    tell(SITE, "the file was read again")
+    supervisor.reload(site, now)
+
+
+@contextmanager
+def _only_service(store: Path) -> Iterator[None]:
+    try:
+        store.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise OutputError(
+            f"the store cannot be written: {fault.strerror}",
+            where=str(store),
+            hint="choose a folder that you may write to: store = ...",
+        ) from fault
+    lock = acquire_lock(store / "visup-serve", "the runs of this store")
+    try:
+        yield
+    finally:
+        lock.release()
