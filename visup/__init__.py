@@ -98,7 +98,7 @@ _HOMES = {
 
 
 def _check_room(module: str) -> None:
-    """A process without memory for the libraries is told so before they are loaded."""
+    """Say so, before the libraries are loaded, when there is too little memory for them."""
     if module not in _LIGHT:
         from visup.agent.memory_limit import check_memory
 

@@ -123,7 +123,7 @@ class Mind:
         return any(c.objects == (min(a, b), max(a, b)) for c in self.couplings)
 
     def one_machine(self, a: int, b: int) -> bool:
-        """Whether two objects are parts of one machine, as a task tells its parts."""
+        """Whether two objects are parts of one machine, as a task declares its parts."""
         return any(a in parts and b in parts for task in self.tasks for parts in task.machines)
 
     def relation(self, name: str, *objects: int) -> Relation | None:

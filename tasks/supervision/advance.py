@@ -12,10 +12,11 @@ from visup.tasks.automaton.backpointers import behind, extended
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
-from visup.tasks.supervision.sentences import last_held, outcome
-from visup.tasks.verification.observe import TRENDS, ActionObservation
+from visup.tasks.supervision.sentences import lasted, outcome
+from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
+from visup.tasks.verification.told import Told, joined, with_told
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
 
@@ -244,18 +245,18 @@ class Advance:
         same = any(leaf.step.same_as(x.step) for x in left)
         begun = (x.payload.begun for x in left)
         turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
-        told = max(
-            (self._trend_until(x, transition) for x in left if _between_same(x, leaf)),
-            default=-math.inf,
-        )
-        return replace(leaf, payload=replace(leaf.payload, turn=turn, told_from=told))
+        told = joined(self._told(x, transition) for x in left)
+        return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told))
 
-    def _trend_until(self, left: Leaf[StepMonitor], transition: OpenTransition) -> float:
-        """Until when two are told to have drawn nearer or apart, last: outlines may have touched before."""
-        if left.step.action not in TRENDS:
-            return left.payload.told_from
-        meaning = self.steps.actions[left.step.action]
-        return last_held(meaning, left.payload, self.now, self._followed(transition))
+    def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> Told:
+        """What has been told once a step is left: of it, and of what came before it."""
+        step, monitor = left.step, left.payload
+        if self._ending(left, followed := self._followed(transition)).status is not Status.DONE:
+            return monitor.told
+        meaning, denied = self.steps.actions[step.action], self._denied(step)
+        _, until = lasted(step, meaning, monitor, self.now, followed, denied)
+        until = self.now if until is None else until
+        return with_told(monitor.told, step.actors, meaning.name, until)
 
     def _after(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
         """A step that begins, with when what comes before it was over; its delay counts from then."""
@@ -301,14 +302,14 @@ class Advance:
     def _ending(self, leaf: Leaf[StepMonitor], followed: Sequence[float]) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
         meaning = self.steps.actions[leaf.step.action]
-        contrary = self.observe(leaf.step).contrary
-        denied = None if contrary is None else contrary.since
+        denied = self._denied(leaf.step)
         status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed, denied)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
-
-def _between_same(a: Leaf[StepMonitor], b: Leaf[StepMonitor]) -> bool:
-    return frozenset(a.step.actors) == frozenset(b.step.actors)
+    def _denied(self, step: TaskStep) -> float | None:
+        """Since when something is seen that says that a step's action does not hold, or None."""
+        contrary = self.observe(step).contrary
+        return None if contrary is None else contrary.since
 
 
 def _may_end(transition: OpenTransition) -> bool:

@@ -30,7 +30,7 @@ from visup.tasks.supervision.hypotheses import (
     under_way,
 )
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.supervision.sentences import evidence, outcome, paused_by
+from visup.tasks.supervision.sentences import evidence, in_retrospect, outcome, paused_by
 from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.task_inference import TaskActivity
 from visup.tasks.verification.pauses import Pause
@@ -196,7 +196,8 @@ def _stage_belief(
     leaf = under_way(hypothesis).get(stage)
     if leaf is None or (past is not None and past.status is Status.FAILED):
         assert past is not None
-        return past
+        done = past.status is Status.DONE and past.since < now
+        return replace(past, evidence=in_retrospect(past.evidence, past.since)) if done else past
     monitor, meaning = leaf.payload, model.actions[leaf.step.action]
     if hypothesis.finished is not None:
         _, why = outcome(leaf.step, meaning, monitor, hypothesis.finished)

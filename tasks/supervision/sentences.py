@@ -11,9 +11,12 @@ from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Action
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import fact_key
-from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.pauses import Pause
 from visup.tasks.verification.step_monitor import StepMonitor
+from visup.tasks.verification.told import since_told
+
+SHORT_S = 0.6
+"""What lasted less long than this is told with its beginning, seconds."""
 
 
 def names(words: Sequence[str]) -> str:
@@ -45,8 +48,10 @@ def evidence(
             return _late(step, monitor)
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
             what = _say(monitor.contrary, actions)
+            known = monitor.entered if monitor.contrary_since is None else monitor.contrary_since
+            since = since_told(monitor.told, step.actors, monitor.contrary, known)
             return (
-                f"{who} {have} been {what} since {monitor.contrary_since:.1f} s; "
+                f"{who} {have} been {what} since {since:.1f} s; "
                 f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.FAILING | Status.FAILED if monitor.fault is not None:
@@ -56,9 +61,9 @@ def evidence(
                 f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.PROGRESSING if monitor.helped_since is not None:
-            what, since = _say(monitor.helped_by or "", actions), max(0.0, monitor.helped_since)
-            if monitor.helped_by not in TRENDS:
-                since = max(since, monitor.told_from)
+            by = monitor.helped_by or ""
+            what, known = _say(by, actions), max(0.0, monitor.helped_since)
+            since = since_told(monitor.told, step.actors, by, known)
             return f"{who} {have} been {what} since {since:.1f} s"
         case Status.STALLED if monitor.helped_at is not None:
             return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
@@ -119,12 +124,60 @@ def _held(
 ) -> str:
     """From or until when a step that is done was what it should be."""
     was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
-    if not meaning.lasts and monitor.held_s > 0.0:
-        since = max(0.0, now - monitor.held_s, monitor.helped_since or 0.0, monitor.told_from)
-        if denied is not None and denied > since:
-            return f"{was} {meaning.text} until {denied:.1f} s"
+    since, until = lasted(step, meaning, monitor, now, followed, denied)
+    if until is None:
         return f"{have} been {meaning.text} since {since:.1f} s"
-    return f"{was} {meaning.text} until {last_held(meaning, monitor, now, followed):.1f} s"
+    begun = since <= _first_known(monitor)
+    if begun and until - since >= SHORT_S:
+        return f"{was} {meaning.text} until {until:.1f} s"
+    if until - since < 0.05:
+        return f"{was} {meaning.text} at {until:.1f} s"
+    return f"{was} {meaning.text} from {since:.1f} s to {until:.1f} s"
+
+
+def in_retrospect(why: str, at: float) -> str:
+    """What was going on when a stage was left, said later: whether it still is, is another matter.
+
+    >>> in_retrospect("the arm and the part have been coupled since 3.9 s", 4.9)
+    'at 4.9 s the arm and the part had been coupled since 3.9 s'
+    """
+    for have in (" have been ", " has been "):
+        who, found, what = why.partition(have)
+        if found and " since " in what:
+            return f"at {at:.1f} s {who} had been {what}"
+    return why
+
+
+def lasted(
+    step: TaskStep,
+    meaning: ActionDefinition,
+    monitor: StepMonitor,
+    now: float,
+    followed: Sequence[float] = (),
+    denied: float | None = None,
+) -> tuple[float, float | None]:
+    """Since when and until when a step that is done is told to have been what it should be, seconds.
+
+    The arguments are those of `outcome`.
+
+    Returns:
+        Since when, and until when: None where it still is.
+    """
+    latest = monitor.helped_since or 0.0
+    if meaning.lasts or monitor.held_s == 0.0:
+        since, until = _first_known(monitor), last_held(meaning, monitor, now, followed)
+        told = since_told(monitor.told, step.actors, meaning.name, since)
+        # Where something else was told in between it began anew.
+        return (since if told == since else max(told, latest)), until
+    known = max(0.0, now - monitor.held_s, latest)
+    since = since_told(monitor.told, step.actors, meaning.name, known)
+    return since, denied if denied is not None and denied > since else None
+
+
+def _first_known(monitor: StepMonitor) -> float:
+    """When a step was first what it should be: since before that was noticed, which `begun` tells."""
+    known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
+    return min(known, default=-math.inf)
 
 
 def last_held(
@@ -141,9 +194,7 @@ def last_held(
     over = now if monitor.helped_at is None else monitor.helped_at
     if not meaning.lasts and monitor.broken_since is not None:
         over = monitor.broken_since
-    # It was so since before that was noticed, which `begun` tells.
-    known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
-    start = min(known, default=-math.inf)
+    start = _first_known(monitor)
     if monitor.status is Status.PROGRESSING:
         start = max(start, monitor.since)  # it was told to go on then
     return min((over, *(since for since in followed if since > start)))

@@ -2,7 +2,8 @@
 
 Read in this order: `observe.py` (what is seen of an action now), `stage_conditions.py` (what the task
 itself says of the beginning, end, progress and failure of a step), `step_monitor.py` (the status of a
-step over time), `step_model.py` (how well what is seen fits it), `settings.py` (how patient all this is).
+step over time), `told.py` (what was told of the actors, and until when), `step_model.py` (how well what is
+seen fits it), `settings.py` (how patient all this is).
 """
 
 from visup.tasks.verification.observe import ActionObservation, observe

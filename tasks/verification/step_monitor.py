@@ -14,6 +14,7 @@ from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import RunningDeadline, TaskStep
 from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
+from visup.tasks.verification.told import Told, with_told
 
 BAD = (Status.FAILING, Status.FAILED)
 
@@ -70,7 +71,7 @@ class StepMonitor:
         after: When what comes before it was over; of what the task begins with, when that was.
         hasty_s: How long after that it began, where its course asks for a longer delay; else None.
         fulfilled_at: When it was first fulfilled, or None.
-        told_from: Since when it is told to be so at the earliest: until then what excludes it was told.
+        told: What was told of it and of what came before it: what excludes that is told to begin no sooner.
     """
 
     entered: float
@@ -103,7 +104,7 @@ class StepMonitor:
     after: float = -math.inf
     hasty_s: float | None = None
     fulfilled_at: float | None = None
-    told_from: float = -math.inf
+    told: Told = ()
 
     @property
     def begun_anew(self) -> bool:
@@ -154,6 +155,7 @@ def update(
     status = _status(noted, seen, now, settings, worked)
     if status is noted.status:
         return noted
+    noted = _note_told(noted, step, status, now)
     if status is not Status.FAILING:
         return replace(noted, status=status, since=now)
     # What had been reached is lost; the step fails since the contrary began, not since it was sure.
@@ -167,6 +169,13 @@ def update(
         fulfilled=False,
         held_s=0.0,
     )
+
+
+def _note_told(monitor: StepMonitor, step: TaskStep, status: Status, now: float) -> StepMonitor:
+    """A change of status is told, with the relation by which it came."""
+    by = monitor.helped_by if status is Status.PROGRESSING else None
+    by = monitor.contrary if status in BAD else by
+    return replace(monitor, told=with_told(monitor.told, step.actors, by, now)) if by else monitor
 
 
 def _note_lateness(

@@ -10,19 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Severity
+from visup.agent import Event, Frame, Mind, ObjectBelief, Observation, Presence, Severity
 from visup.agent.model.object_beliefs import Candidate
 from visup.agent.model.step import Step
 from visup.story import Detail, Narrative, summary_lines
 from visup.story.life_sentences import course, lives_sentence
 from visup.story.line_budget import LineBudget
-from visup.story.lives import ObjectLife
+from visup.story.lives import LifeLog, ObjectLife
 from visup.story.places import Box
 from visup.testing import region_of
 from visup.wording import worded_once
 
 SIZE = (320, 240)
 FPS = 10
+BLUE, RED = (200, 40, 20), (20, 20, 200)
 
 
 def belief(number: int, x: float, y: float, now: float, **changes: object) -> ObjectBelief:
@@ -33,6 +34,18 @@ def belief(number: int, x: float, y: float, now: float, **changes: object) -> Ob
     region = region_of(full, number, at=(min(left, SIZE[0] - 1), min(top, SIZE[1] - 1)), size=SIZE)
     made = ObjectBelief(number, region, Presence.SEEN, now, now, confirmed=True)
     return replace(made, **changes)  # type: ignore[arg-type]  # fields as the test names them
+
+
+def grown(small: ObjectBelief, side: int) -> ObjectBelief:
+    """The same object, larger."""
+    full = np.ones((side, side), dtype=bool)
+    return replace(small, region=region_of(full, small.id, at=(30, 30), size=SIZE))
+
+
+def painted(now: float, colour: tuple[int, int, int]) -> Frame:
+    """A frame of one colour."""
+    image = np.full((*SIZE[::-1], 3), colour, np.uint8)
+    return Frame(round(now * FPS), now, image)
 
 
 def step(now: float, *objects: ObjectBelief, events: Sequence[Event] = ()) -> Step:
@@ -168,6 +181,26 @@ def test_who_comes_twice_is_named_once() -> None:
     assert lives_sentence(lives[:2]) == (
         "Object 17 came in from the left and was last seen there, 3.0 s."
     )
+
+
+@pytest.mark.parametrize(
+    ("later", "colours"),
+    [(BLUE, ["blue", "blue"]), (RED, ["blue", None]), (None, ["blue", "blue"])],
+)
+def test_who_comes_back_is_not_told_of_with_another_colour(
+    later: tuple[int, int, int] | None, colours: list[str | None]
+) -> None:
+    """An id may pass from one thing to another; nobody is blue in one line and red in the next."""
+    log, lives = LifeLog(), list[ObjectLife]()
+    for t in times(14):
+        side, colour = (20, BLUE) if t < 7 else (60, later)
+        where = belief(3, 30, 30, t) if side == 20 else grown(belief(3, 30, 30, t), side)
+        away = replace(where, last_seen=0.0, presence=Presence.LEFT)
+        seen = where if t < 2 or t > 12 else away
+        log_frame = None if colour is None else painted(t, colour)
+        lives += log.add(step(t, seen), log_frame)
+    lives += log.finish()
+    assert [life.colour for life in lives] == colours
 
 
 def test_specks_and_glimpses_are_only_counted() -> None:

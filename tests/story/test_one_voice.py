@@ -81,6 +81,26 @@ BROKEN = [
         times_that_are_told_exclude_each_other_rightly,
         Told([line("Stage `a` goes well: the arm has been moving since 7.0 s.", 5.0)], []),
     ),
+    (
+        times_that_are_told_exclude_each_other_rightly,
+        Told(
+            [
+                line("Stage `a` is complete: the arm and the part were touching from 3.0 s to 3.4 s.", 4.0),
+                line("Stage `b` has begun: the arm and the part have been converging since 3.2 s.", 4.0),
+            ],
+            [],
+        ),
+    ),
+    (
+        times_that_are_told_exclude_each_other_rightly,
+        Told(
+            [
+                line("Done: at 8.3 s the arm and the part had been coupled since 3.8 s.", 8.5),
+                line("Begun: the arm and the part have been diverging since 8.1 s.", 8.5),
+            ],
+            [],
+        ),
+    ),
     (nothing_is_told_twice_at_once, Told([line("It is so.", 5.0), line("It is so.", 5.5)], [])),
     (
         what_is_done_is_not_failing,

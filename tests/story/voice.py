@@ -22,6 +22,8 @@ MENTION = re.compile(
 """Id, how it is called so, and what."""
 SPAN = re.compile(r"(?:^|: )(the .+?) (?:has|have) been ([a-z ]+?) since ([\d.]+) s")
 ENDED = re.compile(r"(?:^|: )(the .+?) (?:was|were) ([a-z ]+?) until ([\d.]+) s")
+BOTH_ENDS = re.compile(r"(?:^|: )(the .+?) (?:was|were) ([a-z ]+?) from ([\d.]+) s to ([\d.]+) s")
+AT_AN_END = re.compile(r"(?:^|: )at ([\d.]+) s (the .+?) had been ([a-z ]+?) since ([\d.]+) s")
 EXCLUDING = (
     frozenset({"converging", "diverging"}),
     frozenset({"converging", "touching"}),
@@ -73,6 +75,10 @@ def times_that_are_told_exclude_each_other_rightly(told: Told) -> Iterator[str]:
             told_since = [s[2] for s in spans if s[:2] == (who, what) and s[2] < float(until)]
             begin = min(float(until) - 0.5, max(told_since, default=math.inf))
             spans.append((who, what, begin, float(until), line.text))
+        for until, who, what, since in AT_AN_END.findall(line.text):
+            spans.append((who, what, float(since), float(until), line.text))
+        for who, what, since, until in BOTH_ENDS.findall(line.text):
+            spans.append((who, what, float(since), float(until), line.text))
     for n, (who, what, since, until, text) in enumerate(spans):
         if since > until + TOLERANCE_S:
             yield f"{who} {what}: since {since} s, told at {until:.2f} s: {text}"

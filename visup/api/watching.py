@@ -141,8 +141,8 @@ class Run(Iterator[Step]):
     def narrate(self) -> Iterator[Event]:
         """Watch what is left of the source, and yield what is worth telling as it comes.
 
-        It is what `visup watch` prints: what has one cause is told once, objects that nobody knows by a
-        line a life. `events` has all that happened.
+        These are the lines that `visup watch` prints: events with one cause are one line, and an
+        unidentified object has one line for its life. `events` has all that happened.
         """
         narrative = Narrative()
         for step in self:

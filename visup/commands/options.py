@@ -97,7 +97,8 @@ def number_parser(kind: type[int] | type[float], at_least: float | None) -> Call
         try:
             value = kind(text)
         except ValueError:
-            raise typer.BadParameter(f"'{text}' is not {wanted}; expected {expected}") from None
+            more = "" if expected == wanted else f"; expected {expected}"
+            raise typer.BadParameter(f"'{text}' is not {wanted}{more}") from None
         if at_least is not None and not value >= at_least:
             raise typer.BadParameter(f"{text} is too small; expected {expected}")
         return value

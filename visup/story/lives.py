@@ -148,6 +148,7 @@ class LifeLog:
     longest: ObjectLife | None = None
     _ids: set[int] = field(default_factory=set)
     _looked: dict[int, tuple[float, str | None]] = field(default_factory=dict)
+    _told: dict[int, str | None] = field(default_factory=dict)
     _origins: dict[int, Origin] = field(default_factory=dict)
     _begun: float | None = None
     _now: float = 0.0
@@ -186,6 +187,7 @@ class LifeLog:
         self._meet(seen, mind, lasted)
         over = list(self._over(mind))
         self._looked = {i: x for i, x in self._looked.items() if i in mind.objects}
+        self._told = {i: x for i, x in self._told.items() if i in mind.objects}
         return over
 
     def finish(self) -> list[ObjectLife]:
@@ -228,7 +230,9 @@ class LifeLog:
         life.name = individual_name(mind, belief.id)
         life.kind = spoken_name(mind, belief.id) if life.name is None else None
         life.area = max(life.area, belief.region.area)
-        life.colour = self._looked.get(belief.id, (0.0, None))[1]
+        colour = self._looked.get(belief.id, (0.0, None))[1]
+        # Who was told of with one colour is not told of with another one.
+        life.colour = colour if self._told.get(belief.id, colour) == colour else None
 
     def _meet(self, seen: Sequence[ObjectBelief], mind: Mind, lasted: float) -> None:
         """Who is near whom."""
@@ -261,6 +265,7 @@ class LifeLog:
 
     def _close(self, life: ObjectLife) -> None:
         del self.alive[life.id]
+        self._told.setdefault(life.id, life.colour)
         self._ids.add(life.id)
         if self.longest is None or life.seconds > self.longest.seconds:
             self.longest = life

@@ -135,18 +135,26 @@ def load_mesh(path: Path) -> Any:
         raise DatabaseError("there is no such mesh file", where=str(path), expected="a mesh file")
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
-        faces = len(mesh.faces)
+        vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     except Exception as e:  # trimesh's readers raise errors of every kind
         raise DatabaseError(
             f"this is not a mesh that can be read ({type(e).__name__}: {e})",
             where=str(path),
             expected="a mesh file such as PLY, STL, OBJ or OFF",
         ) from e
-    if faces == 0 or not np.isfinite(mesh.vertices).all() or float(np.ptp(mesh.vertices)) == 0.0:
+    if not _has_size(vertices, faces):
         raise DatabaseError(
             "this mesh has no triangles of finite size", where=str(path), expected="a triangle mesh"
         )
     return mesh
+
+
+def _has_size(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> bool:
+    """Whether there are triangles, between vertices that there are, at finite places that differ."""
+    if faces.size == 0 or vertices.size == 0 or not np.isfinite(vertices).all():
+        return False
+    there = faces.min() >= 0 and faces.max() < len(vertices)
+    return bool(there and np.ptp(vertices) > 0.0)
 
 
 def render_views(

@@ -198,6 +198,25 @@ def test_a_bad_mesh_is_refused(tmp_path: Path, content: bytes | None) -> None:
     assert not (tmp_path / "x.db").exists()
 
 
+@pytest.mark.parametrize(
+    ("places", "corners"),
+    [(0, "0 1 2"), (3, "0 1 7"), (3, "0 1 -1")],
+    ids=["none", "beyond", "below"],
+)
+def test_triangles_between_vertices_that_there_are_not_are_refused(
+    tmp_path: Path, places: int, corners: str
+) -> None:
+    """The loops that cast rays believe the numbers of vertices that they are given."""
+    head = ["ply", "format ascii 1.0", f"element vertex {places}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += ["element face 1", "property list uchar int vertex_indices", "end_header"]
+    rows = ["0 0 0", "1 0 0", "0 1 0"][:places]
+    mesh = tmp_path / "a.ply"
+    mesh.write_text("\n".join([*head, *rows, f"3 {corners}", ""]))
+    with pytest.raises(DatabaseError, match="no triangles of finite size"):
+        load_mesh(mesh)
+
+
 def test_folders_without_pictures_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DatabaseError, match="no silhouette pictures"):
         read_silhouettes(tmp_path)
