@@ -4,7 +4,3 @@ Read `schema.py` (what the tables hold), `run_tables.py` (from a journal to rows
 disk, a run at a time, whole or not at all), `identity.py` (what tells runs apart) and `filling/` (many clips
 on many workers). Needs the extra `visup[cluster]`; nothing of it is imported before it is used.
 """
-
-from visup.archive.lake import Lake
-
-__all__ = ["Lake"]

@@ -32,6 +32,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
         },
         "Ask many runs": {
             "archive": "watch many clips; a lake with the tables of their runs",
+            "query": "ask a lake in SQL",
         },
         "Extend and measure": {
             "behaviours": "list, check and create plug-ins",
