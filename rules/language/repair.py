@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import inf
 
 from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
@@ -48,7 +49,14 @@ WORDS_OF_PAIRS = (
     "overlapping",
 )
 _CALL = r"\w+\([^()]*\)"
-_AMOUNT = r"-?[\d.]+ ?(?:px/s2|px/s|px|%|ms|min|s|h|deg/s|deg|/s)?"
+_AMOUNT = r"-?[\d.]+ ?(?:px/s2|px/s|px|%|ms|min|mm|m/s|m|cm|s|h|deg/s|deg|/s)?"
+
+
+def _some_of(least: int, parts: list[str]) -> str:
+    """That some of several are true, as the language says it."""
+    return f"({' or '.join(' and '.join(some) for some in combinations(parts, least))})"
+
+
 _WORD = re.compile(r"[A-Za-z_]\w*")
 SLIPS = (
     _slip(r"<->|<=>|↔|⇔", "iff"),
@@ -63,9 +71,11 @@ SLIPS = (
     _slip(r"(?<![=<>!])=(?![=>])", "=="),
     _slip(r"\b(?:seconds?|secs?|sec)\b", "s"),
     _slip(r"\b(?:milliseconds?|msecs?)\b", "ms"),
-    _slip(r"\b(?:minutes?|mins|m)\b", "min"),
+    _slip(r"\b(?:minutes?|mins)\b", "min"),
     _slip(r"\b(?:hours?|hrs?)\b", "h"),
-    _slip(r"\b(?:pixels?|pix|met(?:er|re)s?|cm|mm)\b", "px"),
+    _slip(r"\bmet(?:er|re)s?\b", "m"),
+    _slip(r"\b(?:centimet(?:er|re)s?)\b", "cm"),
+    _slip(r"\b(?:pixels?|pix|met(?:er|re)s?)\b", "px"),
     _slip(r"\b(?:degrees?|°)\b", "deg"),
     _slip(r"\bpercent\b", "%"),
     _slip(rf"({_CALL})\s*(?:===?|=|\bis)\s*true\b", r"\1"),
@@ -73,6 +83,18 @@ SLIPS = (
     _slip(rf"({_CALL})\s*(?:===?|=|\bis)\s*false\b", r"not \1"),
     _slip(rf"({_CALL})\s*(?:!==?|<>|\bis\s+not)\s*false\b", r"\1"),
     _slip(r"\b(north|south)[ ]+(east|west)_of\b", r"\1_\2_of"),
+    _slip(rf"\bnever\s+({_CALL})", r"not \1"),
+    _slip(rf"({_CALL})\s+never\b", r"not \1"),
+    _slip(rf"({_CALL})\s+(?:for\s+)?(?:more|longer)\s+than\s+(\d[\d.]*\s*(?:ms|s|min|h))\b", r"\1 for \2"),
+    _slip(r"\bat\s+the\s+same\s+time\s+as\b", "and"),
+    _slip(rf"\b(eventually|henceforth)\s+({_CALL})\s*(\[[^\]\n]*\])", r"\1\3 \2"),
+    _slip(r"\b(in\s+\d+)\s*/\s*(\d+\s+samples)\b", r"\1 of \2"),
+    _slip(r"\b(exists|forall)\s+(\w+)\s+in\s+\w+\s*:", r"\1 \2:"),
+    _slip(rf"\b(let\s+\w+\s+be\s[^:\n]*?\sat\s+{_CALL})\s+(?:and|or)\s+(?![^\n]*:)", r"\1: "),
+    _slip(
+        rf"\b(?:any|some|at\s+least)\s+([2-3])\s+of\s*\(({_CALL}(?:\s*,\s*{_CALL}){{1,3}})\)",
+        lambda m: _some_of(int(m[1]), re.findall(_CALL, m[2])),
+    ),
     _slip(
         r"\bthere\s+(?:is|are|exists?)\s+(?:an?\s+|some\s+|one\s+)?(\w+)\s*(?::|with|such that|so that)",
         r"exists \1:",

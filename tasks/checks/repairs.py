@@ -93,6 +93,9 @@ USUAL = (
     _usual("E101", r"\b(any)\s+(one|two|three)\s+(?=of)", lambda m: f"any {NUMBERS[m[2]]} "),
     _usual("E101", r"(between\s+[\d.]+\s*\S*?)\s*(?:,|to|-|\.\.)\s*([\d.]+)", r"\1 and \2"),
     _usual("E101", r"\bon\s+(?:failure|error)\s+(?!of)", "on failure of "),
+    _usual("E101 E103 E219", r"\bon\s+(?:fail(?:ing|s|ed)?|errors?)\s+of\b", "on failure of"),
+    _usual("E219", rf"\b({NAME})\s+({NAME})\s+(?:with|and|to)\s+({NAME})\b", r"\1(\2, \3)"),
+    _usual("E103", r"\b(?:each|all)\s+of\s*(?=\()", ""),
     _usual("E101", r"\b(on\s+failure\s+of\s+<[^>]*>)\s*(?!:)", r"\1: "),
     _usual("E101", rf"\b(?:exists|forall|some|all)\s+{NAME}\s*:\s*", ""),
     _usual("E101", r"\b(?:rising|falling|once|previous)\s*\((.*)\)", r"\1"),
@@ -151,6 +154,14 @@ USUAL = (
     _usual("E134", r"\b(at\s+(?:least|most)\s+\d+)\b(?!\s*times?)", r"\1 times"),
     _usual("E134", r"\btwice\b", "at least 2 times at most 2 times"),
     _usual("E134", r"\b(?:thrice|three times)\b", "at least 3 times at most 3 times"),
+    _usual(
+        "E134",
+        rf"\brepeat\s+(\d+)\s*(?:times|x)?\s*(?:of\s+)?({CALL}|<[^>]*>)",
+        r"\2 at least \1 times at most \1 times",
+    ),
+    _usual(
+        "E134", r"\brepeat(?:ed)?\s+(\d+)(?:\s*(?:times|x))?", r"at least \1 times at most \1 times"
+    ),
     _usual("E134", rf"\brepeat(?:edly)?\s+({CALL}|<[^>]*>)", r"\1+"),
     _usual("E134", r"\b(\d+)\s*(?:times|x)\b", r"at least \1 times at most \1 times"),
     _usual("E135", r"\bin\s+(?=any\s+order)", ""),
