@@ -8,6 +8,7 @@ from pathlib import Path
 from visup.agent import AlertCondition, Frame, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
+from visup.agent.storage.wall_clock import RecordStamp
 from visup.redaction import redacted
 from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
@@ -46,17 +47,24 @@ class Sinks:
         wanted: As of `--sink`.
         source: What is watched.
         closing_s: How long each may take to deliver what is left at the end, seconds.
+        stamp: What else stands in every record of an alert.
 
     Attributes:
         outboxes: One for each.
     """
 
-    def __init__(self, wanted: Sequence[str], source: str, closing_s: float = CLOSING_S) -> None:
+    def __init__(
+        self,
+        wanted: Sequence[str],
+        source: str,
+        closing_s: float = CLOSING_S,
+        stamp: RecordStamp | None = None,
+    ) -> None:
         self._closing_s = closing_s
         made = [open_sink(w) for w in wanted]
         self.outboxes = [Outbox(s, _room(s)) for s in made]
         self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
-        self._alerts = AlertSender(self._of_alerts, source)
+        self._alerts = AlertSender(self._of_alerts, source, stamp)
         self._observers: list[Observer] = [
             _sender(o, _OF_STEPS[_kind(o)]) for o in self.outboxes if _kind(o) in _OF_STEPS
         ]

@@ -69,6 +69,7 @@ def camera_of(
         sinks=tuple(_sink(s, folder) for s in dict.fromkeys(sinks)),
         keep_gb=site.recording.keep_gb,
         state_every_s=site.recording.state_every,
+        camera=one.name,
         closing_s=CLOSING_S,
     )
     limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
