@@ -96,11 +96,16 @@ class _EventCollector:
 
 
 def settings_for(recording: Recording, **changed: Any) -> WatchSettings:
-    """The settings of a recorded run with some of them changed; None and () change nothing.
+    """The settings of a recorded run with some of them changed; see `changed_settings`."""
+    settings = recorded_settings(recording.facts(), str(recording.path))
+    return changed_settings(settings, **changed)
+
+
+def changed_settings(settings: WatchSettings, **changed: Any) -> WatchSettings:
+    """Settings with some of them changed; None and () change nothing.
 
     Where tasks are changed and actors are not, bindings of actors that the new tasks lack are dropped.
     """
-    settings = recorded_settings(recording.facts(), str(recording.path))
     wanted = {k: v for k, v in changed.items() if v}
     if "tasks" in wanted and "actors" not in wanted:
         tasks = [t for name in wanted["tasks"] for t in load_tasks(name)]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from visup.archive.filling.pool_settings import PoolSettings
-from visup.commands.options import Given, SettingsFile, takes
+from visup.commands.options import REPLAYED, Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import Option, WatchSettings
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from visup.archive.filling.plan import FailedClip, Plan
     from visup.archive.filling.watching import ClipOutcome
     from visup.archive.lake import Lake
+    from visup.archive.replaying import RunChanges
 
 Into = Annotated[
     Path, typer.Option("--into", metavar="LAKE", help="The lake; made when it is not there.")
@@ -132,6 +133,40 @@ def add(
         else:
             echo(f"{key}  {folder}" if added else f"{key}  {folder} was there already")
     raise typer.Exit(1 if failed else 0)
+
+
+@app.command("replay")
+@takes(WatchSettings, only=REPLAYED)
+def replay(
+    setting: Given,
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+) -> None:
+    """Reason again about all runs of a lake, with other rules, tasks or actors, and say what changes.
+
+    Exit code: 0 when nothing changes, 1 when something does, 2 on bad input.
+    """
+    from visup.archive.lake import Lake
+    from visup.archive.replaying import ChangeSummary, changes
+    from visup.terminal.console import make_console
+
+    console, summary, found = make_console(), ChangeSummary(), Lake.open(lake)
+    for one in changes(found, found.runs(), **setting):
+        summary.take(one)
+        if one.diff:
+            console.print(_changed(one), soft_wrap=True, markup=False)
+    for text in summary.lines():
+        console.print(text, soft_wrap=True, markup=False)
+    raise typer.Exit(1 if summary.changed else 0)
+
+
+def _changed(one: RunChanges) -> str:
+    """What changes of a run, in a line."""
+    lost, gained = one.alerts
+    said = [f"{kind}: {lost.get(kind, 0)} lost, {gained.get(kind, 0)} gained"
+            for kind in sorted({*lost, *gained})]  # fmt: skip
+    before, after = one.diff.verdicts
+    said += [f"verdict {before or 'none'} -> {after or 'none'}"] if before != after else []
+    return f"{one.clip}: {'; '.join(said) or 'other events'} ({one.folder})"
 
 
 def _filled(console: Console, lake: Lake, plan: Plan, where: PoolSettings) -> FillResult:
