@@ -242,7 +242,8 @@ class _FormulaChecker:
         table = words if fact else quantities
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
-            hint = did_you_mean(call.name, table)
+            meant = SYNONYMS.get(call.name, "")
+            hint = did_you_mean(meant if meant in table else call.name, table)
             if call.name in (quantities if fact else words):
                 hint = "compare it with a number" if fact else "it is true or false"
             yield call.span, f"there is no {kind} '{call.name}'", _listed(table), hint
@@ -292,6 +293,15 @@ class _FormulaChecker:
             yield call.span, what, None, hint or "rename the variable"
 
 
+SYNONYMS = {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
+SYNONYMS |= {"visible": "seen", "present": "seen", "gone": "lost", "contact": "touching"}
+SYNONYMS |= {
+    "near": "close_to",
+    "close": "close_to",
+    "far": "far_from",
+    "approaching": "converging",
+}
+"""Words of other tools and of everyday speech -> the word that is meant."""
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
 EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
 
