@@ -38,8 +38,11 @@ class RunChanges:
 
     @property
     def alerts(self) -> tuple[Mapping[str, int], Mapping[str, int]]:
-        """How many alerts of each kind are lost, and gained."""
-        return _alerts(self.diff.gone), _alerts(self.diff.new)
+        """How many alerts of each kind are lost, and gained; another number makes no other alert."""
+        gone, new = _alerts(self.diff.gone), _alerts(self.diff.new)
+        return Counter(k for k, *_ in (gone - new).elements()), Counter(
+            k for k, *_ in (new - gone).elements()
+        )
 
 
 @dataclass(slots=True)
@@ -101,5 +104,10 @@ def changes(lake: Lake, runs: Iterable[str], **changed: Any) -> Iterator[RunChan
         yield RunChanges(run, settings.source, lake.folder_of(run), diff)
 
 
-def _alerts(events: Iterable[Mapping[str, Any]]) -> Mapping[str, int]:
-    return Counter(str(e["data"].get("alert_kind")) for e in events if e.get("kind") == ALERT)
+def _alerts(events: Iterable[Mapping[str, Any]]) -> Counter[tuple[str, float, str]]:
+    """Alerts by kind, time and sentence."""
+    return Counter(
+        (str(e["data"].get("alert_kind")), float(e["time"]), str(e["text"]))
+        for e in events
+        if e.get("kind") == ALERT
+    )

@@ -37,6 +37,11 @@ from visup.rules.relations.reasoner import COLUMNS
 HELD_S = SAMPLE_HOLD / TICKS + 0.1
 """By how much intervals are widened: a sample speaks for so much of what follows; and for rounding."""
 EVER = 1e12
+HELD = (
+    'held AS MATERIALIZED (SELECT run, relation, a, b, "begin", "end" FROM lake.relations'
+    " WHERE truth = 'true' AND relation IN ({names}))"
+)
+"""Relations that held, those that a formula names: many small files are so read once."""
 SYMMETRIC = frozenset(
     name for column in COLUMNS.each if column.rows[0] == column.rows[1] for name in column.names
 ) | {"coupled"}
@@ -48,24 +53,28 @@ class PossibleTimes:
     """Intervals in which something may be true, as a SELECT.
 
     Attributes:
-        sql: Gives `run`, the variables, `low` and `high` (seconds).
+        sql: Gives `run`, the variables, `low` and `high` (seconds), from the rows of `HELD`.
         variables: Of which objects.
+        relations: Which relations it is about.
     """
 
     sql: str
     variables: tuple[str, ...]
+    relations: tuple[str, ...]
 
     def moved(self, low: float, high: float) -> PossibleTimes:
         """The times from `low` to `high` seconds after these."""
         names = "".join(f"{_name(v)}, " for v in self.variables)
         sql = f"SELECT run, {names}low + {low!r} AS low, high + {high!r} AS high FROM ({self.sql})"
-        return PossibleTimes(sql, self.variables)
+        return PossibleTimes(sql, self.variables, self.relations)
 
     def of(self, variables: Sequence[str]) -> PossibleTimes:
         """The same of fewer variables, whoever stands for the others."""
         kept = tuple(v for v in self.variables if v in variables)
         names = "".join(f"{_name(v)}, " for v in kept)
-        return PossibleTimes(f"SELECT DISTINCT run, {names}low, high FROM ({self.sql})", kept)
+        return PossibleTimes(
+            f"SELECT DISTINCT run, {names}low, high FROM ({self.sql})", kept, self.relations
+        )
 
     def meant(self, variable: str, who: str) -> PossibleTimes:
         """The same where only some objects may stand for a variable.
@@ -78,7 +87,9 @@ class PossibleTimes:
             return self
         same = f"w.run = t.run AND w.object = t.{_name(variable)}"
         return PossibleTimes(
-            f"SELECT t.* FROM ({self.sql}) t SEMI JOIN ({who}) w ON {same}", self.variables
+            f"SELECT t.* FROM ({self.sql}) t SEMI JOIN ({who}) w ON {same}",
+            self.variables,
+            self.relations,
         )
 
 
@@ -138,14 +149,14 @@ def _relation(name: str, a: str, b: str) -> PossibleTimes:
     low, high = f'"begin" - {HELD_S!r}', f'"end" + {HELD_S!r}'
     if name == "coupled":  # judged of what is hidden, too, which the recorded relation leaves open
         low, high = repr(-EVER), repr(EVER)
-    rows = f"FROM lake.relations WHERE relation = {quoted(name)} AND truth = 'true'"
+    rows = f"FROM held WHERE relation = {quoted(name)}"
     sql = f"SELECT run, a AS {_name(a)}, b AS {_name(b)}, {low} AS low, {high} AS high {rows}"
     if name in SYMMETRIC:
         turned = (
             f"SELECT run, b AS {_name(a)}, a AS {_name(b)}, {low} AS low, {high} AS high {rows}"
         )
         sql = f"{sql} UNION ALL {turned}"
-    return PossibleTimes(sql, (a, b))
+    return PossibleTimes(sql, (a, b), (name,))
 
 
 def _both(one: PossibleTimes, other: PossibleTimes) -> PossibleTimes:
@@ -159,7 +170,7 @@ def _both(one: PossibleTimes, other: PossibleTimes) -> PossibleTimes:
         f" FROM ({one.sql}) l JOIN ({other.sql}) r"
         f" ON l.run = r.run{same} AND l.low <= r.high AND r.low <= l.high"
     )
-    return PossibleTimes(sql, (*one.variables, *more))
+    return PossibleTimes(sql, (*one.variables, *more), (*one.relations, *other.relations))
 
 
 def _either(parts: Sequence[PossibleTimes | None]) -> PossibleTimes | None:
@@ -169,7 +180,8 @@ def _either(parts: Sequence[PossibleTimes | None]) -> PossibleTimes | None:
     shared = [v for v in known[0].variables if all(v in p.variables for p in known)]
     names = "".join(f"{_name(v)}, " for v in shared)
     each = (f"SELECT run, {names}low, high FROM ({p.sql})" for p in known)
-    return PossibleTimes(" UNION ALL ".join(each), tuple(shared))
+    relations = tuple(r for p in known for r in p.relations)
+    return PossibleTimes(" UNION ALL ".join(each), tuple(shared), relations)
 
 
 def _name(variable: str) -> str:

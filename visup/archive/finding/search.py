@@ -17,7 +17,7 @@ from visup.archive.asking.database import LakeDatabase, QueryError
 from visup.archive.asking.views import quoted
 from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import read_pattern
-from visup.archive.finding.possible import PossibleTimes, possible_times
+from visup.archive.finding.possible import HELD, PossibleTimes, possible_times
 from visup.archive.lake import Lake
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import load_rules
@@ -181,14 +181,18 @@ def runs_of(
         times: When it may be; None for always.
         who: Variable -> SELECT of `run` and `object`.
     """
-    for variable, select in who.items():
-        times = times and times.meant(variable, select)
+    named = {v: f'"who_{v}"' for v in who}
+    parts = [f"{named[v]} AS MATERIALIZED ({select})" for v, select in who.items()]
+    if times:
+        parts.append(HELD.format(names=", ".join(map(quoted, times.relations))))
+    for variable, table in named.items():
+        times = times and times.meant(variable, f"FROM {table}")
     sql = f"SELECT run FROM ({times.sql if times else 'SELECT run FROM lake.runs'})"
-    for select in who.values():
-        sql = f"SELECT run FROM ({sql}) SEMI JOIN ({select}) USING (run)"
-    found: list[str] = database.ask(f"SELECT DISTINCT run FROM ({sql}) ORDER BY run")[
-        "run"
-    ].to_pylist()
+    for table in named.values():
+        sql = f"SELECT run FROM ({sql}) SEMI JOIN {table} USING (run)"
+    first = f"WITH {', '.join(parts)} " if parts else ""
+    answer = database.ask(f"{first}SELECT DISTINCT run FROM ({sql}) ORDER BY run")
+    found: list[str] = answer["run"].to_pylist()
     return found
 
 
