@@ -11,6 +11,8 @@ import typer
 from visup.agent.memory_limit import check_memory
 from visup.agent.model.errors import VisupError
 from visup.commands.archives.archive import app as archive_app
+from visup.commands.archives.find import find
+from visup.commands.archives.query import query
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.check import check
 from visup.commands.debug import app as debug_app
@@ -55,6 +57,8 @@ app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)
 app.command("export")(export)
+app.command("query")(query)
+app.command("find")(find)
 app.command("render")(render)
 app.command("doctor")(doctor)
 app.add_typer(serve_app, name="serve", help="Many cameras under one supervisor.")

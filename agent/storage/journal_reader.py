@@ -19,6 +19,7 @@ from visup.agent.storage.atomic import replacing
 from visup.agent.storage.codec import LARGEST_STEP_BYTES, unpack_observation
 from visup.agent.storage.journal import check_version, is_empty, segments
 from visup.agent.storage.text_file import check_room
+from visup.agent.storage.wall_clock import RecordStamp, WallClock
 
 JOURNAL = "journal.sqlite"
 _LARGEST_ROW = LARGEST_STEP_BYTES
@@ -107,6 +108,13 @@ class Recording:
                 raise _damaged(where, "its check sum is wrong")
             yield checked(unpack_observation(seen, where), where)
 
+    def stamp(self) -> RecordStamp:
+        """What is known of a record besides what it tells: camera, host, time by the clock of the wall."""
+        facts = self.facts()
+        stamp = RecordStamp(clock=WallClock.read(facts.get("clock")))
+        stamp.named = {key: str(facts[key]) for key in ("camera", "host") if key in facts}
+        return stamp
+
     def first_and_last(self) -> tuple[int, int] | None:
         """Numbers of the first and last frame whose steps are kept, or None when there are none."""
         rows = self._rows("SELECT min(frame_index), max(frame_index) FROM steps")
@@ -183,17 +191,24 @@ def is_run(place: str | Path) -> bool:
 
 
 def export_events(journal: Path, target: Path) -> None:
-    """Write `events.jsonl` from a journal: one event a line.
+    """Write `events.jsonl` from a journal: one event a line, with camera, host and time where they are known.
 
     Raises:
         OutputError: `target` cannot be written, or `journal` cannot be read.
     """
     try:
         with replacing(target) as draft, draft.open("w", encoding="utf-8") as out:
-            for event in Recording.open(journal).events():
-                out.write(event_text(event) + "\n")
+            recording = Recording.open(journal)
+            stamp = recording.stamp()
+            for event in recording.events():
+                out.write(event_text({**event, **stamp.of(_time_of(event))}) + "\n")
     except OSError as fault:
         raise OutputError(f"cannot write: {fault.strerror}", where=str(target)) from fault
+
+
+def _time_of(event: Mapping[str, Any]) -> float:
+    time = event.get("time")
+    return float(time) if isinstance(time, int | float) and math.isfinite(time) else 0.0
 
 
 def event_text(event: Mapping[str, Any]) -> str:

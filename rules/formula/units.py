@@ -41,33 +41,31 @@ class Dimension:
         length: Power of pixels.
         time: Power of seconds.
         angle: Power of degrees.
+        metres: Power of metres; what is measured in the scene is no length in the image.
     """
 
     length: int = 0
     time: int = 0
     angle: int = 0
+    metres: int = 0
 
     def __mul__(self, other: Dimension) -> Dimension:
         """The dimension of a product."""
-        return Dimension(
-            self.length + other.length, self.time + other.time, self.angle + other.angle
-        )
+        return Dimension(*(p + q for p, q in zip(self.powers, other.powers, strict=True)))
 
     def __truediv__(self, other: Dimension) -> Dimension:
         """The dimension of a quotient."""
-        return Dimension(
-            self.length - other.length, self.time - other.time, self.angle - other.angle
-        )
+        return Dimension(*(p - q for p, q in zip(self.powers, other.powers, strict=True)))
 
     @property
-    def powers(self) -> tuple[int, int, int]:
-        """Of length, time and angle."""
-        return self.length, self.time, self.angle
+    def powers(self) -> tuple[int, int, int, int]:
+        """Of length, time, angle and metres."""
+        return self.length, self.time, self.angle, self.metres
 
     def __str__(self) -> str:
         return DIMENSION_NAMES.get(self) or " ".join(
             f"{unit}^{power}"
-            for unit, power in (("px", self.length), ("s", self.time), ("deg", self.angle))
+            for unit, power in zip(("px", "s", "deg", "m"), self.powers, strict=True)
             if power
         )
 
@@ -80,6 +78,8 @@ SPEED = LENGTH / TIME
 ANGULAR_SPEED = ANGLE / TIME
 ACCELERATION = SPEED / TIME
 RATE_OF_CHANGE = SHARE / TIME
+REAL_LENGTH = Dimension(metres=1)
+REAL_SPEED = REAL_LENGTH / TIME
 
 DIMENSION_NAMES = {
     SHARE: "share",
@@ -90,6 +90,8 @@ DIMENSION_NAMES = {
     ANGULAR_SPEED: "rate of turn",
     ACCELERATION: "acceleration",
     RATE_OF_CHANGE: "rate of change",
+    REAL_LENGTH: "real length",
+    REAL_SPEED: "real speed",
 }
 """Dimensions that have a name, for messages and docs."""
 
@@ -109,6 +111,10 @@ class Unit(StrEnum):
     DEG = "deg"
     DEG_S = "deg/s"
     PER_S = "/s"
+    M = "m"
+    CM = "cm"
+    MM = "mm"
+    M_S = "m/s"
 
 
 UNITS: dict[str, tuple[Dimension, float]] = {
@@ -124,6 +130,10 @@ UNITS: dict[str, tuple[Dimension, float]] = {
     Unit.DEG: (ANGLE, 1.0),
     Unit.DEG_S: (ANGULAR_SPEED, 1.0),
     Unit.PER_S: (RATE_OF_CHANGE, 1.0),
+    Unit.MM: (REAL_LENGTH, 0.001),
+    Unit.CM: (REAL_LENGTH, 0.01),
+    Unit.M: (REAL_LENGTH, 1.0),
+    Unit.M_S: (REAL_SPEED, 1.0),
 }
 """Unit -> what it measures, and how many of the base unit it is."""
 

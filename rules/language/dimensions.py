@@ -53,7 +53,7 @@ def example_amount(node: Comparison, vocabulary: Vocabulary) -> str:
     """A number of what is compared, such as '20 px'."""
     kinds = (_measured(side, vocabulary, []) for side in (node.left, node.right))
     kind = next((k for k in kinds if k is not None), SHARE)
-    return f"20 {next((u for u, (d, _) in UNITS.items() if d == kind), '')}".rstrip()
+    return f"20 {_base_unit(kind) or ''}".rstrip()
 
 
 def check_value(term: Term, vocabulary: Vocabulary) -> Iterator[Fault]:
@@ -187,9 +187,14 @@ def _named(dimension: Dimension) -> str:
     return f"{article} {'number' if dimension == SHARE else dimension}"
 
 
+def _base_unit(wanted: Dimension) -> str | None:
+    """The unit of a dimension in which numbers are kept, or None."""
+    return next((str(u) for u, (d, by) in UNITS.items() if d == wanted and by == 1.0), None)
+
+
 def _with_unit(node: Comparison, wanted: Dimension) -> str | None:
     """The comparison with a unit of what is measured, where a plain number is compared."""
-    unit = next((str(u) for u, (d, _) in UNITS.items() if d == wanted), None)
+    unit = _base_unit(wanted)
     if unit is None:
         return None
     sides = [

@@ -36,7 +36,7 @@ _WANTED = {
     "SEVERITY": "info, warning or critical",
     "NAME": "a name",
     "NUMBER": "a number",
-    "UNIT": "a unit (ms, s, min, h, px, px/s, px/s2, %, deg, deg/s, /s)",
+    "UNIT": "a unit (ms, s, min, h, px, px/s, px/s2, %, deg, deg/s, /s, m, cm, mm, m/s)",
     "STRING": "a sentence in double quotes on one line",
     "OPERATOR": "<, <=, >, >=, == or !=",
     "LSQB": "'['",

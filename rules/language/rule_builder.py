@@ -37,8 +37,8 @@ from visup.rules.formula.nodes import (
     Since,
     TimeWindow,
     Until,
-    bound,
 )
+from visup.rules.formula.rebuilding import bound
 from visup.rules.formula.terms import (
     Arithmetic,
     Measure,

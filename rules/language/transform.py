@@ -29,9 +29,9 @@ from visup.rules.formula.nodes import (
     Since,
     TimeWindow,
     Until,
-    bound,
 )
 from visup.rules.formula.nodes import Predicate as Fact
+from visup.rules.formula.rebuilding import bound
 from visup.rules.formula.terms import (
     OVER_WINDOW,
     POINTWISE,

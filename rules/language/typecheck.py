@@ -26,7 +26,7 @@ from visup.rules.formula.nodes import (
     children,
     walk,
 )
-from visup.rules.formula.terms import Measure, Variable, WindowFunction
+from visup.rules.formula.terms import Arithmetic, Measure, Variable, WindowFunction
 from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
 from visup.rules.language.diagnostics import Diagnostic, Source
@@ -143,6 +143,11 @@ class _FormulaChecker:
                 return
             case Variable():
                 yield from self.variable(node)
+            case Arithmetic(operator="/", left=left, right=Variable(name=Unit.S) as unit):
+                what = "'s' is a unit, and stands right behind its number"
+                yield unit.span, what, "such as 3 px/s", "write `px/s` in place of `px / s`"
+                yield from self.node(left)
+                return
             case Comparison():
                 yield from check_dimensions(node, self.vocabulary)
                 self.amount = example_amount(node, self.vocabulary)
@@ -237,7 +242,8 @@ class _FormulaChecker:
         table = words if fact else quantities
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
-            hint = did_you_mean(call.name, table)
+            meant = SYNONYMS.get(call.name, "")
+            hint = did_you_mean(meant if meant in table else call.name, table)
             if call.name in (quantities if fact else words):
                 hint = "compare it with a number" if fact else "it is true or false"
             yield call.span, f"there is no {kind} '{call.name}'", _listed(table), hint
@@ -287,6 +293,15 @@ class _FormulaChecker:
             yield call.span, what, None, hint or "rename the variable"
 
 
+SYNONYMS = {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
+SYNONYMS |= {"visible": "seen", "present": "seen", "gone": "lost", "contact": "touching"}
+SYNONYMS |= {
+    "near": "close_to",
+    "close": "close_to",
+    "far": "far_from",
+    "approaching": "converging",
+}
+"""Words of other tools and of everyday speech -> the word that is meant."""
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
 EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
 
@@ -301,7 +316,8 @@ def _time(number: Number | None, word: str) -> Iterator[Fault]:
     if number is None:
         return
     if number.dimension != TIME:
-        hint = f"write `{Number(abs(number.value) or 2.0, Unit.S)}`"
+        unit = Unit.MIN if number.unit == Unit.M else Unit.S
+        hint = f"write `{Number(abs(number.value) or 2.0, unit)}`"
         yield number.span, f"'{word}' needs a time", "such as 2 s", hint
     elif number.value <= 0:
         hint = f"write `{Number(abs(number.value) or 2.0, number.unit)}`"

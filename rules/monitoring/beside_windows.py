@@ -75,6 +75,49 @@ class BegunWindow:
         return mapped(state, lambda v: pick(v, UNKNOWN))
 
 
+@dataclass(frozen=True)
+class FollowedWindow:
+    """Whether in a window that ends now something was true, and something else then or later.
+
+    Attributes:
+        high: Length of the window, microseconds.
+    """
+
+    high: int
+
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its parts at a sample."""
+        least, most, high = algebra.least, algebra.most, self.high
+        unknown = (algebra.constant(UNKNOWN),) * 3
+
+        def fold(older: Any, newer: Any) -> Any:
+            # (what has been followed, the first, the second)
+            followed = most(most(older[0], newer[0]), least(older[1], newer[2]))
+            return followed, most(older[1], newer[1]), most(older[2], newer[2])
+
+        def step(
+            state: SlidingState | None, now: int, first: Any, second: Any
+        ) -> tuple[SlidingState, Any]:
+            if state is None:
+                state = initial(now, unknown)
+            elif now - state.then > SAMPLE_HOLD:
+                state = slide(state, state.then + SAMPLE_HOLD, unknown, 0, high, fold)[0]
+            value = least(first, second), first, second
+            state, found = slide(state, now, value, 0, high, fold)
+            return state, found[0]
+
+        return step
+
+    @property
+    def kept(self) -> int:
+        """Most intervals that the state holds for one choice of objects."""
+        return 3 * (2 * max_samples(self.high) + 2)
+
+    def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
+        """The same state for other objects; those that are new have no past."""
+        return mapped(state, lambda v: tuple(pick(part, UNKNOWN) for part in v))
+
+
 class EndedState(NamedTuple):
     """What `EndedWindow` retains.
 

@@ -27,7 +27,7 @@ from visup.rules.formula.nodes import (
     Until,
 )
 from visup.rules.formula.units import ticks
-from visup.rules.monitoring.beside_windows import EndedWindow
+from visup.rules.monitoring.beside_windows import EndedWindow, FollowedWindow
 from visup.rules.monitoring.compiler import Compiler, Scope, ValueRef, inner_scope, scope_of
 
 
@@ -68,11 +68,39 @@ class EarlyCompiler:
         What was decided early stays so until it is told in the end, so that one alert stands throughout.
         """
         parts = rule.when.parts if isinstance(rule.when, And) else (rule.when,)
-        claim = rule.when if rule.unless is None else And((*parts, Not(rule.unless)))
-        found = self.formula(claim, scope_of(rule))
+        parts = parts if rule.unless is None else (*parts, Not(rule.unless))
+        scope = scope_of(rule)
+        found = self.formula(And(parts) if len(parts) > 1 else parts[0], scope)
         if not found.wait:
             return None
-        return replace(found, first=self._on.windowed("once", 0, found.wait, 0, found.first))
+        at = self._on.windowed("once", 0, found.wait, 0, found.first)
+        followed = self._followed(parts, scope)
+        if followed is not None:
+            at = self._on.combined("most", *self._on.together([at, followed]))
+        return replace(found, first=at)
+
+    def _followed(self, parts: tuple[Formula, ...], scope: Scope) -> ValueRef | None:
+        """That all but one of some parts were true at a moment, which `eventually` has then followed.
+
+        What is true now was not yet when they were; so of such rules each moment is told early.
+        """
+        ahead = [p for p in parts if self._on.formula(p, scope).delay]
+        if len(ahead) != 1 or len(parts) == 1:
+            return None
+        (claim,) = ahead
+        if not isinstance(claim, FutureOperator) or claim.kind != "eventually":
+            return None
+        then = self._on.formula(claim.part, scope)
+        if then.delay or claim.window is None:
+            return None
+        low, high = ticks(claim.window.low.base), ticks(claim.window.high.base)
+        others = [self._on.formula(p, scope) for p in parts if p is not claim]
+        first, *more = others
+        for other in more:
+            first = self._on.combined("least", first, other)
+        first = self._on.waited(first, low)
+        at = self._on.remembered(FollowedWindow(high - low), first, then)
+        return replace(at, delay=low)
 
     def formula(self, node: Formula, scope: Scope = ()) -> EarlyValue:
         """What is known early of a formula, after its steps have been put into the program."""

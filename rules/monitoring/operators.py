@@ -18,6 +18,7 @@ from visup.rules.monitoring.beside_windows import (
     BegunWindow,
     DelayedUnbounded,
     EndedWindow,
+    FollowedWindow,
     PreviousSample,
 )
 from visup.rules.monitoring.intervals import EQUAL, UNKNOWN, Algebra, Interval
@@ -265,7 +266,13 @@ class ValueWhenTrue:
 PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch | ValueWhenTrue
 """Operators whose state is a few numbers for each choice of objects."""
 WindowOperator = (
-    SlidingWindow | SlidingCount | DelayedUnbounded | BegunWindow | EndedWindow | PreviousSample
+    SlidingWindow
+    | SlidingCount
+    | DelayedUnbounded
+    | BegunWindow
+    | EndedWindow
+    | FollowedWindow
+    | PreviousSample
 )
 """Operators that retain a whole window, or what `vm` has no loop for."""
 TemporalOperator = PointOperator | WindowOperator

@@ -1,4 +1,4 @@
-"""Quantities read off the image and the belief about objects: place, size, direction, number."""
+"""Quantities read off the image and the belief about objects: place, size, depth, direction, number."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from visup.agent import Presence
 from visup.rules.geometry.regions import image_diagonal
-from visup.rules.predicates.snapshot import Floats, Snapshot, exact
+from visup.rules.predicates.snapshot import SIGMAS, Floats, Snapshot, exact, interval_between
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.wording.sentences import believed_name
 
@@ -43,6 +43,29 @@ def area_share(facts: Snapshot) -> Floats:
     """The share of the image that each object covers."""
     whole = float(np.prod(facts.mind.frame_size)) or 1.0
     return _seen(facts, [b.region.area / whole for b in facts.beliefs])
+
+
+def depth(facts: Snapshot) -> Floats:
+    """How far away each object in sight is, in the unit of its model, within its deviation."""
+    known = [
+        b if b.presence is Presence.SEEN and b.depth is not None else None for b in facts.beliefs
+    ]
+    away = np.array([np.nan if b is None else b.depth for b in known], dtype=float)
+    spread = np.array([0.0 if b is None else SIGMAS * (b.depth_sigma or 0.0) for b in known])
+    return interval_between(np.maximum(away - spread, 0.0), away + spread)
+
+
+def depth_difference(facts: Snapshot) -> Floats:
+    """Difference of depth as a share of the smaller one; both depths within their deviations."""
+    depth = facts.one("depth")
+    if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
+        return facts.unknown(2)
+    spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
+    apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
+    least = np.minimum(depth[:, None], depth[None])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(least > 0, 1.0 / least, np.nan)
+        return interval_between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
 
 
 def confidence(facts: Snapshot) -> Floats:

@@ -23,7 +23,7 @@ _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
         "stale": frozenset(),  # it tells of this very thing
         "healthy": frozenset({"health"}),
         **dict.fromkeys(SIGNAL_WORDS, frozenset({"signal"})),
-        "depth_difference": frozenset({"region", "depth"}),
+        **dict.fromkeys(("depth", "depth_difference"), frozenset({"region", "depth"})),
         "spin": frozenset({"region", "hypothesis"}),
     }
 )

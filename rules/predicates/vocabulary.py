@@ -12,7 +12,16 @@ import numpy as np
 
 from visup.agent import HealthStatus, ObjectBelief, Presence
 from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
-from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
+from visup.rules.formula.units import (
+    ANGLE,
+    ANGULAR_SPEED,
+    LENGTH,
+    REAL_LENGTH,
+    SHARE,
+    SPEED,
+    TIME,
+    Dimension,
+)
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
@@ -94,7 +103,7 @@ class QuantityDefinition:
         if self.plain:
             return ""
         units = {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}
-        return {**units, ANGLE: "deg"}[self.dimension]
+        return {**units, ANGLE: "deg", REAL_LENGTH: "m"}[self.dimension]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,19 +203,6 @@ def stale(facts: Snapshot, kind: str) -> Codes:
 def healthy(facts: Snapshot) -> Codes:
     """Whether the image is sound."""
     return np.array(code(facts.mind.health.status is HealthStatus.OK), dtype=np.int8)
-
-
-def depth_difference(facts: Snapshot) -> Floats:
-    """Difference of depth as a share of the smaller one; both depths within their deviations."""
-    depth = facts.one("depth")
-    if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
-        return facts.unknown(2)
-    spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
-    apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
-    least = np.minimum(depth[:, None], depth[None])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(least > 0, 1.0 / least, np.nan)
-        return interval_between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
 
 
 def spin(facts: Snapshot) -> Floats:
@@ -349,8 +345,11 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
             _TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"
         ),
         "speed": QuantityDefinition(_ONE, SPEED, lambda f: exact(f.one("speed")), "in the image"),
+        "depth": QuantityDefinition(
+            _ONE, REAL_LENGTH, image.depth, "how far away it is, by the size of its model"
+        ),
         "depth_difference": QuantityDefinition(
-            _TWO, SHARE, depth_difference, "of the smaller depth"
+            _TWO, SHARE, image.depth_difference, "of the smaller depth"
         ),
         "spin": QuantityDefinition(_ONE, ANGULAR_SPEED, spin, "about itself"),
         "out_of_sight": QuantityDefinition(_ONE, TIME, _since("last_seen"), "since last seen"),

@@ -19,8 +19,8 @@ from visup.rules.formula.nodes import (
     calls,
     children,
     placeholder,
-    substituted,
 )
+from visup.rules.formula.rebuilding import substituted
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.monitoring.compiler import Compiler, Program, Scope, ValueRef
 from visup.rules.monitoring.early import EarlyCompiler

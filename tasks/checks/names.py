@@ -18,10 +18,12 @@ from visup.tasks.actions.floor import floor_map
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.conditions import (
     Amount,
+    Condition,
     Name,
     ParameterRef,
     action_of,
     bounds_of,
+    durations_of,
     facts_of,
     is_periodic,
 )
@@ -79,10 +81,15 @@ class NameCheck:
     @cached_property
     def comparisons(self) -> list[Comparison]:
         """Every comparison of the file."""
-        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
-        conditions = [s.condition for s in signs] + [i.condition for i in self.task.invariants]
         found = [c for c in self.courses if isinstance(c, Comparison)]
-        return found + [f for c in conditions for f in facts_of(c) if isinstance(f, Comparison)]
+        facts = (f for c in self.conditions for f in facts_of(c))
+        return found + [f for f in facts if isinstance(f, Comparison)]
+
+    @cached_property
+    def conditions(self) -> list[Condition]:
+        """Every condition of the file, of stages and of invariants."""
+        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
+        return [s.condition for s in signs] + [i.condition for i in self.task.invariants]
 
     def faults(self) -> Iterator[Diagnostic]:
         """All faults of the words."""
@@ -103,6 +110,7 @@ class NameCheck:
             if isinstance(course, Conditioned):
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
+        yield from ((d, TIME) for c in self.conditions for d in durations_of(c))
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
         criteria = (c for a in (*self.task.actors, *self.task.bystanders) for c in a.criteria)
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))

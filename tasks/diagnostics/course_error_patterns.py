@@ -221,6 +221,10 @@ def times(text: str) -> RecognisedError | None:
     if m is not None:
         what = f"`{m[1]}` already says that, without `{m[2]}`"
         return RecognisedError("E115", m.start(2), len(m[2]), what, f"such as `{m[1]} 5 s`")
+    m = re.search(r"\bfor\s+each\s+of\s+([01])\b", text)
+    if m is not None:
+        what, expected = f"{m[1]} is not several", "a whole number of at least 2"
+        return RecognisedError("E134", m.start(1), 1, what, expected)
     m = re.search(r"\brepeat(?:ed|s)?\b(?!\s*[(>])", text)
     if m is not None:
         what = f"`{m[0]}` is not how repetitions are written"

@@ -194,6 +194,7 @@ SAID = {
     "ACTOR": "`actor`",
     "UNIT": "a unit",
     "COUNT": "a whole number",
+    "SEVERAL": "a whole number of at least 2",
     "TEXT": "a text in double quotes",
     "SIGN": STAGE_CONDITIONS,
     "COMPARE": "`<` or `>`",

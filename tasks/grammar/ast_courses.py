@@ -169,11 +169,13 @@ class AnyOrder:
 
     Attributes:
         count: How many of them; None for all.
+        copies: Of what and how many things the items are each one, as `leg` and 4; or None.
     """
 
     items: tuple[Course, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
     count: int | None = None
+    copies: tuple[str, int] | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
         said = "any order" if self.count is None else f"any {self.count} of"

@@ -13,7 +13,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias, cast
 
-from visup.rules.formula.nodes import And, Comparison, Not, Or, Predicate, walk
+from visup.rules.formula.nodes import (
+    ZERO,
+    And,
+    Comparison,
+    Not,
+    Or,
+    PastOperator,
+    Predicate,
+    TimeWindow,
+    walk,
+)
 from visup.rules.formula.terms import Measure
 from visup.rules.formula.units import NOWHERE, Number, Span
 
@@ -103,13 +113,39 @@ class Period:
         return f"{self.least} to {self.most}" if self.least else str(self.most)
 
 
+@dataclass(frozen=True, slots=True)
+class Lasted(PastOperator):
+    """`(touching(a, b) for 2 s)`: a condition, within one, that must have held for so long."""
+
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    @property
+    def duration(self) -> Amount:
+        """How long."""
+        assert self.window is not None
+        return cast("Amount", self.window.high)
+
+    def __str__(self) -> str:
+        return f"({self.part} for {self.duration})"
+
+
+def lasted(part: Condition, duration: Amount, span: Span = NOWHERE) -> Lasted:
+    """A condition that must have held for so long."""
+    return Lasted("always", part, TimeWindow(ZERO, cast("Number", duration)), span)
+
+
 Fact: TypeAlias = Predicate | Comparison
-Condition: TypeAlias = Predicate | Comparison | Not | And | Or
+Condition: TypeAlias = Predicate | Comparison | Not | And | Or | Lasted
 
 
 def facts_of(condition: Condition) -> Iterator[Fact]:
     """The actions and comparisons of a condition, in the order of the text."""
     return (n for n in walk(condition) if isinstance(n, Predicate | Comparison))
+
+
+def durations_of(condition: Condition) -> Iterator[Amount]:
+    """How long conditions within a condition must have held."""
+    return (n.duration for n in walk(condition) if isinstance(n, Lasted))
 
 
 def action_of(fact: Fact) -> Predicate | Measure:

@@ -13,7 +13,8 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span, Unit
 from visup.tasks.grammar.ast_courses import ConditionKind
-from visup.tasks.grammar.conditions import EVERY, Condition, PartName, Period, Range
+from visup.tasks.grammar.conditions import EVERY, Condition, Lasted, PartName, Period, Range, lasted
+from visup.tasks.grammar.copies import MOST_COPIES, copy_names, one_of, with_copies
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -121,9 +122,10 @@ def collect(statements: Several[object], file: str) -> Task:
 
     invariants = of(Invariant)
     stages = instantiated(recovered(of(Stage), of(Recovery)), invariants)
+    actors = with_copies([a for a in of(Actor) if not a.bystander], stages)
     return Task(
         stages=stages,
-        actors=with_parts([a for a in of(Actor) if not a.bystander], stages, invariants),
+        actors=with_parts(actors, stages, invariants),
         invariants=invariants,
         zones=of(ZoneDeclaration),
         parameters=of(Parameter),
@@ -276,6 +278,12 @@ class _TaskBuilder(Transformer[Token, Any]):
         made = (bound(course, {str(variable): str(a)}) for a in actors)
         return AnyOrder(tuple(made), _of(first).to(course.span))
 
+    def for_copies(self, items: list[Any]) -> AnyOrder:
+        first, said, plural, course = items
+        name, count = one_of(str(plural), course), min(int(said), MOST_COPIES)
+        made = (bound(course, {name: copy}) for copy in copy_names(name, count))
+        return AnyOrder(tuple(made), _of(first).to(course.span), copies=(name, count))
+
     def already(self, items: list[Any]) -> Already:
         return Already(items[1], _of(items[0]).to(items[1].span))
 
@@ -341,6 +349,9 @@ class _TaskBuilder(Transformer[Token, Any]):
         span = quantity.span.to(items[-1].span)
         right = items[2] if len(items) == 3 else Range(items[2], items[3], _all(items[2:]))
         return Comparison(quantity, str(items[1]), cast("Term", right), span=span)
+
+    def lasted(self, items: list[Any]) -> Lasted:
+        return lasted(items[0], items[1].duration, items[0].span.to(items[1].span))
 
     def periodic(self, items: list[Any]) -> Comparison:
         action, _, *amounts = items

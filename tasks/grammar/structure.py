@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
@@ -207,6 +208,22 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
         amounts = between.join(str(task.amount(a)) for a in bounds_of(fact))
         key = f"{key} {fact.operator} {amounts}"
     return key, actors
+
+
+_SIGN = re.compile(r"(?:^|\s)(?=(?:[<>]=?|between|every)\s)")
+
+
+def key_text(key: str, actors: Iterable[str]) -> str:
+    """A fact as it is written, by its key (see `fact_key`).
+
+    >>> key_text("inside berth every 5 s", ["car"])
+    'inside(car, berth) every 5 s'
+    """
+    name, _, rest = key.partition(" ")
+    sign = _SIGN.search(rest)
+    words = rest if sign is None else rest[: sign.start()]
+    compared = "" if sign is None else f" {rest[sign.end() :]}"
+    return f"{name}({', '.join([*actors, *words.split()])}){compared}"
 
 
 def period_of(task: Task, periodic: Comparison) -> tuple[float, float]:

@@ -138,6 +138,20 @@ def bound(node: Any, names: Mapping[str, str]) -> Any:
     return _mapped(node, changed)
 
 
+def names_in(node: Any) -> frozenset[str]:
+    """The actors, zones and signals that a tree names, also those that it asks stages for."""
+    found: set[str] = set()
+
+    def note(n: Any) -> None:
+        if isinstance(n, Name):
+            found.add(str(n))
+        if isinstance(n, Reference):
+            found.update(called(n.stage)[1])
+
+    _mapped(node, note)
+    return frozenset(found)
+
+
 def _bound(pattern: Stage, words: tuple[str, ...]) -> Stage:
     plain, parameters = called(pattern.name)
     names = dict(zip(parameters, words, strict=True))

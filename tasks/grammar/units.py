@@ -26,11 +26,10 @@ MEASURES: Mapping[Dimension, str] = MappingProxyType(
         of_rules.SHARE: SHARE,
         of_rules.ANGLE: ANGLE,
         of_rules.ANGULAR_SPEED: ANGULAR_SPEED,
+        of_rules.REAL_LENGTH: SIZE,
     }
 )
 """Dimension of a quantity of rules -> what tasks call it."""
-
-_SIZES = {"mm": (SIZE, 0.001), "cm": (SIZE, 0.01), "m": (SIZE, 1.0)}
 
 UNITS = MappingProxyType(
     {
@@ -38,7 +37,6 @@ UNITS = MappingProxyType(
         for unit, (measured, factor) in of_rules.UNITS.items()
         if unit != Unit.NONE and measured in MEASURES
     }
-    | _SIZES
 )
 """Unit -> (what it measures, how many of the base unit one of it is)."""
 

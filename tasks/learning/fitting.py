@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from math import floor
 
 from visup.rules.formula.units import Number, Span
-from visup.tasks.grammar.nodes import Actors, Deadline, Delay, Task, Timed, walk
+from visup.tasks.grammar.nodes import (
+    Actors,
+    Conditioned,
+    Course,
+    Deadline,
+    Delay,
+    Task,
+    Timed,
+    walk,
+)
 from visup.tasks.grammar.units import value
 from visup.tasks.learning.induction import deadline
 from visup.tasks.learning.judging import JudgedRun
@@ -56,23 +65,43 @@ def with_amounts(text: str, fitted: Sequence[FittedAmount]) -> str:
     return "\n".join(lines)
 
 
-def _clauses(task: Task) -> Iterator[tuple[str, str, Number]]:
-    """Stage, word and amount of each clause that has a number of its own."""
+Clause = tuple[str, str, Number, bool]
+"""Stage, word and amount of a clause, and whether it stands around a pause, which then counts."""
+
+
+def _clauses(task: Task) -> Iterator[Clause]:
+    """Each clause that has a number of its own."""
     for stage in task.stages:
         if isinstance(stage.body, Actors):
             continue
         for course in walk(stage.body):
-            for clause in course.clauses if isinstance(course, Timed) else ():
+            if not isinstance(course, Timed):
+                continue
+            for clause in course.clauses:
                 if isinstance(clause, Delay):
                     continue
                 if isinstance(clause.duration, Number) and not clause.duration.span.file:
                     word = "within" if isinstance(clause, Deadline) else "for"
-                    yield stage.name, word, clause.duration
+                    yield stage.name, word, clause.duration, _pauses(course)
 
 
-def _fitted(clause: tuple[str, str, Number], runs: Sequence[JudgedRun]) -> FittedAmount | None:
-    stage, word, amount = clause
-    took = [end - begin for r in runs for begin, end in [r.spans().get(stage, (0.0, 0.0))] if end]
+def _pauses(course: Course) -> bool:
+    """Whether something inside a course is paused."""
+    return any(
+        c.kind == "pauses" for x in walk(course) if isinstance(x, Conditioned) for c in x.conditions
+    )
+
+
+def _took(stage: str, run: JudgedRun, *, pauses: bool) -> Iterator[float]:
+    """How long a stage took in a run, where it was done, seconds; with its pauses or without."""
+    if stage in run.spans():
+        begin, end = run.spans()[stage]
+        yield end - begin - (0.0 if pauses else run.paused_s().get(stage, 0.0))
+
+
+def _fitted(clause: Clause, runs: Sequence[JudgedRun]) -> FittedAmount | None:
+    stage, word, amount, pauses = clause
+    took = [seconds for r in runs for seconds in _took(stage, r, pauses=pauses)]
     if not took:
         return None
     new = (

@@ -38,6 +38,18 @@ class JudgedRun:
                 found[stage] = begun[stage], event.time
         return found
 
+    def paused_s(self) -> Mapping[str, float]:
+        """For how long the work on each stage was paused before it was done, seconds."""
+        since: dict[str, float] = {}
+        found: dict[str, float] = {}
+        for event in self.events:
+            stage = str(event.data.get("stage", ""))
+            if event.kind == "stage_paused":
+                since[stage] = event.time
+            elif event.kind.startswith("stage_") and stage in since:
+                found[stage] = found.get(stage, 0.0) + event.time - since.pop(stage)
+        return found
+
 
 def judged(task: Task, minds: Sequence[Mind]) -> JudgedRun:
     """A task followed through what was believed in a run, whatever tasks were followed then.

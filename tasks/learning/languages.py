@@ -1,19 +1,22 @@
 """How two tasks differ: by the courses that they allow, not by how they are written.
 
 Both automata are made deterministic side by side; the shortest course that one allows and the other
-does not is the difference, told in words. What is no matter of courses (times, invariants, who the actors
-are) is compared by what it says.
+does not is the difference, told in words. What is no matter of courses (times, conditions, actors and so on)
+is compared by what it says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.states import TaskStep
-from visup.tasks.grammar.nodes import Actors, Task, Timed, walk
+from visup.tasks.grammar.nodes import Actors, Already, Conditioned, Task, Timed, walk
+from visup.tasks.grammar.structure import key_text
+
+C = TypeVar("C")
 
 MOST_STATES = 4_000
 """Tasks with more are compared up to so many."""
@@ -155,11 +158,11 @@ def told(course: Course) -> str:
 
 def told_label(label: Label) -> str:
     """What begins together in words."""
-    return " & ".join(sorted(f"{action}({', '.join(sorted(who))})" for action, who in label))
+    return " & ".join(sorted(key_text(action, sorted(who)) for action, who in label))
 
 
 def _other(first: Task, second: Task) -> Iterator[str]:
-    for what, of in (("invariants", _invariants), ("times", _times), ("actors", _declared)):
+    for what, of in OTHER:
         one, two = of(first), of(second)
         for missing in sorted(one - two):
             yield f"only the first has {missing} ({what})"
@@ -177,6 +180,31 @@ def _declared(task: Task) -> set[str]:
 
 def _times(task: Task) -> set[str]:
     """Each clause with what it stands behind."""
+    return {f"`{c}`" for c in _all(task, Timed)}
+
+
+def _conditions(task: Task) -> set[str]:
+    """Each stage condition with what it stands behind, and what may have been so already."""
+    said = (f"`{c.item} {told}`" for c in _all(task, Conditioned) for told in c.conditions)
+    return {*said, *(f"`{c}`" for c in _all(task, Already))}
+
+
+def _places(task: Task) -> set[str]:
+    """Zones, and the floor."""
+    return {f"`{place}`" for place in (*task.zones, *task.grounds)}
+
+
+def _all(task: Task, kind: type[C]) -> Iterator[C]:
+    """Every course of a kind."""
     bodies = [s.body for s in task.stages if not isinstance(s.body, Actors)]
-    timed = (c for b in bodies for c in walk(b) if isinstance(c, Timed))
-    return {f"`{c}`" for c in timed}
+    return (c for b in bodies for c in walk(b) if isinstance(c, kind))
+
+
+OTHER: tuple[tuple[str, Callable[[Task], set[str]]], ...] = (
+    ("invariants", _invariants),
+    ("times", _times),
+    ("conditions", _conditions),
+    ("actors", _declared),
+    ("places", _places),
+)
+"""What differs besides courses, and how it is said."""

@@ -9,7 +9,7 @@ from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Action
-from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.nodes import Comparison, Task
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.verification.pauses import Pause
 from visup.tasks.verification.step_monitor import StepMonitor
@@ -217,9 +217,11 @@ def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -
 def paused_by(pause: Pause, task: Task, actions: Words) -> str:
     """What pauses work, and since when: one clause."""
     condition = pause.condition.condition
-    if not isinstance(condition, Action):
+    key, actors = (
+        fact_key(task, condition) if isinstance(condition, Action | Comparison) else ("", ())
+    )
+    if not actors:
         return f"`{condition}` since {pause.since:.1f} s"
-    key, actors = fact_key(task, condition)
     have = "has" if len(actors) < 2 else "have"
     return f"{names(actors)} {have} been {_say(key, actions)} since {pause.since:.1f} s"
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from random import Random
 
 from visup.tasks.automaton.derivatives import begin, derivatives, enter
-from visup.tasks.automaton.states import State, TaskStep, leaves, structural_key
+from visup.tasks.automaton.states import State, leaves, structural_key
 from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.structure import key_text
 
 LONGEST = 200  # moments after which a course drawn at random is cut off
 MOST_LOOKED_AT = 50_000  # beginnings of courses that a listing looks at
@@ -95,12 +96,4 @@ def _distinct(states: Iterator[State[None] | None]) -> tuple[Position, ...]:
 
 def _moment(state: State[None]) -> Moment:
     steps = (leaf.step for leaf in leaves(state))
-    return tuple(f"<{s.stage}> {_written(s)}" for s in steps)
-
-
-def _written(step: TaskStep) -> str:
-    """What a step asks for, as it is written: its key begins with the name of the action."""
-    name, _, rest = step.action.partition(" ")
-    zone, sign = ("", rest) if rest[:1] in ("<", ">") else (rest, "")
-    actors = ", ".join([*step.actors, *([zone] if zone else [])])
-    return f"{name}({actors}){' ' + sign if sign else ''}"
+    return tuple(f"<{s.stage}> {key_text(s.action, s.actors)}" for s in steps)

@@ -66,7 +66,7 @@ class ActionObservation:
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:
         """Seconds from one time to another in which the work on a step was not paused."""
-        pauses = step.pauses
+        pauses = step.pauses if step.conditions else ()
         return self.pauses.elapsed(pauses, since, now) if pauses else now - since
 
 

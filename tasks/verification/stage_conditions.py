@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import cast
 
 from visup.agent import Relation, Truth
 from visup.rules.formula.nodes import And, Formula, Not, Or
 from visup.rules.formula.truth import NEGATION, conjunction, disjunction
 from visup.tasks.automaton.states import TaskStep
-from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.conditions import Condition, Lasted
 from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
@@ -39,24 +40,28 @@ class ConditionEvaluator:
     holds: Holds
     relations: RelationLookup
 
-    def truth(self, condition: Formula) -> Truth:
+    def truth(self, condition: Formula, worked: Worked = _passed) -> Truth:
         """Whether a condition holds; unknown when what decides it was not observed."""
         match condition:
             case Action() | Comparison():
                 return self.holds(*fact_key(self.task, condition))
             case Not(part=part):
-                return NEGATION[self.truth(part)]
+                return NEGATION[self.truth(part, worked)]
             case And(parts=parts):
-                return conjunction(map(self.truth, parts))
+                return conjunction(self.truth(p, worked) for p in parts)
             case Or(parts=parts):
-                return disjunction(map(self.truth, parts))
+                return disjunction(self.truth(p, worked) for p in parts)
+            case Lasted(part=part):
+                return self.relation(
+                    cast("Condition", part), Hold(condition.duration), worked
+                ).truth
         raise TypeError(f"a task has no condition like {condition}")
 
     def relation(
         self, condition: Condition, lasting: Hold | None, worked: Worked = _passed
     ) -> Relation:
         """A condition as a relation: true once it has held as long as it must, pauses not counted."""
-        found = self.relations.lasting(str(condition), (), self.truth(condition))
+        found = self.relations.lasting(str(condition), (), self.truth(condition, worked))
         if found.truth is not Truth.TRUE or lasting is None:
             return found
         must = value(self.task.amount(lasting.duration))

@@ -14,13 +14,14 @@ from tests.cli import Call, caller
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
 from visup.agent.model.errors import OutputError, SettingsError, SourceError
-from visup.archive import Lake
 from visup.archive.filling.attempts import Attempts, forget_interrupted
 from visup.archive.filling.clips import Clip, clips_of
 from visup.archive.filling.filling import FillResult, begin_anew, fill, only_filler
 from visup.archive.filling.plan import Plan, make_plan
-from visup.archive.filling.pool import Pool, PoolSettings, open_pool
+from visup.archive.filling.pool import Pool, open_pool
+from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.filling.watching import Watch, watch_job
+from visup.archive.lake import Lake
 from visup.archive.schema import TABLES
 from visup.runs.settings import WatchSettings
 

@@ -16,10 +16,10 @@ from tests.paths import ROOT
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.atomic import replacing
 from visup.agent.storage.journal_reader import Recording
-from visup.archive import Lake
 from visup.archive.adding import add_run
 from visup.archive.identity import content_hash, settings_hash
 from visup.archive.inputs import run_inputs
+from visup.archive.lake import Lake
 from visup.archive.run_tables import Provenance, RunTables, run_tables
 from visup.archive.schema import TABLES, schema_text
 from visup.runs.replay import replay

@@ -8,7 +8,7 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure
 from visup.rules.traits.colours import SHADES, TERMS
 from visup.tasks.diagnostics.actor_error_patterns import RANKS
-from visup.tasks.grammar.conditions import EVERY, Condition, Period, Range
+from visup.tasks.grammar.conditions import EVERY, Condition, Period, Range, lasted
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -90,7 +90,12 @@ facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons, periodic)
 
 def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]:
     several = st.lists(inner, min_size=2, max_size=3).map(tuple)
-    return st.one_of(st.builds(And, several), st.builds(Or, several), st.builds(Not, inner))
+    return st.one_of(
+        st.builds(And, several),
+        st.builds(Or, several),
+        st.builds(Not, inner),
+        st.builds(lasted, inner, amounts_said),
+    )
 
 
 conditions = st.recursive(facts, _joined, max_leaves=4)

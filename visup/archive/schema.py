@@ -171,7 +171,7 @@ STAGES = _table(
     "a stretch in which a stage had this status and probability",
     "task string: its task",
     "stage string: its name",
-    "status string: pending, active, progressing, stalled, failing, failed, done or unknown",
+    "status string: pending, active, progressing, paused, stalled, failing, failed, done or unknown",
     "confidence float64: how likely it has this status, 0 to 1, to two digits",
     *_STRETCH,
 )

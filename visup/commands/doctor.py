@@ -44,7 +44,7 @@ EXTRAS = {
     "ros": ("the pictures of ROS 2 bags", ("rosbags",)),
     "rerun": ("the Rerun viewer", ("rerun-sdk",)),
     "tables": ("runs as pandas and Arrow tables", ("pandas", "pyarrow")),
-    "cluster": ("visup archive: tables of many runs", ("distributed", "pyarrow")),
+    "cluster": ("visup archive: tables of many runs", ("distributed", "duckdb", "pyarrow")),
     "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),
 }
 """What each extra brings, and its libraries; the same as `optional-dependencies` in pyproject.toml."""

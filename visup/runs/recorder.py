@@ -21,6 +21,7 @@ from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
 from visup.agent.storage.jsonable import to_jsonable
+from visup.agent.storage.wall_clock import RecordStamp, WallClock
 from visup.percepts.video import VideoSource
 from visup.redaction import has_secret, redacted
 from visup.runs.settings import SECRET_LEFT_OUT, RunOptions, WatchSettings
@@ -75,7 +76,7 @@ class Recorder:
         self.folder = folder
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
         self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
-        self.facts = _facts(settings, source)
+        self.facts = {**_facts(settings, source), **RecordStamp(options.camera).named}
         if not resume:
             self.journal.note(**self.facts)
         self.notes = source.notes
@@ -91,6 +92,7 @@ class Recorder:
         self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
         self._patience = 0
         self._lost = 0
+        self._clock: WallClock | None = None
         self._fault = ""
 
     def __call__(self, step: Step, frame: Frame) -> None:
@@ -101,6 +103,11 @@ class Recorder:
         if self._patience <= 0:
             self._write()
         self._derive(step, frame, list(self._derived))
+
+    def keep_clock(self, clock: WallClock) -> None:
+        """Note when it was by the clock of the wall, with the next step."""
+        self._clock = clock
+        self.facts["began"] = clock.text(0.0)
 
     def begin_anew(self) -> None:
         """Forget what was gathered for the report: all of it comes again."""
@@ -168,6 +175,9 @@ class Recorder:
     def _write(self) -> None:
         self._patience = TRY_AGAIN if self._fault else 0
         try:
+            if self._clock:
+                self.journal.note(clock=self._clock.anchors)
+                self._clock = None
             while self._waiting:
                 self.journal.record(self._waiting[0])
                 self._waiting.popleft()

@@ -16,6 +16,7 @@ from visup.agent.model.step import Observer, Step
 from visup.agent.storage.atomic import sync
 from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.journal_reader import JOURNAL
+from visup.agent.storage.wall_clock import RecordStamp, WallClock
 from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
@@ -23,6 +24,7 @@ from visup.redaction import redacted
 from visup.rules.safety.ending import open_rules
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.inputs.preflight import check_cast
+from visup.runs.inputs.run_sinks import sinks_of
 from visup.runs.inputs.stop_signals import stop_signals
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
@@ -214,7 +216,9 @@ class _Run:
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
         # Before the journal: what is refused leaves no run behind.
-        self._sinks = Sinks(options.sinks, settings.source, options.closing_s)
+        told = past.recording.facts().get("clock") if past else None
+        self._stamp = RecordStamp(options.camera, WallClock.read(told), live=self.source.live)
+        self._sinks = sinks_of(options, settings.source, self._stamp)
         stack.callback(self._sinks.close)
         self._recorder = (
             Recorder(settings, self.source, folder, options, resume=past is not None)
@@ -222,6 +226,7 @@ class _Run:
             else None
         )
         if self._recorder:
+            self._stamp.changed = self._recorder.keep_clock
             stack.callback(self._recorder.close)
         if past:
             past.check_unchanged()  # now that nobody else may write it
@@ -266,7 +271,8 @@ class _Run:
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         others = (*audience.observers, self._sinks, *answering)
-        self._agent.observers = (self._alarms, *recording, *others)
+        clocked = (self._stamp,) if self.source.live else ()
+        self._agent.observers = (self._alarms, *clocked, *recording, *others)
         for warning in self._warnings:
             self._warn(warning, audience.notice)
         if self._recorder:
@@ -288,6 +294,7 @@ class _Run:
         realtime = self._settings.realtime
         if self.source.live if realtime is None else realtime:
             self._pace = in_real_time(self.source, frames)
+            self._stamp.lag = self._pace.lag
             self._stack.callback(self._pace.close)
             self._faults.add_source(self._pace.runtime_faults)
         begin = self._agent.mind.time if past and past.steps else None

@@ -245,8 +245,6 @@ class RunOptions:
     video: Annotated[bool, Option("Write the annotated video.")] = True
     report: bool = True
     """Whether to write the report."""
-    closing_s: float = 5.0
-    """How long each sink may take to deliver what is left when the run ends, seconds."""
     sinks: Annotated[
         tuple[str, ...],
         Option("Also send alerts there: jsonl:-, webhook:URL, ...", "--sink", "KIND:PLACE"),
@@ -261,3 +259,13 @@ class RunOptions:
             "Seconds between checkpoints to resume from; 0 for none.", "--state-every", at_least=0.0
         ),
     ] = 30.0
+    camera: Annotated[
+        str | None,
+        Option("Name of the camera: it and the host then stand in every record.", metavar="NAME"),
+    ] = None
+    webhook_headers: Mapping[str, str] = field(default_factory=dict, repr=False)
+    """Headers of each request of a webhook."""
+    webhook_key: str | None = field(default=None, repr=False)
+    """Key by which what webhooks send is signed."""
+    closing_s: float = 5.0
+    """How long each sink may take to deliver what is left when the run ends, seconds."""

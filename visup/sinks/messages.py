@@ -8,6 +8,7 @@ from typing import Any
 from visup.agent import Alert, Frame, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import to_jsonable
+from visup.agent.storage.wall_clock import RecordStamp
 from visup.redaction import redacted
 from visup.sinks.outbox import Outbox
 
@@ -44,16 +45,21 @@ class AlertSender:
     Args:
         outboxes: Of the sinks.
         source: What is watched.
+        stamp: What else stands in every record: camera, host, time of the wall.
     """
 
-    def __init__(self, outboxes: Sequence[Outbox], source: str) -> None:
+    def __init__(
+        self, outboxes: Sequence[Outbox], source: str, stamp: RecordStamp | None = None
+    ) -> None:
         self._outboxes = outboxes
+        self._stamp = stamp or RecordStamp()
         self._source = redacted(source)
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Send the alerts that a step opened or closed."""
         for alert in step.alerts:
-            self._send(alert_record(alert, self._source))
+            when = alert.opened if alert.closed is None else alert.closed
+            self._send(alert_record(alert, self._source), when)
 
     def notice(self, text: str) -> None:
         """Send a sentence that cannot wait for a step."""
@@ -64,6 +70,7 @@ class AlertSender:
         """Send the verdict."""
         self._send(verdict_record(verdict, steps, self._source))
 
-    def _send(self, record: dict[str, Any]) -> None:
+    def _send(self, record: dict[str, Any], when: float | None = None) -> None:
+        stamped = {**record, **self._stamp.of(when)}
         for outbox in self._outboxes:
-            outbox.offer(record)
+            outbox.offer(stamped)

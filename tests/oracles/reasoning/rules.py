@@ -16,10 +16,12 @@ import numpy as np
 from tests.oracles import dense_formulas, rule_oracle, rule_peer
 from tests.oracles import rule_formulas as drawn_formulas
 from tests.oracles.dense_oracle import CELL_MS, DenseOracle
+from tests.oracles.early_verdicts import both_told
 from tests.oracles.reasoning.rule_scenes import FPS, minds, twenty_rules
 from visup.agent import Mind, Observation
 from visup.evaluation.figures import Progress, silent
 from visup.rules.dense_time import Ends, judge_recording
+from visup.rules.dense_time.compiler import horizon
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula, shipped_rules
@@ -53,13 +55,15 @@ def evaluate_rules(
         progress: Shows what is being done.
 
     Returns:
-        Items `oracle`, `dense time`, `rtamt` (left out when it is not installed), `window N`, `N objects` and
-        `snapshots`; the total holds `slower`, what a window of 3000 costs over one of 30, and
+        Items `oracle`, `early`, `dense time`, `rtamt` (left out when it is not installed), `window N`,
+        `N objects` and `snapshots`; the total holds `slower`, what a window of 3000 costs over one of 30, and
         whether rtamt was there.
     """
     items: dict[str, dict[str, Any]] = {}
     progress("formulas against the oracle")
     items["oracle"] = _against_oracle(formulas, seed)
+    progress("what is foreseen against what is told")
+    items["early"] = _foreseen(formulas, seed)
     progress("dense time against its oracle")
     items["dense time"] = _against_dense_oracle(formulas // 5, seed)
     peer = rule_peer.available()
@@ -99,6 +103,21 @@ def _against_oracle(count: int, seed: int) -> dict[str, Any]:
         samples += len(times)
         different += not all(map(alike, told, truth))
     return {"formulas": count, "samples": samples, "different": different}
+
+
+def _foreseen(count: int, seed: int) -> dict[str, Any]:
+    """Of formulas about the future: moments decided early, and those of which the end says otherwise."""
+    late = samples = different = 0
+    for number in range(count):
+        rng = Random(f"{seed} early {number}")
+        formula = drawn_formulas.random_formula(rng, rng.randint(1, 4))
+        if not horizon(formula):
+            continue
+        late += 1
+        pairs = both_told(formula, rng, 450_000)
+        samples += sum(low > 0 or high < 0 for (low, high), _ in pairs)
+        different += any(e[0] > told[0] or e[1] < told[1] for e, told in pairs)
+    return {"formulas": late, "samples": samples, "different": different}
 
 
 def _against_dense_oracle(count: int, seed: int) -> dict[str, Any]:

@@ -76,6 +76,10 @@ CONDITIONS = [
     "touching(a, b) == false",
     "north east_of(a, b)",
     "3 of 5 samples touching(a, b)",
+    "any 2 of (seen(a), seen(b), touching(a, b))",
+    "speed(a) > 3px / s and seen(b)",
+    "depth(a) < 3 meters and seen(b)",
+    "gap(a, b) < 3 mm",
 ]
 RULES = [
     'rule r(a, b) info\n when touching(a, b)\n say "x"',
@@ -143,6 +147,11 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
             "let p be gap(a, b) at touching(a, b): gap(a, b) > p",
         ),
         ("touching(a, b) within 5 frames", "touching(a, b) in 1 of 5 samples"),
+        ("touching(a, b) never", "not touching(a, b)"),
+        ("touching(a, b) more than 2 s", "touching(a, b) for 2 s"),
+        ("touching(a, b) in 3/5 samples", "touching(a, b) in 3 of 5 samples"),
+        ("henceforth touching(a, b) [5 s]", "henceforth[5 s] touching(a, b)"),
+        ("time_to_contact(a, b) < 3", "time_to_contact(a, b) < 3 s"),
     ],
 )
 def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:

@@ -7,16 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.oracles.rule_formulas import random_formula, random_times, random_value
+from tests.oracles.early_verdicts import both_told
+from tests.oracles.rule_formulas import random_formula
 from tests.rules.runs import Thought, think
 from tests.rules.safety.test_reasoner import closing
 from visup.agent import Truth
 from visup.rules.formula.nodes import Formula
-from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula, parse_rules
+from visup.rules.monitoring.beside_windows import FollowedWindow
 from visup.rules.monitoring.compiler import Compiler
 from visup.rules.monitoring.early import EarlyCompiler
-from visup.rules.monitoring.intervals import AtEnd, Interval, verdict
+from visup.rules.monitoring.intervals import FALSE, TRUE, AtEnd, Scalars, verdict
 from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.reasoners import default_reasoners
@@ -26,25 +27,6 @@ from visup.rules.safety.queries import explain
 
 def formula(text: str) -> Formula:
     return parse_formula(text, signals("x", "y"))
-
-
-def both_told(f: Formula, rng: Random, longest_gap: int | None) -> list[tuple[Interval, Interval]]:
-    """Of each moment of which both speak: what was foreseen, and what was told in the end."""
-    monitor = Monitor(f, early=True)
-    wait = ticks(monitor.delay) - ticks(monitor.early_delay)
-    moments = [ticks(t) for t in random_times(rng, 40)]
-    gaps = [b - a for a, b in pairwise(moments)]
-    times = [0]
-    for gap in gaps:
-        times.append(times[-1] + min(gap, longest_gap or gap))
-    times = sorted({*times, *(t + wait for t in times if t + wait < times[-1])})
-    foreseen, found = {}, []
-    for t in times:
-        told = monitor.step(t / 1e6, {n: random_value(rng) for n in ("x", "y")})
-        foreseen[t] = monitor.foreseen()
-        if t - wait in foreseen:
-            found.append((foreseen[t - wait], told))
-    return found
 
 
 @settings(max_examples=150)
@@ -134,7 +116,14 @@ rule near(a, b): info
 SUSPENDED = SOON.replace("say", "unless henceforth[1 s] gap(a, b) < 10 px say")
 
 
-@pytest.mark.parametrize("text", [SOON, SUSPENDED])
+MOMENT = """
+rule near(a, b): info
+    when falling(gap(a, b) > 100 px) and eventually[3 s] gap(a, b) < 60 px
+    say "{a} {b}"
+"""
+
+
+@pytest.mark.parametrize("text", [SOON, SUSPENDED, MOMENT, MOMENT.replace("[3", "[0.5 s .. 3")])
 def test_an_alert_is_raised_sooner_and_stands_until_it_is_told_in_the_end(text: str) -> None:
     early, late = alerts(text, early=True), alerts(text, early=False)
     assert late
@@ -173,3 +162,17 @@ def test_rules_that_are_due_at_the_end_are_told_as_one_chooses(
     assert tuple(map(bool, told)) == (weak, strong)
     assert all(o.decided == strong for o in told[0])
     assert all(str(o).startswith("At the end rule 'near' is ") for o in told[0])
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=30), st.integers(1, 8))
+def test_what_was_followed_is_what_one_finds_by_looking(
+    seen: list[tuple[bool, bool]], window: int
+) -> None:
+    step, state = FollowedWindow(window * 100_000).on(Scalars()), None
+    for k, _ in enumerate(seen):
+        first, second = (TRUE if held else FALSE for held in seen[k])
+        state, told = step(state, k * 100_000, first, second)
+        near = range(max(0, k - window), k + 1)
+        wanted = any(seen[i][0] and seen[j][1] for i in near for j in near if i <= j)
+        assert (verdict(told) is Truth.TRUE) == wanted

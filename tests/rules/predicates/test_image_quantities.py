@@ -9,6 +9,8 @@ import pytest
 
 from tests.rules.predicates.test_certainty import mind_of
 from visup.agent import Candidate, Mind, Presence
+from visup.agent.model.errors import RuleError
+from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import QUANTITIES
 
@@ -37,6 +39,22 @@ def test_place_and_size_are_those_of_the_boxes() -> None:
 def test_overlap_is_intersection_over_union() -> None:
     mind = mind_of((100, 100, 100, 100), (150, 100, 100, 100))
     assert asked(mind, "overlap") == pytest.approx([1.0, 1 / 3, 1 / 3, 1.0])
+
+
+def test_depth_is_in_metres_within_its_deviation_and_is_never_compared_with_pixels() -> None:
+    mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
+    mind = mind.with_objects(replace(mind.objects[1], depth=3.0, depth_sigma=0.25))
+    assert asked(mind, "depth") == [2.75, -inf]
+    (rule,) = parse_rules('rule near(a): info when depth(a) < 250 cm leave 3 m say "{a}"')
+    assert rule.when.right.base == 2.5  # type: ignore[union-attr]
+    for wrong in (
+        "depth(a) < 3 px",
+        "width(a) < 3 cm",
+        "depth(a) < 3 m/s",
+        "rate(depth(a), 1 s) > 1 m",
+    ):
+        with pytest.raises(RuleError, match="is compared with"):
+            parse_rules(f'rule near(a): info when {wrong} say "{{a}}"')
 
 
 def test_what_is_out_of_sight_or_at_rest_is_unknown() -> None:

@@ -105,6 +105,14 @@ CONDITIONS = [
     "touching(a, b) in 60 of 5 s",
     "objects() > and touching(a, b)",
     "inside(a, b) and seen(b)",
+    "seen(a) whenever touching(a, b)",
+    "touching(a, b) for 2 s or more",
+    "speed(a) > 2 * speed b",
+    "is touching(a, b)",
+    "eventually touching(a, b) within 5 s",
+    "let x be speed(a) at seen(b) and speed(a) > x",
+    "remember speed(a) when seen(b): speed(a) > 3 px/s",
+    "exists c in view: touching(a, c) and seen(b)",
 ]
 STAGES = [
     "<a> ::= converging(x, y) <b",
@@ -196,6 +204,12 @@ STAGES = [
     "zone z (1, 2) (3, 4) (5, 6)\n<a> ::= inside(x, z)",
     "on failure of <a> <b>\n<a> ::= touching(x, y)",
     "<a> := <c>\n<c> := touching(x, y)",
+    "<a> ::= repeat 3 touching(x, y)",
+    "<a> ::= touching(x, y) repeat 3 times",
+    "<a> ::= each of (touching(x, y))",
+    "<a> ::= touching x with y",
+    "<a> ::= touching(x, y) as long as seen(x)",
+    "<a> ::= touching(x, y) ends when gap(x, y) > 3 s",
 ]
 
 

@@ -223,3 +223,44 @@ def test_times_and_invariants_that_differ_are_told() -> None:
     assert "both allow the same courses" in said
     assert "only the first has never touching(a, c) (invariants)" in said
     assert "within 9 s" in said
+
+
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [
+        (" pauses when touching(a, c)", "`touching(a, b) pauses when touching(a, c)` (conditions)"),
+        (" fails when gone(b)", "`touching(a, b) fails when gone(b)` (conditions)"),
+        (
+            "\nzone z is (0, 0) (9, 0) (9, 9)\nnever inside(a, z)",
+            "`zone z is (0, 0) (9, 0) (9, 9)`",
+        ),
+    ],
+)
+def test_conditions_and_places_that_differ_are_told(more: str, what: str) -> None:
+    one, two = parse_task("<t> ::= touching(a, b)"), parse_task("<t> ::= touching(a, b)" + more)
+    found = difference(one, two)
+    assert found
+    assert any(what in line for line in found.lines("A", "B"))
+
+
+PAUSE = "pauses when touching(part, tray)"
+
+
+@pytest.mark.parametrize(
+    ("course", "seconds"),
+    [
+        (f"touching(arm, part) for 4 s within 90 s {PAUSE}", "3.8"),
+        (f"(touching(arm, part) for 4 s {PAUSE}) within 90 s", "13.8"),
+    ],
+)
+def test_pauses_count_for_a_time_only_where_they_stand_inside_it(course: str, seconds: str) -> None:
+    task = parse_task(f"<hold> ::= {course}")
+    hold, pause = (
+        Spell("touching", 1.0, 30.0, (ARM, PART)),
+        Spell("touching", 2.0, 12.0, (PART, TRAY)),
+    )
+    run = judged(task, run_of("paused", [hold, pause], 20.0).minds)
+    assert run.verdict is Verdict.SUCCEEDED
+    assert run.paused_s()["hold"] == pytest.approx(10.0, abs=0.5)
+    (fitted,) = (f for f in fitted_amounts(task, [run]) if f.clause.startswith("within"))
+    assert fitted.seen.startswith(f"1 of 1 runs, {seconds} ")

@@ -166,6 +166,22 @@ def test_a_pause_and_its_end_are_told() -> None:
     assert task_of(played, 6.0).verdict is Verdict.IN_PROGRESS
 
 
+@pytest.mark.parametrize(
+    ("condition", "why"),
+    [
+        ("apart(guard, part)", "the guard and the part have been apart since 0.0 s"),
+        ("gap(arm, part) < 9 px", "the arm and the part have been at a gap below 9 px since 0.0 s"),
+        ("signal_on(hold) or apart(guard, part)", "`signal_on(hold) or apart(guard, part)` since"),
+    ],
+)
+def test_what_pauses_is_told_in_words(condition: str, why: str) -> None:
+    scene = replace(script([TOUCH]), gaps=lambda time: 5.0)
+    reasoner = task_reasoner([parse_task(GRASP.format(f"pauses when {condition}"))])
+    stage = task_of(play(reasoner, scene, 3.0, FPS)).stages[0]
+    assert stage.status is Status.PAUSED
+    assert why in stage.evidence
+
+
 def test_what_must_never_be_counts_in_a_pause() -> None:
     text = GRASP + "\nnever touching(part, tray)"
     spells = (TOUCH, paused_for(3.0, 6.0), Spell("touching", 5.0, 7.0, (PART, TRAY)))

@@ -19,6 +19,7 @@ from visup.agent.model.errors import SettingsError
 from visup.archive.extra import imported
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.plan import FailedClip, Job, put_aside
+from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.filling.watching import ClipOutcome, Watch, watch_into, watch_job
 from visup.archive.lake import Lake
 
@@ -26,21 +27,6 @@ WAITING_PER_WORKER = 3
 """Jobs handed over for each worker: while one is watched, the next is there."""
 CONNECT_S = 20
 MOST_RESUBMISSIONS = 5
-
-
-@dataclass(frozen=True, slots=True)
-class PoolSettings:
-    """Where jobs are run.
-
-    Attributes:
-        workers: Processes on this machine; 0 for none but this one.
-        scheduler: Address of a Dask scheduler, whose workers see the same files; in place of `workers`.
-        memory_gb: What a worker may take; one that takes more is ended. None for a fair share.
-    """
-
-    workers: int = 0
-    scheduler: str | None = None
-    memory_gb: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +58,7 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
         SettingsError: The scheduler cannot be reached.
         ExtraMissingError: Dask is not installed.
     """
-    if not (settings.workers or settings.scheduler):
+    if not (settings.processes or settings.scheduler):
         yield Pool()
         return
     distributed = imported("distributed")
@@ -85,7 +71,7 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
     with (
         _quiet(),
         distributed.LocalCluster(
-            n_workers=settings.workers,
+            n_workers=settings.processes,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.archive.filling.pool_settings import PoolSettings
 from visup.commands.options import Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
-from visup.runs.settings import WatchSettings
+from visup.runs.settings import Option, WatchSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from visup.archive.filling.filling import FillResult
     from visup.archive.filling.plan import FailedClip, Plan
-    from visup.archive.filling.pool import PoolSettings
     from visup.archive.filling.watching import ClipOutcome
     from visup.archive.lake import Lake
 
@@ -45,16 +45,28 @@ FILLED = (
     "motion",
     "preset",
     "attention",
+    *("workers", "scheduler", "memory_gb"),
+    *("plan", "retry"),
 )
 """Settings of all clips; those of live sources, and of one clip alone, are left out."""
 
 app = typer.Typer(no_args_is_help=True)
 
 
+@dataclass(frozen=True, slots=True)
+class FillOptions:
+    """What else may be wanted of filling a lake."""
+
+    plan: Annotated[bool, Option("Only say what would be done.", "--plan")] = False
+    retry: Annotated[bool, Option("Try clips again that were put aside.", "--retry")] = False
+
+
 @app.command("run")
-@takes(WatchSettings, only=FILLED)
+@takes(WatchSettings, PoolSettings, FillOptions, only=FILLED)
 def run(
     setting: Given,
+    where: Given,
+    wanted: Given,
     sources: Annotated[
         list[str],
         typer.Argument(
@@ -62,27 +74,6 @@ def run(
         ),
     ],
     into: Into,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=0, help="Processes; 0 for this one alone (default: one for each core)."
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Use the workers of this Dask scheduler, such as tcp://head:8786.",
-        ),
-    ] = None,
-    memory_gb: Annotated[
-        float | None,
-        typer.Option(metavar="NUMBER", help="What a worker may take, gigabytes."),
-    ] = None,
-    plan: Annotated[bool, typer.Option("--plan", help="Only say what would be done.")] = False,
-    retry: Annotated[
-        bool, typer.Option("--retry", help="Try clips again that were put aside.")
-    ] = False,
     settings_file: SettingsFile = None,
 ) -> None:
     """Watch many clips, on many workers, and put the runs into a lake.
@@ -94,24 +85,22 @@ def run(
     from visup.archive.filling.clips import clips_of
     from visup.archive.filling.filling import begin_anew, only_filler
     from visup.archive.filling.plan import make_plan
-    from visup.archive.filling.pool import PoolSettings
     from visup.archive.lake import MARK, Lake
     from visup.terminal.console import make_console
 
-    console = make_console()
+    console, pool, options = make_console(), PoolSettings(**where), FillOptions(**wanted)
     settings = watch_settings("", setting, settings_file)
-    count = workers if workers is not None else 0 if scheduler else os.cpu_count() or 1
     clips = clips_of(sources)
-    if plan:
+    if options.plan:
         there = Lake.open(into) if (into / MARK).exists() else None
-        _print_plan(console, into, make_plan(there, clips, settings), count)
+        _print_plan(console, into, make_plan(there, clips, settings), pool.processes)
         return
     lake = Lake.create(into)
     with only_filler(lake):
-        begin_anew(lake, retry=retry)
+        begin_anew(lake, retry=options.retry)
         todo = make_plan(lake, clips, settings)
-        _print_plan(console, into, todo, count)
-        result = _filled(console, lake, todo, PoolSettings(count, scheduler, memory_gb))
+        _print_plan(console, into, todo, pool.processes)
+        result = _filled(console, lake, todo, pool)
     for text in _closing(result):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if result.failed else 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,13 +63,14 @@ def run(
 
 def _teller(*, as_json: bool) -> Tell:
     """What writes each message to standard error with the time, in UTC."""
+    from visup.agent.storage.wall_clock import utc_text
     from visup.terminal.console import make_console
     from visup.wording import escaped_json
 
     console = make_console(stderr=True, soft_wrap=True, markup=False)
 
     def tell(camera: str, text: str) -> None:
-        now = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        now = utc_text(time.time())
         record = {"time": now, "camera": camera, "text": text}
         console.print(escaped_json(record) if as_json else f"{now} {camera}: {text}")
 

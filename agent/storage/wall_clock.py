@@ -1,0 +1,149 @@
+"""When things were by the clock on the wall, beside the seconds of the source: UTC, with its zone.
+
+A run is reasoned about in seconds of its source, so that equal frames give equal events. Of a camera it is
+known besides when each frame came. That is kept as anchors: at this second of the source it was that time.
+One is enough while both clocks agree; there are more where a run was resumed, or the wall's clock was set.
+"""
+
+from __future__ import annotations
+
+import math
+import socket
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import pairwise
+from typing import Any
+
+from visup.agent.model.records import Frame
+from visup.agent.model.step import Step
+
+TOLERANCE_S = 1.0
+"""So far the two clocks may differ: records say when a thing was, not how long it took."""
+
+MOST_ANCHORS = 10_000
+LATEST = 253402300799.0
+"""The end of the year 9999: what is told of later times makes no sense."""
+
+
+@dataclass(frozen=True, slots=True)
+class WallClock:
+    """Times of the source as times of the wall.
+
+    Attributes:
+        anchors: Pairs of seconds of the source and seconds since 1970 in UTC; the first ones ascend.
+    """
+
+    anchors: tuple[tuple[float, float], ...] = ()
+
+    @classmethod
+    def read(cls, told: object) -> WallClock:
+        """The clock of a recorded run; one without anchors where there is none that makes sense."""
+        pairs = told if isinstance(told, list | tuple) else ()
+        anchors = tuple(
+            (float(pair[0]), float(pair[1]))
+            for pair in pairs[:MOST_ANCHORS]
+            if isinstance(pair, list | tuple) and len(pair) == 2 and all(map(_is_time, pair))
+        )
+        ascends = all(a[0] < b[0] for a, b in pairwise(anchors))
+        return cls(anchors if ascends else ())
+
+    def seconds(self, time_s: float) -> float | None:
+        """Seconds since 1970 at a time of the source, or None where nobody knows.
+
+        >>> WallClock(((0.0, 1000.0), (60.0, 5000.0))).seconds(61.5)
+        5001.5
+        """
+        if not self.anchors:
+            return None
+        number = bisect_right(self.anchors, (time_s, math.inf)) - 1
+        at, wall = self.anchors[max(0, number)]
+        return wall + time_s - at
+
+    def text(self, time_s: float) -> str | None:
+        """The same as text, or None.
+
+        >>> WallClock(((0.0, 0.0),)).text(90.0625)
+        '1970-01-01T00:01:30.062Z'
+        """
+        seconds = self.seconds(time_s)
+        return None if seconds is None else utc_text(seconds)
+
+    def anchored(self, time_s: float, wall_s: float) -> WallClock:
+        """This clock where it agrees with what is now, else one with a further anchor.
+
+        Args:
+            time_s: Seconds of the source, no earlier than that of the last anchor.
+            wall_s: Seconds since 1970.
+        """
+        known = self.seconds(time_s)
+        if known is not None and abs(known - wall_s) <= TOLERANCE_S:
+            return self
+        kept = [a for a in self.anchors if a[0] < time_s]
+        return WallClock((*kept, (time_s, wall_s))[-MOST_ANCHORS:])
+
+
+def _is_time(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= LATEST
+
+
+def utc_text(seconds: float) -> str:
+    """Seconds since 1970 as a text that sorts, to the millisecond, with its zone.
+
+    >>> utc_text(1795455235.0181)
+    '2026-11-23T17:33:55.018Z'
+    """
+    whole = datetime.fromtimestamp(min(max(seconds, 0.0), LATEST), UTC)
+    return whole.strftime("%Y-%m-%dT%H:%M:%S.") + f"{whole.microsecond // 1000:03d}Z"
+
+
+class RecordStamp:
+    """What stands in every record besides what it tells: camera, host, and when it was.
+
+    An observer of the steps of a camera; other sources tell no time of the wall.
+
+    Args:
+        camera: Its name; None to leave camera and host out.
+        clock: As far as it is known from an earlier part of the run.
+        live: Whether it is a camera that is watched, so that what is said without a time is said now.
+        now: Seconds since 1970.
+
+    Attributes:
+        clock: As far as it is known now.
+        lag: How long ago it was what a time of the source shows, seconds.
+        changed: Told of each further anchor.
+    """
+
+    def __init__(
+        self,
+        camera: str | None = None,
+        clock: WallClock | None = None,
+        *,
+        live: bool = False,
+        now: Callable[[], float] = time.time,
+    ) -> None:
+        self.named = {"camera": camera, "host": socket.gethostname()} if camera else {}
+        self._live = live
+        self.clock = clock or WallClock()
+        self.lag: Callable[[float], float] = lambda time_s: 0.0
+        self.changed: Callable[[WallClock], None] = lambda clock: None
+        self._now = now
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Compare the clocks after a step."""
+        clock = self.clock.anchored(step.time, self._now() - self.lag(step.time))
+        if clock is not self.clock:
+            self.clock = clock
+            self.changed(clock)
+
+    def of(self, time_s: float | None) -> Mapping[str, Any]:
+        """The keys of a record.
+
+        Args:
+            time_s: When it was, seconds of the source; None for now.
+        """
+        now = utc_text(self._now()) if self._live else None
+        at = now if time_s is None else self.clock.text(time_s)
+        return {**self.named, **({"at": at} if at else {})}

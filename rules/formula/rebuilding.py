@@ -1,0 +1,83 @@
+"""The same tree with some of its nodes changed: objects named, values of `let` put in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, cast
+
+from visup.rules.formula.nodes import (
+    And,
+    Comparison,
+    Formula,
+    FutureOperator,
+    Last,
+    Let,
+    MOfN,
+    Node,
+    Not,
+    Or,
+    PastOperator,
+    Predicate,
+    Previous,
+    Quantified,
+    Since,
+    Until,
+)
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Variable,
+    WindowFunction,
+)
+
+_PARTS: dict[type, tuple[str, ...]] = {
+    Let: ("value", "at", "part"),
+    **dict.fromkeys((Since, Until, Comparison, Arithmetic), ("left", "right")),
+    **dict.fromkeys(
+        (Not, PastOperator, FutureOperator, Previous, MOfN, Last, Quantified), ("part",)
+    ),
+    **dict.fromkeys((Negative, WindowFunction), ("part",)),
+}
+"""Where the nodes that a node is made of stand in it."""
+
+
+def rebuilt(node: Node, change: Callable[[Node], Node | None]) -> Node:
+    """The same tree with some nodes changed.
+
+    Args:
+        node: The root.
+        change: What stands in the place of a node; None to leave it and look at its parts.
+    """
+    changed = change(node)
+    if changed is not None:
+        return changed
+    if isinstance(node, And | Or | PointwiseFunction):
+        return replace(node, parts=tuple(rebuilt(p, change) for p in node.parts))  # type: ignore[arg-type]
+    names = _PARTS.get(type(node), ())
+    changes: dict[str, Any] = {n: rebuilt(getattr(node, n), change) for n in names}
+    return replace(node, **changes) if changes else node
+
+
+def substituted(node: Node, names: Mapping[str, str]) -> Node:
+    """The same tree with variables replaced by the names of objects."""
+
+    def change(part: Node) -> Node | None:
+        if isinstance(part, Predicate | Measure):
+            return replace(part, words=tuple(names.get(w, w) for w in part.words))
+        return None
+
+    return rebuilt(node, change)
+
+
+def bound(node: Formula, variable: Variable) -> Formula:
+    """The same formula in which a name stands for what `let` says."""
+
+    def change(part: Node) -> Node | None:
+        free = isinstance(part, Variable) and part.part is None and part.name == variable.name
+        return replace(variable, span=part.span) if free else None  # type: ignore[union-attr]
+
+    found: Any = rebuilt(node, change)
+    return cast("Formula", found)

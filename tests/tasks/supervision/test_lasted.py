@@ -1,0 +1,50 @@
+"""`(touching(a, b) for 2 s)` within a condition: it must have held for so long."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.tasks.scripted import Script, Spell, task_of, watch
+from visup.agent import Verdict
+from visup.tasks.grammar.parser import read
+from visup.tasks.supervision.supervise import finish
+
+DOCK = "<dock> ::= converging(arm, satellite) ends when {}"
+tenths = st.integers(10, 90).map(lambda n: n / 10)
+
+
+@settings(max_examples=15)
+@given(st.lists(st.tuples(tenths, tenths), max_size=3))
+def test_alone_it_says_what_the_stage_condition_says(spells: list[tuple[float, float]]) -> None:
+    script = Script([Spell("touching", at, at + lasts) for at, lasts in spells])
+    texts = ("touching(arm, satellite) for 2 s", "(touching(arm, satellite) for 2 s)")
+    one, other = (task_of(watch(script, 12.0, DOCK.format(t), fps=5.0)) for t in texts)
+    assert (one.verdict, one.confidence) == (other.verdict, other.confidence)
+
+
+@pytest.mark.parametrize(
+    ("condition", "good"),
+    [
+        ("(touching(arm, satellite) for 2 s) and not coupled(arm, satellite)", True),
+        ("(touching(arm, satellite) for 4 s) and not coupled(arm, satellite)", False),
+        ("not (touching(arm, satellite) for 4 s) and coupled(arm, satellite)", True),
+        ("(coupled(arm, satellite) for 4 s) or (touching(arm, satellite) for 2 s)", True),
+    ],
+)
+def test_it_may_stand_among_others(condition: str, good: bool) -> None:
+    script = Script(
+        [
+            Spell("converging", 0.5, 3.0),
+            Spell("touching", 3.0, 6.0),
+            Spell("coupled", 6.5, 8.0),
+        ]
+    )
+    played = watch(script, 10.0, DOCK.format(condition), fps=5.0)
+    assert (finish(task_of(played)) is Verdict.SUCCEEDED) == good
+
+
+def test_it_reads_back() -> None:
+    text = DOCK.format("not (touching(a, b) and seen(a) for 2 s) or (seen(b) for wait)")
+    assert str(read(text)) == text

@@ -1,0 +1,108 @@
+"""SQL over a lake that reads the lake and does nothing else.
+
+DuckDB is let into the folder of the tables and no other, its settings are locked, and only statements that
+read are taken: a question can neither read another file, nor write one, nor reach the network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from visup.agent.model.errors import VisupError
+from visup.archive.asking.views import definitions, escaped, quoted
+from visup.archive.extra import imported
+from visup.archive.lake import TABLES_FOLDER, Lake
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MEMORY_GB = 2.0
+
+
+class QueryError(VisupError):
+    """A question to a lake cannot be answered as it is put."""
+
+
+@dataclass(frozen=True, slots=True)
+class LakeDatabase:
+    """A lake that can be asked.
+
+    Attributes:
+        connection: Of DuckDB, locked.
+    """
+
+    connection: Any
+
+    def ask(self, sql: str) -> pa.Table:
+        """The answer to one SELECT.
+
+        Raises:
+            QueryError: It is none, or cannot be answered.
+        """
+        duckdb = imported("duckdb")
+        try:
+            statements = self.connection.extract_statements(sql)
+            if len(statements) != 1:
+                raise QueryError(
+                    f"these are {len(statements)} statements" if statements else "nothing is asked",
+                    expected="one SELECT",
+                )
+            # Not EXPLAIN either: EXPLAIN ANALYZE runs what it explains.
+            if statements[0].type != duckdb.StatementType.SELECT:
+                raise QueryError(
+                    f"a lake is only read, and this is {statements[0].type.name}",
+                    expected="SELECT ..., or WITH ... SELECT ...",
+                )
+            return self.connection.sql(sql).to_arrow_table()
+        except duckdb.Error as fault:
+            raise _told(fault) from fault
+
+
+@contextmanager
+def open_database(lake: Lake, memory_gb: float = MEMORY_GB) -> Iterator[LakeDatabase]:
+    """A lake as a database, closed at the end.
+
+    Args:
+        lake: The lake.
+        memory_gb: What a question may take.
+
+    Raises:
+        QueryError: The tables cannot be read.
+        ExtraMissingError: DuckDB is not installed.
+    """
+    duckdb = imported("duckdb")
+    tables = (lake.path / TABLES_FOLDER).absolute()
+    offline = {"autoinstall_known_extensions": "false", "autoload_known_extensions": "false"}
+    with duckdb.connect(":memory:", config=offline) as connection:
+        try:
+            for statement in definitions(tables):
+                connection.execute(statement)
+            for setting in (
+                "TimeZone = 'UTC'",
+                "enable_progress_bar = false",
+                f"memory_limit = '{memory_gb:g}GB'",
+                "temp_directory = ''",
+                f"allowed_directories = [{quoted(f'{tables}/')}, {quoted(f'{escaped(tables)}/')}]",
+                "enable_external_access = false",
+                "lock_configuration = true",
+            ):
+                connection.execute(f"SET {setting}")
+        except duckdb.Error as fault:
+            raise QueryError(f"the tables cannot be read ({fault})", where=str(tables)) from fault
+        yield LakeDatabase(connection)
+
+
+def _told(fault: Exception) -> QueryError:
+    """What DuckDB says, as visup says it."""
+    kind, name = str(fault).partition(": ")[::2], type(fault).__name__
+    text = kind[1].strip() or str(fault)
+    hints = {
+        "PermissionException": "a question reads the tables of its lake and nothing else",
+        "OutOfMemoryException": "ask for less, group earlier, or give more with --memory-gb",
+        "CatalogException": "visup query LAKE --tables shows what there is",
+        "BinderException": "visup query LAKE --tables shows what there is",
+    }
+    return QueryError(text, hint=hints.get(name))

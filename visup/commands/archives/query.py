@@ -1,0 +1,120 @@
+"""`visup query`: questions to a lake, in SQL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from visup.commands.options import Given, takes
+from visup.runs.settings import Option
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from rich.console import Console
+
+    from visup.archive.asking.database import LakeDatabase
+
+SHOWN_ROWS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerOptions:
+    """What becomes of an answer, and what is shown besides."""
+
+    form: Annotated[
+        str | None, Option("table (default), csv, json or parquet.", "--format", "FORM")
+    ] = None
+    out: Annotated[
+        Path | None, Option("Write the answer there: .csv, .json or .parquet.", metavar="FILE")
+    ] = None
+    tables: Annotated[
+        bool, Option("Show what can be asked: tables and their columns.", "--tables")
+    ] = False
+    examples: Annotated[
+        bool, Option("Show fifteen questions with their answers.", "--examples")
+    ] = False
+    memory_gb: Annotated[float, Option("What a question may take, gigabytes.", at_least=0.1)] = 2.0
+
+
+@takes(AnswerOptions)
+def query(
+    wanted: Given,
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    sql: Annotated[
+        str | None, typer.Argument(metavar="SQL", help="One SELECT, in the SQL of DuckDB.")
+    ] = None,
+) -> None:
+    """Ask a lake in SQL; it is read and nothing else.
+
+    Exit code: 0 when there is an answer, also an empty one, 2 when the question cannot be answered.
+    """
+    from visup.archive.asking.answers import answer_rows, as_csv, format_of, write_answer
+    from visup.archive.asking.database import open_database
+    from visup.archive.lake import Lake
+    from visup.terminal.console import echo, echo_json, make_console
+
+    options = AnswerOptions(**wanted)
+    if not (sql or options.tables or options.examples):
+        raise typer.BadParameter("ask something, or see --examples", param_hint="SQL")
+    form = format_of(options.form, options.out)
+    console = make_console(whole=True)
+    with open_database(Lake.open(lake), options.memory_gb) as database:
+        if options.tables:
+            _show_tables(console, database)
+        if options.examples:
+            _show_examples(console, database)
+        if not sql:
+            return
+        answer = database.ask(sql)
+    if options.out:
+        write_answer(answer, form, options.out)
+        echo(f"{options.out}: {answer.num_rows} rows")
+    elif form == "json":
+        echo_json(answer_rows(answer))
+    elif form == "csv":
+        echo(as_csv(answer), nl=False)
+    else:
+        _show(console, answer)
+
+
+def _show(console: Console, answer: pa.Table) -> None:
+    from rich.markup import escape
+    from rich.text import Text
+
+    from visup.archive.asking.answers import cell
+    from visup.terminal.tables import table
+
+    shown = table(*map(escape, answer.column_names))
+    head = answer.slice(0, SHOWN_ROWS)
+    columns = [column.to_pylist() for column in head.columns]
+    for row in zip(*columns, strict=True):
+        shown.add_row(*(Text(cell(value)) for value in row))
+    console.print(shown)
+    more = answer.num_rows - head.num_rows
+    if more > 0:
+        console.print(f"and {more} more rows: --format csv shows all", markup=False)
+
+
+def _show_examples(console: Console, database: LakeDatabase) -> None:
+    from visup.archive.asking.examples import EXAMPLES
+
+    for number, question in enumerate(EXAMPLES, 1):
+        console.print(f"{number}. {question.words}", markup=False, style="bold")
+        console.print(f"   {question.sql}\n", markup=False, soft_wrap=True)
+        _show(console, database.ask(question.sql))
+        console.print()
+
+
+def _show_tables(console: Console, database: LakeDatabase) -> None:
+    from visup.archive.asking.views import RELATIONS, VIEWS
+
+    for name, (meaning, _) in VIEWS.items():
+        columns = database.ask(f"SELECT * FROM {name} LIMIT 0").column_names
+        console.print(f"{name}: {meaning}", markup=False, soft_wrap=True)
+        console.print(f"    {', '.join(columns)}", markup=False, soft_wrap=True)
+    said = f"Each relation, the times in which it held: {', '.join(RELATIONS)}"
+    console.print(said, markup=False, soft_wrap=True)
+    console.print("The tables as they are stored: lake.runs, lake.objects, ...", markup=False)
