@@ -11,6 +11,7 @@ import typer
 from visup.agent.memory_limit import check_memory
 from visup.agent.model.errors import VisupError
 from visup.commands.archives.archive import app as archive_app
+from visup.commands.archives.find import find
 from visup.commands.archives.query import query
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.check import check
@@ -57,6 +58,7 @@ app.command("step")(step)
 app.command("replay")(replay)
 app.command("export")(export)
 app.command("query")(query)
+app.command("find")(find)
 app.command("render")(render)
 app.command("doctor")(doctor)
 app.add_typer(serve_app, name="serve", help="Many cameras under one supervisor.")

@@ -107,10 +107,10 @@ class RecordStamp:
     Args:
         camera: Its name; None to leave camera and host out.
         clock: As far as it is known from an earlier part of the run.
+        live: Whether it is a camera that is watched, so that what is said without a time is said now.
         now: Seconds since 1970.
 
     Attributes:
-        live: Whether it is a camera that is watched, so that what is said without a time is said now.
         clock: As far as it is known now.
         lag: How long ago it was what a time of the source shows, seconds.
         changed: Told of each further anchor.
@@ -120,10 +120,12 @@ class RecordStamp:
         self,
         camera: str | None = None,
         clock: WallClock | None = None,
+        *,
+        live: bool = False,
         now: Callable[[], float] = time.time,
     ) -> None:
         self.named = {"camera": camera, "host": socket.gethostname()} if camera else {}
-        self.live = False
+        self._live = live
         self.clock = clock or WallClock()
         self.lag: Callable[[float], float] = lambda time_s: 0.0
         self.changed: Callable[[WallClock], None] = lambda clock: None
@@ -142,6 +144,6 @@ class RecordStamp:
         Args:
             time_s: When it was, seconds of the source; None for now.
         """
-        now = utc_text(self._now()) if self.live else None
+        now = utc_text(self._now()) if self._live else None
         at = now if time_s is None else self.clock.text(time_s)
         return {**self.named, **({"at": at} if at else {})}

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
 from math import inf
 
 from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
@@ -17,166 +16,20 @@ from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 from visup.agent.model.did_you_mean import closest
 from visup.rules.language.edits import Repair, edits
 from visup.rules.language.keywords import KEYWORDS
+from visup.rules.language.slips import SLIPS
 
 MOST_REPAIRS = 12
 MUCH_FURTHER = 8
 """Where a usual slip lets so many more characters be read, it is what was meant, whatever else is wrong."""
 
 
-@dataclass(frozen=True, slots=True)
-class Slip:
-    """A frequent slip.
-
-    Attributes:
-        pattern: What it looks like.
-        new: What is meant; a template as of `re.Match.expand`, or a function of the match.
-    """
-
-    pattern: re.Pattern[str]
-    new: str | Callable[[re.Match[str]], str]
-
-
-def _slip(pattern: str, new: str | Callable[[re.Match[str]], str]) -> Slip:
-    return Slip(re.compile(pattern), new)
-
-
-WORDS_OF_PAIRS = (
-    "touching",
-    "converging",
-    "diverging",
-    "coupled",
-    "moving_together",
-    "overlapping",
-)
-_CALL = r"\w+\([^()]*\)"
-_AMOUNT = r"-?[\d.]+ ?(?:px/s2|px/s|px|%|ms|min|mm|m/s|m|cm|s|h|deg/s|deg|/s)?"
-
-
-def _some_of(least: int, parts: list[str]) -> str:
-    """That some of several are true, as the language says it."""
-    return f"({' or '.join(' and '.join(some) for some in combinations(parts, least))})"
-
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
-SLIPS = (
-    _slip(r"<->|<=>|↔|⇔", "iff"),
-    _slip(r"->|=>|→|⇒", "implies"),
-    _slip(r"&&|&|∧", "and"),
-    _slip(r"\|\||\||∨", "or"),
-    _slip(r"!(?!=)\s*|¬", "not "),
-    _slip(r"===", "=="),
-    _slip(r"≤|=<", "<="),
-    _slip(r"≥", ">="),
-    _slip(r"≠|<>|!==", "!="),
-    _slip(r"(?<![=<>!])=(?![=>])", "=="),
-    _slip(r"\b(?:seconds?|secs?|sec)\b", "s"),
-    _slip(r"\b(?:milliseconds?|msecs?)\b", "ms"),
-    _slip(r"\b(?:minutes?|mins)\b", "min"),
-    _slip(r"\b(?:hours?|hrs?)\b", "h"),
-    _slip(r"\bmet(?:er|re)s?\b", "m"),
-    _slip(r"\b(?:centimet(?:er|re)s?)\b", "cm"),
-    _slip(r"\b(?:pixels?|pix|met(?:er|re)s?)\b", "px"),
-    _slip(r"\b(?:degrees?|°)\b", "deg"),
-    _slip(r"\bpercent\b", "%"),
-    _slip(rf"({_CALL})\s*(?:===?|=|\bis)\s*true\b", r"\1"),
-    _slip(rf"({_CALL})\s*(?:!==?|<>|\bis\s+not)\s*true\b", r"not \1"),
-    _slip(rf"({_CALL})\s*(?:===?|=|\bis)\s*false\b", r"not \1"),
-    _slip(rf"({_CALL})\s*(?:!==?|<>|\bis\s+not)\s*false\b", r"\1"),
-    _slip(r"\b(north|south)[ ]+(east|west)_of\b", r"\1_\2_of"),
-    _slip(rf"\bnever\s+({_CALL})", r"not \1"),
-    _slip(rf"({_CALL})\s+never\b", r"not \1"),
-    _slip(rf"({_CALL})\s+(?:for\s+)?(?:more|longer)\s+than\s+(\d[\d.]*\s*(?:ms|s|min|h))\b", r"\1 for \2"),
-    _slip(r"\bat\s+the\s+same\s+time\s+as\b", "and"),
-    _slip(rf"\b(eventually|henceforth)\s+({_CALL})\s*(\[[^\]\n]*\])", r"\1\3 \2"),
-    _slip(r"\b(in\s+\d+)\s*/\s*(\d+\s+samples)\b", r"\1 of \2"),
-    _slip(r"\b(exists|forall)\s+(\w+)\s+in\s+\w+\s*:", r"\1 \2:"),
-    _slip(rf"\b(let\s+\w+\s+be\s[^:\n]*?\sat\s+{_CALL})\s+(?:and|or)\s+(?![^\n]*:)", r"\1: "),
-    _slip(
-        rf"\b(?:any|some|at\s+least)\s+([2-3])\s+of\s*\(({_CALL}(?:\s*,\s*{_CALL}){{1,3}})\)",
-        lambda m: _some_of(int(m[1]), re.findall(_CALL, m[2])),
-    ),
-    _slip(
-        r"\bthere\s+(?:is|are|exists?)\s+(?:an?\s+|some\s+|one\s+)?(\w+)\s*(?::|with|such that|so that)",
-        r"exists \1:",
-    ),
-    _slip(rf"({_CALL})\s+in\s+\[?({_AMOUNT})\s*(?:\.\.|to|-)\s*({_AMOUNT})\]?", r"\1 >= \2 and \1 <= \3"),
-    _slip(
-        rf"\b(\d+)\s+(?:out\s+)?of\s+(?:the\s+last\s+)?(\d+)\s+(?:samples|frames)\s+({_CALL})",
-        r"\3 in \1 of \2 samples",
-    ),
-    _slip(r"\bfor\s+(\d+)\s*(?:frames|samples)\b", r"in \1 of \1 samples"),
-    _slip(r"\bwithin\s+(\d+)\s*(?:frames|samples)\b", r"in 1 of \1 samples"),
-    _slip(rf"({_CALL})\s+between\s+({_AMOUNT})\s+and\s+({_AMOUNT})", r"\1 >= \2 and \1 <= \3"),
-    _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})", r"\1 \2 \3 and \3 \4 \5"),
-    _slip(r"\b(?:for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+ago\b", r"within \1 to \1 ago"),
-    _slip(r"\b(?:for|within)\s+-\s*(\d)", r"for \1"),
-    _slip(rf"\b(for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s*,?\s+({_CALL})", r"\3 \1 \2"),
-    _slip(
-        r"\b([a-z])[ ]+(?:is[ ]+)?([a-z_]{3,})[ ]+(?:to[ ]+|with[ ]+)?([a-z])\b",
-        lambda m: f"{closest(m[2], WORDS_OF_PAIRS) or m[2]}({m[1]}, {m[3]})",
-    ),
-    _slip(r"\b(?:under|below)\b", "<"),
-    _slip(r"\b(?:over|above|exceeds)\b", ">"),
-    _slip(r"(\d),(\d)", r"\1.\2"),
-    _slip(r"\b(?:is\s+)?(?:less|smaller|lower|nearer|closer)\s+than\b|\bis\s+below\b", "<"),
-    _slip(r"\b(?:is\s+)?(?:more|greater|larger|higher)\s+than\b|\bis\s+above\b", ">"),
-    _slip(r"\b(?:is|equals)\b(?=\s*\d)", "=="),
-    _slip(rf"(\[{_AMOUNT})\s*(?:to|,|:|-)\s*({_AMOUNT}\])", r"\1 .. \2"),
-    _slip(rf"\bif\s+({_CALL})\s*,?\s*then\s+({_CALL})", r"\1 implies \2"),
-    _slip(r"\b([a-z_]{3,})[ ]+([a-z])\b(?!\s*[:(,])", r"\1(\2)"),
-    _slip(r"\b(in\s+\d+\s+of\s+\d+)\b(?! *\w)", r"\1 samples"),
-    _slip(r"\b(?:historically|globally)\b", "always"),
-    _slip(r"\b(?:previously|prev|last)\b(?!\s*\()", "previous"),
-    _slip(r"\bnext\b", "eventually[0.1 s .. 0.1 s]"),
-    _slip(r"\b(?:finally|F|future)(?=\s*\[)", "eventually"),
-    _slip(r"\b(?:G|always|globally|henceforth)(?=\s*\[)", "henceforth"),
-    _slip(r"\b(?:O|P|once)(?=\s*\[)", "once"),
-    _slip(r"\b(?:H|historically)(?=\s*\[)", "always"),
-    _slip(r"\b(?:exist|some|any)\b(?=\s+\w+\s*:)", "exists"),
-    _slip(r"\b(?:all|each|every|for all)\b(?=\s+\w+\s*:)", "forall"),
-    _slip(
-        r"\b(exists|forall)\s+(\w+\((?:[^()]*,\s*)?(\w+)\))", lambda m: f"{m[1]} {m[3]}: {m[2]}"
-    ),
-    _slip(r"\b(exists|forall)\s+(\w+)\s+(?!may|:)", r"\1 \2: "),
-    _slip(r"\blet\s+(\w+)\s+(?=\w+\()(?!be\b|as\b|is\b)", r"let \1 be "),
-    _slip(r"\blet\s+(\w+)\s*(?::=|==?|\bas\b|\bis\b)\s*", r"let \1 be "),
-    _slip(r"\b(let\s+\w+\s+be\s[^:\n]*?)\s+(?:when|if|once|on|upon|whenever)\b", r"\1 at"),
-    _slip(rf"\b(let\s+\w+\s+be\s[^:\n]*?\sat\s+{_CALL})\s*(?:,|\bin\b|;|->)", r"\1:"),
-    _slip(
-        r"\b(?:freeze|remember|store|bind|define|set|with|where)\s+(\w+)\s*(?:=|:=|\bas\b|\bbe\b)\s*",
-        r"let \1 be ",
-    ),
-    _slip(r"\b(let\s+\w+\s+be\s[^:\n]*?\))\s*:", r"\1 at true:"),
-    _slip(r"\bbefore\b", "and previous"),
-    _slip(r"\bduring\b|\bwhile\b", "and"),
-    _slip(r"\bbut\b|\bthen\b", "and"),
-    _slip(r"//", "#"),
-    _slip(r"\b(?:if|whenever|condition)\b", "when"),
-    _slip(r"\b(?:except|exclude)\b", "unless"),
-    _slip(r"\b(?:tell|print|message)\b", "say"),
-    _slip(r"\b(?:error|fatal|alarm|emergency)\b", "critical"),
-    _slip(r"\b(?:warn)\b", "warning"),
-    _slip(r"\b(?:note|notice|debug)\b", "info"),
-    _slip(r"'([^'\"\n]*)'", r'"\1"'),
-    _slip(r"\bsay\s+([^\"\s][^\"\n]*)", lambda m: f'say "{m[1].strip()}"'),
-    _slip(r"(say\s+\"[^\"\n]*\")(\s+)((?:hold|cooldown)\s+[\d.]+\s*\w+)", r"\3\2\1"),
-    _slip(r"(say\s+\"[^\"\n]*\")(\s+)(when\s[^\n]*)", r"\3\2\1"),
-    _slip(
-        r"\brule\s+(\w+)\s+(\w+(?:[\s,]+\w+)*)\s*:",
-        lambda m: f"rule {m[1]}({', '.join(_WORD.findall(m[2]))}):",
-    ),
-    _slip(r"\brule\s*\(", "rule name("),
-    _slip(r"\brule\s+([A-Za-z]\w*)-(\w+)", r"rule \1_\2"),
-    _slip(r"\bunless\b", "or"),
-    _slip(r"\b(\w+)\s+(\w)\s*,?\s+(\w)\b(?!\s*[:(])", r"\1(\2, \3)"),
-)  # fmt: skip
-"""In the order in which they are tried; each only where it meets the place of the error."""
-
 WORDS = (
     *(w for w in KEYWORDS if w not in ("may", "repeat")),
     *("may repeat", "info", "warning", "critical"),
 )
 PUT_IN = (")", " s", " px", ":", " samples", ": info", "(", ",", " and", "]", ' say "{a}"', "[5 s]")
+AMOUNTS = ("0", "20 px", "2 s", "20 px/s", "20 deg", "20 deg/s", "2 m")
+"""What may be compared with, where nothing stands behind a sign."""
 Parses = Callable[[str], UnexpectedInput | None]
 """The syntax error of a text, or None."""
 
@@ -228,6 +81,7 @@ class _RepairTrial:
         """The first that makes sense, else that can be read, else that can be read further."""
         further: Repair | None = None
         readable: Repair | None = None
+        slips_first = False
         for tried in repairs:
             repair = replace(tried, old=self.text[tried.begin : tried.end])
             if repair.old == repair.new:
@@ -243,6 +97,11 @@ class _RepairTrial:
             moved = place_of(changed, left)[0] - len(repair.new)
             if further is None and moved > repair.end + 1 and moved > self.at + self.length:
                 further, self.moved = repair, moved - self.at
+                gained = moved + repair.end - repair.begin - self.at
+                slips_first = readable is None and gained > MUCH_FURTHER
+        if slips_first:
+            self.moved = MUCH_FURTHER + 1
+            return further
         self.moved = self.moved if readable is None else inf
         return readable or further
 
@@ -289,8 +148,11 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
         # A bracket may be missing further back in the line.
         place = max(low, text.rfind("\n", 0, before)) + match.end()
         yield Repair(place, place, ")")
+    if text[before - 1 : before] in ("<", ">", "="):
+        yield from (Repair(before, before, f" {amount}") for amount in AMOUNTS)
     for new in PUT_IN:
-        yield Repair(before, before, new)
+        if text[before - 1 : before].isdigit() or new not in (" s", " px"):
+            yield Repair(before, before, new)
     if length:
         yield Repair(at, at + length, "")
     previous = _word_before(text, before)

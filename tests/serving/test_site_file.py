@@ -13,7 +13,14 @@ from tests.docs.blocks import blocks
 from tests.paths import ROOT
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.runs.settings import WatchSettings
-from visup.serving.site.form import CameraTable, LimitsTable, RecordingTable, SiteTable, schema_text
+from visup.serving.site.form import (
+    CameraTable,
+    LimitsTable,
+    RecordingTable,
+    SiteTable,
+    WebhooksTable,
+    schema_text,
+)
 from visup.serving.site.reading import read_site
 from visup.serving.site.records import SiteCamera
 
@@ -163,6 +170,16 @@ def test_beliefs_hang_on_files_too_but_on_no_password(tmp_path: Path) -> None:
     assert changed == replace(first, fingerprint=changed.fingerprint)
 
 
+def test_keys_of_webhooks_come_from_the_environment(tmp_path: Path) -> None:
+    head = '[webhooks]\nkey = "${KEY}"\nheaders = { Authorization = "Bearer ${TOKEN}" }\n'
+    one = camera(tmp_path, head + ONE, KEY="swordfish", TOKEN="marlin")
+    assert one.options.webhook_key == "swordfish"
+    assert one.options.webhook_headers == {"Authorization": "Bearer marlin"}
+    assert "marlin" not in repr(one)
+    (fault,) = faults(tmp_path, head + ONE)
+    assert "has no variable" in str(fault)
+
+
 def test_the_schema_knows_every_key_of_a_camera() -> None:
     form = json.loads(schema_text())
     keys = form["$defs"]["CameraTable"]["properties"]
@@ -174,9 +191,9 @@ def test_the_schema_knows_every_key_of_a_camera() -> None:
 def test_the_page_has_every_key_and_its_example_is_a_site(tmp_path: Path) -> None:
     page = ROOT / "docs" / "serving.md"
     text = page.read_text(encoding="utf-8")
-    for table in (SiteTable, CameraTable, RecordingTable, LimitsTable):
+    for table in (SiteTable, CameraTable, RecordingTable, LimitsTable, WebhooksTable):
         assert [key for key in table.model_fields if not re.search(rf"[`\[]{key}[`\]]", text)] == []
-    (block,) = (b for b in blocks() if b.page == page and b.kind == "toml")
+    block, *_ = (b for b in blocks() if b.page == page and b.kind == "toml")
     example = block.text.replace("/run/secrets/cell", "secret.txt")
     (tmp_path / "secret.txt").write_text("marlin")
     site = read_site(written(tmp_path, example), {"ALARM_URL": "https://example.org/alarms"})

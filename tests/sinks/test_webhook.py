@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import hmac
 import itertools
 import socket
 import threading
@@ -10,8 +12,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from visup.agent.model.errors import SettingsError
+from visup.runs.settings import RunOptions
 from visup.sinks.webhook import Webhook
+from visup.sinks.webhook_access import SIGNATURE, TIMESTAMP, WebhookAccess
 
 Answer = Callable[[socket.socket], None]
 
@@ -134,3 +141,51 @@ def test_records_follow_each_other_on_new_connections() -> None:
             one.deliver({"n": n})
         one.close()
     assert [g[-7:] for g in got] == [b'{"n":0}', b'{"n":1}', b'{"n":2}']
+
+
+def test_a_server_can_tell_who_sent_a_record_and_when() -> None:
+    access = WebhookAccess({"Authorization": "Bearer marlin"}, key="swordfish")
+    with server(says(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")) as (url, got):
+        Webhook(url, access=access).deliver({"record": "alert"})
+    head, _, body = got[0].partition(b"\r\n\r\n")
+    headers = dict(line.split(": ", 1) for line in head.decode().split("\r\n")[1:])
+    now = time.time()
+    assert headers["Authorization"] == "Bearer marlin"
+    timestamp = headers[TIMESTAMP]
+    assert abs(int(timestamp) - now) < 30
+    mac = hmac.new(b"swordfish", timestamp.encode() + b"." + body, hashlib.sha256)
+    assert headers[SIGNATURE] == f"sha256={mac.hexdigest()}"
+
+
+@given(st.binary(max_size=30), st.binary(max_size=30), st.integers(0, 10**10))
+def test_another_body_or_time_has_another_signature(a: bytes, b: bytes, now: int) -> None:
+    access = WebhookAccess(key="swordfish")
+    one, other = access.headers_for(a, now), access.headers_for(b, now)
+    assert (one == other) == (a == b)
+    assert access.headers_for(a, now + 1)[SIGNATURE] != one[SIGNATURE]
+    assert WebhookAccess(key="marlin").headers_for(a, now)[SIGNATURE] != one[SIGNATURE]
+
+
+@pytest.mark.parametrize(
+    ("headers", "key"),
+    [
+        ({"A b": "x"}, None),
+        ({"": "x"}, None),
+        ({"Content-Length": "1"}, None),
+        ({"x-visup-signature": "1"}, None),
+        ({"X-Key": "marlin\r\nHost: other"}, None),
+        ({"X-Key": "mårlin"}, None),
+        ({}, ""),
+    ],
+)
+def test_what_cannot_stand_in_a_request_is_refused_without_the_secret(
+    headers: dict[str, str], key: str | None
+) -> None:
+    with pytest.raises(SettingsError) as refused:
+        WebhookAccess(headers, key)
+    assert "rlin" not in str(refused.value)
+
+
+def test_neither_header_nor_key_is_shown() -> None:
+    assert "marlin" not in repr(WebhookAccess({"A": "marlin"}, "marlin"))
+    assert "marlin" not in repr(RunOptions(webhook_headers={"A": "marlin"}, webhook_key="marlin"))

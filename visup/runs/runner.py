@@ -24,6 +24,7 @@ from visup.redaction import redacted
 from visup.rules.safety.ending import open_rules
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.inputs.preflight import check_cast
+from visup.runs.inputs.run_sinks import sinks_of
 from visup.runs.inputs.stop_signals import stop_signals
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
@@ -216,9 +217,8 @@ class _Run:
         self._settings, self._folder, self._stack = settings, folder, stack
         # Before the journal: what is refused leaves no run behind.
         told = past.recording.facts().get("clock") if past else None
-        self._stamp = RecordStamp(options.camera, WallClock.read(told))
-        self._stamp.live = self.source.live
-        self._sinks = Sinks(options.sinks, settings.source, options.closing_s, self._stamp)
+        self._stamp = RecordStamp(options.camera, WallClock.read(told), live=self.source.live)
+        self._sinks = sinks_of(options, settings.source, self._stamp)
         stack.callback(self._sinks.close)
         self._recorder = (
             Recorder(settings, self.source, folder, options, resume=past is not None)

@@ -263,5 +263,9 @@ class RunOptions:
         str | None,
         Option("Name of the camera: it and the host then stand in every record.", metavar="NAME"),
     ] = None
+    webhook_headers: Mapping[str, str] = field(default_factory=dict, repr=False)
+    """Headers of each request of a webhook."""
+    webhook_key: str | None = field(default=None, repr=False)
+    """Key by which what webhooks send is signed."""
     closing_s: float = 5.0
     """How long each sink may take to deliver what is left when the run ends, seconds."""

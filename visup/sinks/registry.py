@@ -13,6 +13,7 @@ from visup.redaction import redacted
 from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import CLOSING_S, MOST_WAITING, Outbox, Sink
+from visup.sinks.webhook_access import WebhookAccess
 
 MOST_STEPS = 64
 """Whole steps that may wait, with their frames: some tens of megabytes."""
@@ -22,11 +23,12 @@ KINDS = (
 )
 
 
-def open_sink(wanted: str) -> Sink:
+def open_sink(wanted: str, access: WebhookAccess | None = None) -> Sink:
     """A sink, from `--sink`.
 
     Args:
         wanted: `KIND:PLACE`, one of `KINDS`.
+        access: How servers of webhooks know that records come from here.
 
     Raises:
         SettingsError: There is no such kind, or the place is not as it should be.
@@ -34,9 +36,13 @@ def open_sink(wanted: str) -> Sink:
         OutputError: Its file cannot be written.
     """
     kind, colon, place = wanted.partition(":")
-    if not (colon and place and kind in _MAKERS):
+    if not (colon and place and kind in (*_MAKERS, "webhook")):
         shown = f"{kind}{colon}{redacted(place)}"
         raise SettingsError(f"--sink {shown!r} cannot be read", expected=f"one of: {KINDS}")
+    if kind == "webhook":
+        from visup.sinks.webhook import Webhook
+
+        return Webhook(place, access=access)
     return _MAKERS[kind](wanted, place)
 
 
@@ -48,6 +54,7 @@ class Sinks:
         source: What is watched.
         closing_s: How long each may take to deliver what is left at the end, seconds.
         stamp: What else stands in every record of an alert.
+        access: How servers of webhooks know that records come from here.
 
     Attributes:
         outboxes: One for each.
@@ -59,9 +66,10 @@ class Sinks:
         source: str,
         closing_s: float = CLOSING_S,
         stamp: RecordStamp | None = None,
+        access: WebhookAccess | None = None,
     ) -> None:
         self._closing_s = closing_s
-        made = [open_sink(w) for w in wanted]
+        made = [open_sink(w, access) for w in wanted]
         self.outboxes = [Outbox(s, _room(s)) for s in made]
         self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
         self._alerts = AlertSender(self._of_alerts, source, stamp)
@@ -106,12 +114,6 @@ def _jsonl(wanted: str, place: str) -> Sink:
     return to_stdout()
 
 
-def _webhook(wanted: str, place: str) -> Sink:
-    from visup.sinks.webhook import Webhook
-
-    return Webhook(place)
-
-
 def _mqtt(wanted: str, place: str) -> Sink:
     from visup.sinks.mqtt import Mqtt
 
@@ -133,7 +135,6 @@ def _rerun(wanted: str, place: str) -> Sink:
 _MAKERS: dict[str, Callable[[str, str], Sink]] = {
     "jsonl": _jsonl,
     "file": lambda wanted, place: to_file(wanted, Path(place)),
-    "webhook": _webhook,
     "mqtt": _mqtt,
     "otel": _otel,
     "rerun": _rerun,

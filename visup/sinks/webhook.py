@@ -21,6 +21,7 @@ from urllib3.util import parse_url
 from visup.agent.model.errors import SettingsError
 from visup.redaction import redacted
 from visup.sinks.lines import TIMEOUT_S, json_text
+from visup.sinks.webhook_access import WebhookAccess
 
 TRIES = 4
 FIRST_WAIT_S = 0.5
@@ -45,6 +46,7 @@ class Webhook:
         url: http or https.
         timeout_s: For one attempt, seconds.
         tries: Attempts for one record.
+        access: How the server knows that it comes from here.
         wait: Waits so many seconds; an argument so that tests need not.
 
     Raises:
@@ -57,6 +59,7 @@ class Webhook:
         *,
         timeout_s: float = TIMEOUT_S,
         tries: int = TRIES,
+        access: WebhookAccess | None = None,
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
         if not _is_web_address(url):
@@ -65,6 +68,7 @@ class Webhook:
             )
         self.name = f"webhook:{_shown(url)}"
         self._url, self._timeout_s, self._tries, self._wait = url, timeout_s, tries, wait
+        self._access = access or WebhookAccess()
         self._opened: list[socket.socket] = []
         self._manager = _manager(url, self._opened)
 
@@ -100,7 +104,7 @@ class Webhook:
                 "POST",
                 self._url,
                 body=body,
-                headers=HEADERS,
+                headers={**HEADERS, **self._access.headers_for(body, time.time())},
                 timeout=self._timeout_s,
                 retries=False,
                 redirect=False,

@@ -33,6 +33,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "Ask many runs": {
             "archive": "watch many clips; a lake with the tables of their runs",
             "query": "ask a lake in SQL",
+            "find": "find where a condition was true, in all runs of a lake",
         },
         "Extend and measure": {
             "behaviours": "list, check and create plug-ins",

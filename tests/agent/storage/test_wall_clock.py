@@ -70,6 +70,6 @@ def test_a_stamp_says_who_and_when() -> None:
     assert told["host"]
     assert told["at"] == "2026-11-23T17:33:56.500Z"
     assert "at" not in stamp.of(None)
-    stamp.live = True
-    assert stamp.of(None)["at"] == "2026-11-23T17:34:55.000Z"
+    live = RecordStamp("cell", live=True, now=lambda: NOW + 60.0)
+    assert live.of(None)["at"] == "2026-11-23T17:34:55.000Z"
     assert RecordStamp().of(1.5) == {}

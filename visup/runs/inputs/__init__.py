@@ -2,5 +2,5 @@
 
 Read `zones.py` and `plugins.py` (what is loaded), `presets.py` (what suits a kind of scene),
 `preflight.py` (what is known before the first frame) and `speed.py` (what a run takes of this machine);
-`stop_signals.py` is how one stops it.
+`run_sinks.py` is where alerts go, `stop_signals.py` how one stops it.
 """

@@ -17,6 +17,7 @@ from visup.runs.settings import RunOptions, WatchSettings
 from visup.serving.site.form import CameraTable, SiteTable
 from visup.serving.site.placeholders import filled
 from visup.serving.site.records import ProcessLimits, SiteCamera
+from visup.sinks.webhook_access import WebhookAccess
 from visup.tasks import shipped_tasks
 from visup.version import __version__
 
@@ -63,6 +64,7 @@ def camera_of(
         attention=one.attention,
     )
     sinks = (filled(s, environment, folder) for s in (*site.sinks, *one.sinks))
+    access = _access(site, folder, environment)
     options = RunOptions(
         video=site.recording.video,
         report=site.recording.report,
@@ -70,10 +72,20 @@ def camera_of(
         keep_gb=site.recording.keep_gb,
         state_every_s=site.recording.state_every,
         camera=one.name,
+        webhook_headers=access.headers,
+        webhook_key=access.key,
         closing_s=CLOSING_S,
     )
     limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
     return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
+
+
+def _access(site: SiteTable, folder: Path, environment: Mapping[str, str]) -> WebhookAccess:
+    given = site.webhooks
+    return WebhookAccess(
+        headers={k: filled(v, environment, folder) for k, v in given.headers.items()},
+        key=None if given.key is None else filled(given.key, environment, folder),
+    )
 
 
 def _path(name: str, folder: Path) -> Path:

@@ -32,6 +32,13 @@ class RecordingTable(_Table):
     )
 
 
+class WebhooksTable(_Table):
+    """How servers of webhooks know that records come from here; values may be placeholders."""
+
+    headers: dict[str, str] = Field(default={}, description="Headers of each request.")
+    key: str | None = Field(default=None, description="Key by which each record is signed.")
+
+
 class LimitsTable(_Table):
     """What the process of a camera may take before it is ended and begun anew."""
 
@@ -121,6 +128,7 @@ class SiteTable(_Table):
     sinks: Names = Field(default=(), description="Where alerts of all cameras go, as of `--sink`.")
     recording: RecordingTable = RecordingTable()
     limits: LimitsTable = LimitsTable()
+    webhooks: WebhooksTable = WebhooksTable()
     camera: tuple[CameraTable, ...] = Field(
         description="One table [[camera]] for each camera.",
         json_schema_extra={"minItems": 1, "maxItems": MOST_CAMERAS},

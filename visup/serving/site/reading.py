@@ -21,6 +21,7 @@ from visup.serving.site.form import (
     LimitsTable,
     RecordingTable,
     SiteTable,
+    WebhooksTable,
 )
 from visup.serving.site.records import Site
 from visup.serving.site.toml_lines import locate, syntax_location
@@ -149,6 +150,7 @@ def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
     kinds: dict[str | int, type[BaseModel]] = {
         "recording": RecordingTable,
         "limits": LimitsTable,
+        "webhooks": WebhooksTable,
         "camera": CameraTable,
     }
     return (

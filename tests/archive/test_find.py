@@ -1,0 +1,285 @@
+"""Looking for conditions: what is found is what an agent would have said, and nothing is left out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from tests.archive.recordings import meeting, record
+from tests.cli import Call, caller
+from visup.agent import Truth
+from visup.agent.model.errors import ErrorGroup, RuleError, SettingsError
+from visup.agent.model.step import Step
+from visup.archive.adding import add_run
+from visup.archive.asking.database import LakeDatabase, QueryError, open_database
+from visup.archive.finding.judge import ConditionJudge
+from visup.archive.finding.pattern import desugared, read_pattern
+from visup.archive.finding.search import (
+    ConditionSearch,
+    RulesSearch,
+    find,
+    read_search,
+)
+from visup.archive.lake import Lake
+from visup.rules.language.parser import load_rules
+from visup.rules.safety.queries import verdicts
+from visup.runs.replay import replay
+from visup.runs.settings import WatchSettings
+
+pytest.importorskip("duckdb", reason="needs the extra `cluster`")
+pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
+
+DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
+RELATIONS = (
+    *("converging", "diverging", "keeping_distance", "touching", "coupled"),
+    *("north_of", "moving_towards", "close_to", "partially_overlapping"),
+)
+
+
+@pytest.fixture(scope="module")
+def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
+    """Runs in which the arm comes near, touches, or never does; one without an arm."""
+    place = tmp_path_factory.mktemp("find")
+    made = Lake.create(place / "lake")
+    for number, (count, shift) in enumerate([(45, 0.0), (45, 45.0), (25, -90.0), (14, 0.0)]):
+        record(place / f"run-{number}", meeting(count, 20, shift), DOCK)
+        add_run(made, place / f"run-{number}")
+    return made
+
+
+@pytest.fixture(scope="module")
+def database(lake: Lake) -> Iterator[LakeDatabase]:
+    with open_database(lake) as found:
+        yield found
+
+
+def random_condition(rng: Random, depth: int) -> str:
+    """A condition about `a` and `b` with any of the operators."""
+    if depth == 0 or rng.random() < 0.15:
+        names = ("a, b", "b, a")
+        return rng.choice(
+            [f"{rng.choice(RELATIONS)}({rng.choice(names)})"] * 6
+            + ["gap(a, b) < 60 px", "(moving(a) and touching(a, b))"]
+        )
+
+    def part() -> str:
+        return f"({random_condition(rng, depth - 1)})"
+
+    span = f"{rng.choice((0.2, 0.7, 1.5))} s"
+    operators: list[Callable[[], str]] = [
+        lambda: f"{part()} and {part()}",
+        lambda: f"{part()} or {part()}",
+        lambda: f"not {part()}",
+        lambda: f"{part()} implies {part()}",
+        lambda: f"{part()} within {span}",
+        lambda: f"{part()} for {span}",
+        lambda: f"{part()} within 0.3 s to 1.1 s ago",
+        lambda: f"{part()} for 0.3 s to 1.1 s ago",
+        lambda: f"once {part()}",
+        lambda: f"always {part()}",
+        lambda: f"previous {part()}",
+        lambda: f"{part()} since {part()}",
+        lambda: f"{part()} since[{span}] {part()}",
+        lambda: f"{part()} until[{span}] {part()}",
+        lambda: f"{part()} release[{span}] {part()}",
+        lambda: f"eventually[{span}] {part()}",
+        lambda: f"henceforth[{span}] {part()}",
+        lambda: f"{part()} in 60 % of {span}",
+        lambda: f"{part()} in 2 of 4 samples",
+        lambda: f"last({part()}, {span})",
+        lambda: f"(exists c: (touching(b, c) and converging(a, c))) or {part()}",
+        lambda: f"(exists c: converging(a, c)) and {part()}",
+        lambda: f"{part()} and (forall c: not touching(a, c))",
+    ]
+    return rng.choice(operators)()
+
+
+def conditions(count: int) -> list[str]:
+    rng, found = Random(23), dict[str, None]()
+    while len(found) < count:
+        text = random_condition(rng, rng.randint(0, 3))
+        if "a" in text and "b" in text:
+            found[text] = None
+    return list(found)
+
+
+CONDITIONS = conditions(24)
+
+
+def test_what_is_found_is_what_the_agent_says(
+    lake: Lake, database: LakeDatabase, tmp_path: Path
+) -> None:
+    rules = tmp_path / "all.rules"
+    rules.write_text(
+        "\n".join(f'rule f{n}(a, b): info when {text} say "."' for n, text in enumerate(CONDITIONS))
+    )
+    compared, pruned = 0, 0
+    searches = [ConditionSearch(read_pattern(text)) for text in CONDITIONS]
+    possible = [set(search.possible_runs(database)) for search in searches]
+    for run in lake.runs():
+        recording, settings = lake.recorded(run)
+        judges = [ConditionJudge(s.pattern) for s in searches]
+
+        def look(step: Step, judges: list[ConditionJudge] = judges) -> None:
+            nonlocal compared
+            for n, judge in enumerate(judges):
+                judge(step)
+                order = judge.pattern.rule.variables
+                said = verdicts(step.mind, f"f{n}")
+                assert judge.before is not None
+                for reading in judge.before.readings:
+                    meant = dict(zip(order, reading.objects, strict=True))
+                    assert reading.truth == said[meant["a"], meant["b"]], CONDITIONS[n]
+                    compared += 1
+
+        replay(recording, replace(settings, rules=(rules,)), tell=look)
+        for n, judge in enumerate(judges):
+            is_hit = any(h.truth == Truth.TRUE for h in judge.hits())
+            assert not is_hit or run in possible[n], CONDITIONS[n]
+            pruned += run not in possible[n]
+    assert compared > 5_000
+    assert pruned > 0.1 * len(CONDITIONS) * len(lake.runs())
+
+
+@pytest.mark.parametrize("rule", ["near", "meets", "none_such"])
+def test_rules_are_found_where_a_replay_raises_them(
+    lake: Lake, database: LakeDatabase, tmp_path: Path, rule: str
+) -> None:
+    when = {
+        "near": "converging(a, b) for 0.3 s",
+        "meets": "touching(a, b) and converging(a, b) within 1 s",
+        "none_such": "coupled(a, b) and south_of(a, b)",
+    }[rule]
+    file = tmp_path / "mine.rules"
+    file.write_text(
+        f'rule {rule}(a, b): warning when {when} hold 0.5 s say "{{a}} {{is}} near {{b}}."'
+    )
+    search = RulesSearch(file, load_rules(file))
+    found = {f.run: f.hits for f in find(lake, search, search.possible_runs(database))}
+    for run in lake.runs():
+        recording, settings = lake.recorded(run)
+        told = replay(recording, replace(settings, rules=(file,))).events
+        opened = [
+            (e["time"], tuple(e["objects"]))
+            for e in told
+            if e["data"].get("alert_kind") == rule and e["kind"] == "alert"
+        ]
+        assert [(round(h.begin, 6), h.objects) for h in found.get(run, ())] == opened
+
+
+def test_names_are_those_whom_the_agent_meant(lake: Lake, database: LakeDatabase) -> None:
+    by_actor = ConditionSearch(read_pattern("converging(arm, satellite) for 0.3 s"))
+    by_model = ConditionSearch(read_pattern("converging(arm, spartan) for 0.3 s"))
+    runs = by_actor.possible_runs(database)
+    assert runs == by_model.possible_runs(database)
+    found = [f.hits for f in find(lake, by_actor, runs)]
+    assert [h.names for hits in found for h in hits]
+    assert {h.names for hits in found for h in hits} == {("arm", "spartan")}
+    assert all(0 < (h.confidence or 0) <= 1 for hits in found for h in hits)
+    with pytest.raises(QueryError, match="nobody in this lake was ever taken for 'satelite'"):
+        ConditionSearch(read_pattern("touching(arm, satelite)")).possible_runs(database)
+
+
+def test_unknown_is_kept_apart_and_looked_for_everywhere(
+    lake: Lake, database: LakeDatabase
+) -> None:
+    pattern = read_pattern("touching(a, b)")
+    sure, all_of_it = ConditionSearch(pattern), ConditionSearch(pattern, unknown=True)
+    assert all_of_it.possible_runs(database) == lake.runs()
+    told = {f.run: f.hits for f in find(lake, all_of_it, lake.runs())}
+    assert {h.truth for hits in told.values() for h in hits} == {"true", "unknown"}
+    for found in find(lake, sure, sure.possible_runs(database)):
+        assert found.hits == tuple(h for h in told[found.run] if h.truth == "true")
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("f(a)", "f(a)"),
+        ("f(a) and g(a)", "f(a) and g(a)"),
+        ("(f(a) and then_(a))", "(f(a) and then_(a))"),
+        ("f(a) and then g(a)", "(g(a)) and (previous once (f(a)))"),
+        ("f(a) and  then g(a) within 2 s", "(g(a)) and ((f(a)) within 1 ms to 2 s ago)"),
+        (
+            "f(a) and then g(a) within 2 s and then h(a)",
+            "(h(a)) and (previous once ((g(a)) and ((f(a)) within 1 ms to 2 s ago)))",
+        ),
+    ],
+)
+def test_and_then_is_written_in_the_rule_language(text: str, meant: str) -> None:
+    assert desugared(text) == meant
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("and then touching(a, b)", "something is missing beside `and then`"),
+        ("touching(a, b) and then", "something is missing beside `and then`"),
+        ("gap(a, b)", "neither true nor false"),
+        ("toching(a, b)", "touching"),
+        ("touching(a, b", ""),
+        ("", ""),
+    ],
+)
+def test_what_is_no_condition_is_refused(text: str, said: str) -> None:
+    with pytest.raises((RuleError, ErrorGroup)) as told:
+        read_search(text)
+    assert said in str(told.value)
+
+
+def test_a_sequence_is_true_once_it_is_complete(tmp_path: Path) -> None:
+    """Of the truths of each step it follows when a sequence is true."""
+    record(tmp_path, meeting(45, 20), DOCK)
+    lake = Lake.create(tmp_path / "lake")
+    key, _ = add_run(lake, tmp_path)
+    first, then = "converging(arm, spartan)", "diverging(arm, spartan)"
+    truths: list[tuple[float, bool, bool, bool]] = []
+    judges = [
+        ConditionJudge(read_pattern(t))
+        for t in (first, then, f"{first} and then {then} within 1 s")
+    ]
+
+    def look(step: Step) -> None:
+        for judge in judges:
+            judge(step)
+        held = [any(r.truth == "true" for r in j.before.readings) for j in judges if j.before]
+        truths.append((step.time, held[0], held[1], held[2]))
+
+    recording, settings = lake.recorded(key)
+    replay(recording, settings, tell=look)
+    assert any(t[3] for t in truths)
+    for n, (time, _, second, both) in enumerate(truths):
+        # A sample speaks until the next one.
+        ends = [t for t, *_ in truths[1 : n + 1]]
+        spoke = any(t[1] and end > time - 1.0 for t, end in zip(truths, ends, strict=False))
+        assert both == (second and spoke), time
+
+
+def test_the_command(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    visup: Call = caller(monkeypatch, capfd)
+    told = visup("find", lake.path, "converging(arm, satellite) for 0.3 s")
+    assert told.code == 0, told.err
+    assert "arm (1), spartan (2), confidence" in told.out
+    assert "open it: visup step " in told.out
+    lines = visup(
+        "find", lake.path, "converging(arm, satellite) for 0.3 s", "--json"
+    ).out.splitlines()
+    hits = [json.loads(line) for line in lines]
+    assert f"Hits: {len(hits)}, in " in told.out
+    assert {tuple(h["names"]) for h in hits} == {("arm", "spartan")}
+    assert all(Path(h["folder"], "journal.sqlite").is_file() for h in hits)
+    none = visup("find", lake.path, "coupled(arm, spartan) and south_of(arm, spartan)")
+    assert (none.code, none.out.splitlines()[-1]) == (
+        1,
+        "Hits: 0, in 0 of 4 runs; looked into: 0 (0 %).",
+    )
+    assert visup("find", lake.path, "gap(a, b)").code == 2
+    with pytest.raises(SettingsError, match="alerts are raised or not"):
+        read_search("mine.rules", unknown=True)

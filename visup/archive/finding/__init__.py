@@ -1,0 +1,6 @@
+"""Questions in visup's own language: where in a lake a condition was true.
+
+Read `pattern.py` (what is looked for), `possible.py` (which runs can have it, by the intervals of relations),
+`judge.py` (a condition judged step by step) and `search.py` (those runs reasoned about again, which gives
+what an agent would have said).
+"""

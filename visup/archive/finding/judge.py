@@ -1,0 +1,117 @@
+"""A condition judged step by step in a run, as rules are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from visup.agent import Mind, Truth
+from visup.agent.model.step import Step
+from visup.archive.stretches import StepTime, Stretches
+from visup.rules.safety.compiled_rules import compile_rules
+from visup.rules.safety.expression import Expression, ExpressionResult
+from visup.rules.safety.reasoner import rule_memory
+
+Objects = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """A time in which a condition was true, or unknown.
+
+    Attributes:
+        objects: Ids, in the order of the condition's names.
+        names: What they were taken for when it began.
+        truth: 'true' or 'unknown'.
+        begin: Seconds.
+        end: Seconds at which it was so no more, or of the last step.
+        open: Whether it was still so when the run ended.
+        confidence: Lowest among the relations of the condition that were true meanwhile; None without any.
+        rule: Which one, where rules were looked for.
+    """
+
+    objects: Objects
+    names: tuple[str, ...]
+    truth: str
+    begin: float
+    end: float
+    open: bool
+    confidence: float | None = None
+    rule: str = ""
+
+
+@dataclass(slots=True)
+class ConditionJudge:
+    """Judges a condition step by step."""
+
+    pattern: Expression
+    before: ExpressionResult | None = None
+    last: StepTime | None = None
+    stretches: Stretches[tuple[int, ...], tuple[str, Objects]] = field(default_factory=Stretches)
+    names: dict[tuple[int, int], str] = field(default_factory=dict)
+    confidences: dict[tuple[Objects, int], float] = field(default_factory=dict)
+
+    def __call__(self, step: Step) -> None:
+        """Judge it after one step."""
+        number = self.last.number + 1 if self.last else 0
+        self.last = StepTime(number, step.frame_index, step.time)
+        mind = as_rules_see(step.mind)
+        self.before = self.pattern.judge(mind, self.before)
+        self.stretches.add(self.last, self._values(mind, self.before))
+
+    def hits(self) -> tuple[Hit, ...]:
+        """All hits so far, by time."""
+        found = self.stretches.finish(self.last) if self.last else []
+        return tuple(
+            Hit(
+                s.value[1],
+                tuple(self.names[s.begin.number, i] for i in s.value[1]),
+                s.value[0],
+                s.begin.time,
+                s.end.time,
+                s.open,
+                self._confidence(s.value[1], s.begin.number, s.begin.number + s.columns[3])
+                if s.value[0] == Truth.TRUE
+                else None,
+            )
+            for s in sorted(found, key=lambda s: (s.begin.number, s.key))
+        )
+
+    def _values(
+        self, mind: Mind, judged: ExpressionResult
+    ) -> dict[tuple[int, ...], tuple[str, Objects]]:
+        """Of each set of objects the truth, and the choice for which it holds: true before unknown."""
+        found: dict[tuple[int, ...], tuple[str, Objects]] = {}
+        assert self.last is not None
+        for reading in judged.readings:
+            key, truth = tuple(sorted(reading.objects)), reading.truth
+            if truth is None or truth is Truth.FALSE:
+                continue
+            if key not in found or (truth is Truth.TRUE and found[key][0] != Truth.TRUE):
+                found[key] = truth.value, reading.objects
+            if truth is Truth.TRUE:
+                self._note_confidence(mind, reading.objects)
+        for objects in found:
+            self.names.update({(self.last.number, i): mind.objects[i].name for i in objects})
+        return found
+
+    def _note_confidence(self, mind: Mind, objects: Objects) -> None:
+        rule = self.pattern.rule
+        meant = dict(zip(rule.variables, objects, strict=True))
+        for call in compile_rules((rule,)).related(rule):
+            held = mind.relation(call.name, *(meant[w] for w in call.words))
+            if held is not None and held.truth is Truth.TRUE and self.last is not None:
+                at = objects, self.last.number
+                self.confidences[at] = min(self.confidences.get(at, 1.0), held.confidence)
+
+    def _confidence(self, objects: Objects, first: int, end: int) -> float | None:
+        found = [
+            self.confidences[objects, n]
+            for n in range(first, end)
+            if (objects, n) in self.confidences
+        ]
+        return round(min(found), 6) if found else None
+
+
+def as_rules_see(mind: Mind) -> Mind:
+    """A mind with its tasks as they stood when the rules of its step were judged."""
+    return replace(mind, tasks=rule_memory(mind).tasks)

@@ -1,0 +1,176 @@
+"""Which runs of a lake can have a moment at which a condition is true, by the intervals of their relations.
+
+Of a formula the *possible times* are found: intervals that hold every moment at which it is true, for each
+choice of objects, and perhaps others. A relation is possible where it was recorded as true; `and` is possible
+where all its parts are; a window moves and widens the interval of its part. What says nothing about recorded
+relations (a quantity, a `not`) is possible always. What is not possible need not be looked at; what is
+possible is then judged exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+from visup.archive.asking.views import quoted
+from visup.rules.formula.nodes import (
+    And,
+    Formula,
+    FutureOperator,
+    Last,
+    MOfN,
+    Or,
+    PastOperator,
+    Predicate,
+    Previous,
+    Quantified,
+    Since,
+    TimeWindow,
+    Until,
+)
+from visup.rules.formula.units import TICKS
+from visup.rules.monitoring.samples import SAMPLE_HOLD
+from visup.rules.predicates.snapshot import RELATION_NAMES
+from visup.rules.relations.reasoner import COLUMNS
+
+HELD_S = SAMPLE_HOLD / TICKS + 0.1
+"""By how much intervals are widened: a sample speaks for so much of what follows; and for rounding."""
+EVER = 1e12
+SYMMETRIC = frozenset(
+    name for column in COLUMNS.each if column.rows[0] == column.rows[1] for name in column.names
+) | {"coupled"}
+"""Relations whose rows stand once for a pair."""
+
+
+@dataclass(frozen=True, slots=True)
+class PossibleTimes:
+    """Intervals in which something may be true, as a SELECT.
+
+    Attributes:
+        sql: Gives `run`, the variables, `low` and `high` (seconds).
+        variables: Of which objects.
+    """
+
+    sql: str
+    variables: tuple[str, ...]
+
+    def moved(self, low: float, high: float) -> PossibleTimes:
+        """The times from `low` to `high` seconds after these."""
+        names = "".join(f"{_name(v)}, " for v in self.variables)
+        sql = f"SELECT run, {names}low + {low!r} AS low, high + {high!r} AS high FROM ({self.sql})"
+        return PossibleTimes(sql, self.variables)
+
+    def of(self, variables: Sequence[str]) -> PossibleTimes:
+        """The same of fewer variables, whoever stands for the others."""
+        kept = tuple(v for v in self.variables if v in variables)
+        names = "".join(f"{_name(v)}, " for v in kept)
+        return PossibleTimes(f"SELECT DISTINCT run, {names}low, high FROM ({self.sql})", kept)
+
+    def meant(self, variable: str, who: str) -> PossibleTimes:
+        """The same where only some objects may stand for a variable.
+
+        Args:
+            variable: One of these, or another.
+            who: A SELECT of `run` and `object`.
+        """
+        if variable not in self.variables:
+            return self
+        same = f"w.run = t.run AND w.object = t.{_name(variable)}"
+        return PossibleTimes(
+            f"SELECT t.* FROM ({self.sql}) t SEMI JOIN ({who}) w ON {same}", self.variables
+        )
+
+
+def possible_times(formula: Formula) -> PossibleTimes | None:
+    """When a formula may be true; None for always."""
+    match formula:
+        case Predicate(name=name, words=(a, b)) if name in RELATION_NAMES and a != b:
+            return _relation(name, a, b)
+        case And(parts=parts):
+            found = [p for p in map(possible_times, parts) if p is not None]
+            return reduce(_both, found) if found else None
+        case Or(parts=parts):
+            return _either([possible_times(p) for p in parts])
+        case Quantified(kind="exists", variable=variable, part=part):
+            inner = possible_times(part)
+            others = [v for v in inner.variables if v != variable] if inner else []
+            return inner and inner.of(others)
+        case Previous(part=part):
+            return _moved(part, 0.0, HELD_S)
+        case Last(part=part, duration=duration):
+            return _moved(part, 0.0, duration.base)
+        case MOfN(part=part, of=of) if not formula.counts_samples and formula.least.value > 0:
+            return _moved(part, 0.0, of.base)
+    return _windowed(formula)
+
+
+def _windowed(formula: Formula) -> PossibleTimes | None:
+    match formula:
+        case PastOperator(kind="once", part=part, window=window):
+            return _moved(part, *_span(window))
+        case PastOperator(kind="always", part=part, window=window) if _from_now(window):
+            return possible_times(part)
+        case Since(right=right, window=window):
+            return _moved(right, *_span(window))
+        case FutureOperator(kind="eventually", part=part, window=TimeWindow(high=high)):
+            return _moved(part, 0.0, high.base)
+        case Until(right=right, window=TimeWindow(high=high)):
+            return _moved(right, 0.0, high.base)
+    return None
+
+
+def _moved(part: Formula, low: float, high: float) -> PossibleTimes | None:
+    found = possible_times(part)
+    return found and found.moved(low, high)
+
+
+def _span(window: TimeWindow | None) -> tuple[float, float]:
+    return (0.0, EVER) if window is None else (window.low.base, window.high.base)
+
+
+def _from_now(window: TimeWindow | None) -> bool:
+    """Whether a window has the present in it."""
+    return window is None or window.low.base == 0
+
+
+def _relation(name: str, a: str, b: str) -> PossibleTimes:
+    low, high = f'"begin" - {HELD_S!r}', f'"end" + {HELD_S!r}'
+    if name == "coupled":  # judged of what is hidden, too, which the recorded relation leaves open
+        low, high = repr(-EVER), repr(EVER)
+    rows = f"FROM lake.relations WHERE relation = {quoted(name)} AND truth = 'true'"
+    sql = f"SELECT run, a AS {_name(a)}, b AS {_name(b)}, {low} AS low, {high} AS high {rows}"
+    if name in SYMMETRIC:
+        turned = (
+            f"SELECT run, b AS {_name(a)}, a AS {_name(b)}, {low} AS low, {high} AS high {rows}"
+        )
+        sql = f"{sql} UNION ALL {turned}"
+    return PossibleTimes(sql, (a, b))
+
+
+def _both(one: PossibleTimes, other: PossibleTimes) -> PossibleTimes:
+    shared = [v for v in other.variables if v in one.variables]
+    more = [v for v in other.variables if v not in one.variables]
+    names = [f"l.{_name(v)}" for v in one.variables] + [f"r.{_name(v)}" for v in more]
+    same = "".join(f" AND l.{_name(v)} = r.{_name(v)}" for v in shared)
+    sql = (
+        f"SELECT l.run, {', '.join(names)}{', ' if names else ''}"
+        "greatest(l.low, r.low) AS low, least(l.high, r.high) AS high"
+        f" FROM ({one.sql}) l JOIN ({other.sql}) r"
+        f" ON l.run = r.run{same} AND l.low <= r.high AND r.low <= l.high"
+    )
+    return PossibleTimes(sql, (*one.variables, *more))
+
+
+def _either(parts: Sequence[PossibleTimes | None]) -> PossibleTimes | None:
+    known = [p for p in parts if p is not None]
+    if len(known) < len(parts):
+        return None
+    shared = [v for v in known[0].variables if all(v in p.variables for p in known)]
+    names = "".join(f"{_name(v)}, " for v in shared)
+    each = (f"SELECT run, {names}low, high FROM ({p.sql})" for p in known)
+    return PossibleTimes(" UNION ALL ".join(each), tuple(shared))
+
+
+def _name(variable: str) -> str:
+    return f'"of_{variable}"'

@@ -1,0 +1,219 @@
+"""A condition looked for in all runs of a lake, judged in each as an agent would have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+from visup.agent import Alert, Truth
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
+from visup.archive.asking.database import LakeDatabase, QueryError
+from visup.archive.asking.views import quoted
+from visup.archive.finding.judge import ConditionJudge, Hit
+from visup.archive.finding.pattern import read_pattern
+from visup.archive.finding.possible import PossibleTimes, possible_times
+from visup.archive.lake import Lake
+from visup.rules.formula.nodes import Rule
+from visup.rules.language.parser import load_rules
+from visup.rules.safety.expression import Expression
+from visup.runs.replay import replay
+from visup.runs.settings import WatchSettings
+
+_BY_ID = re.compile(r"object_(\d+)")
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRun:
+    """A run that was looked at.
+
+    Attributes:
+        run: Its key.
+        clip: What was watched.
+        folder: Where it can be opened.
+        hits: By time.
+    """
+
+    run: str
+    clip: str
+    folder: Path
+    hits: tuple[Hit, ...]
+
+
+class Search(Protocol):
+    """What is looked for."""
+
+    def possible_runs(self, database: LakeDatabase) -> list[str]:
+        """The runs in which it may be; in all others it is not.
+
+        Raises:
+            QueryError: It names somebody whom no run of the lake knows.
+        """
+
+    def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
+        """Where it is in a run, by time."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionSearch:
+    """Looks for the times in which a condition was true, or unknown.
+
+    Attributes:
+        pattern: The condition.
+        unknown: Whether times in which it was unknown are wanted, too; any run may have some.
+    """
+
+    pattern: Expression
+    unknown: bool = False
+
+    def possible_runs(self, database: LakeDatabase) -> list[str]:
+        """See `Search`."""
+        variables = self.pattern.rule.variables
+        who = {v: select for v in variables if (select := objects_meant(v)) is not None}
+        for variable, select in who.items():
+            if not database.ask(f"SELECT 1 FROM ({select}) LIMIT 1").num_rows:
+                raise _nobody(database, variable)
+        if self.unknown:
+            return runs_of(database, None, who)
+        return runs_of(database, possible_times(self.pattern.rule.when), who)
+
+    def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
+        """See `Search`."""
+        judge = ConditionJudge(self.pattern)
+        replay(recording, settings, tell=judge)
+        return tuple(h for h in judge.hits() if self.unknown or h.truth == Truth.TRUE)
+
+
+@dataclass(frozen=True, slots=True)
+class RulesSearch:
+    """Looks for the alerts that other rules would have raised.
+
+    Attributes:
+        file: A rules file.
+        rules: What it holds.
+    """
+
+    file: Path
+    rules: tuple[Rule, ...]
+
+    def possible_runs(self, database: LakeDatabase) -> list[str]:
+        """See `Search`."""
+        found = (runs_of(database, possible_times(rule.when), {}) for rule in self.rules)
+        return sorted({run for runs in found for run in runs})
+
+    def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
+        """See `Search`."""
+        alerts: dict[int, tuple[Alert, tuple[str, ...]]] = {}
+        last = 0.0
+
+        def look(step: Step) -> None:
+            nonlocal last
+            last = step.time
+            for alert in step.alerts:
+                named = tuple(step.mind.objects[i].name for i in alert.objects)
+                alerts[alert.id] = alert, alerts.get(alert.id, (alert, named))[1]
+
+        replay(recording, replace(settings, rules=(self.file,)), tell=look)
+        kinds = {rule.name for rule in self.rules}
+        return tuple(
+            Hit(
+                alert.objects,
+                names,
+                Truth.TRUE.value,
+                alert.opened,
+                last if alert.closed is None else alert.closed,
+                alert.closed is None,
+                rule=alert.kind,
+            )
+            for alert, names in alerts.values()
+            if alert.kind in kinds
+        )
+
+
+def read_search(text: str, *, unknown: bool = False) -> Search:
+    """What is looked for, from a condition or the name of a rules file.
+
+    Raises:
+        RuleError: It is neither.
+        ManyErrors: It has several faults.
+    """
+    if text.endswith(".rules"):
+        if unknown:
+            raise SettingsError(
+                "alerts are raised or not", hint="leave out --unknown, or look for a condition"
+            )
+        return RulesSearch(Path(text), load_rules(text))
+    return ConditionSearch(read_pattern(text), unknown)
+
+
+def find(lake: Lake, search: Search, runs: Iterable[str]) -> Iterator[FoundRun]:
+    """Look into runs.
+
+    Args:
+        lake: The lake.
+        search: What is looked for.
+        runs: Which runs; those that are possible are enough.
+
+    Yields:
+        Each run, also one without hits.
+
+    Raises:
+        OutputError: A run is damaged.
+    """
+    for run in runs:
+        recording, settings = lake.recorded(run)
+        hits = search.hits(recording, settings)
+        yield FoundRun(run, settings.source, lake.folder_of(run), hits)
+
+
+def runs_of(
+    database: LakeDatabase, times: PossibleTimes | None, who: Mapping[str, str]
+) -> list[str]:
+    """The runs with possible times and with somebody for every name.
+
+    Args:
+        database: The lake.
+        times: When it may be; None for always.
+        who: Variable -> SELECT of `run` and `object`.
+    """
+    for variable, select in who.items():
+        times = times and times.meant(variable, select)
+    sql = f"SELECT run FROM ({times.sql if times else 'SELECT run FROM lake.runs'})"
+    for select in who.values():
+        sql = f"SELECT run FROM ({sql}) SEMI JOIN ({select}) USING (run)"
+    found: list[str] = database.ask(f"SELECT DISTINCT run FROM ({sql}) ORDER BY run")[
+        "run"
+    ].to_pylist()
+    return found
+
+
+def objects_meant(variable: str) -> str | None:
+    """The objects that a name may ever have stood for, as a SELECT; None for a name that is anybody's."""
+    if by_id := _BY_ID.fullmatch(variable):
+        return f"SELECT run, object FROM lake.objects WHERE object = {by_id[1]}"
+    if len(variable) == 1:
+        return None
+    name, path = quoted(variable), quoted(f'$."{variable}"[*]')
+    return (
+        "SELECT o.run, o.object FROM lake.objects o JOIN lake.runs r USING (run)"
+        f" WHERE list_contains(o.names, {name}) OR list_contains(o.actors, {name})"
+        f" OR list_has_any(o.names, json_extract_string(r.actors, {path}))"
+    )
+
+
+def _nobody(database: LakeDatabase, name: str) -> QueryError:
+    known = database.ask(
+        "SELECT DISTINCT name FROM (SELECT unnest(names) AS name FROM lake.objects"
+        " UNION ALL SELECT unnest(actors) FROM lake.objects) ORDER BY name"
+    )
+    names = [n for n in known.column("name").to_pylist() if " " not in n]
+    return QueryError(
+        f"nobody in this lake was ever taken for '{name}'",
+        expected=f"one of: {', '.join(names[:20])}; or one letter for anybody" if names else None,
+        hint=did_you_mean(name, names),
+    )
