@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from difflib import get_close_matches
 
 from visup.agent.cycle.own_troubles import OWN_TROUBLES
 from visup.agent.model.did_you_mean import closest, did_you_mean
@@ -246,7 +247,7 @@ class _FormulaChecker:
             hint = did_you_mean(meant if meant in table else call.name, table)
             if call.name in (quantities if fact else words):
                 hint = "compare it with a number" if fact else "it is true or false"
-            yield call.span, f"there is no {kind} '{call.name}'", _listed(table), hint
+            yield call.span, f"there is no {kind} '{call.name}'", _nearest(call.name, table), hint
             return
         takes = table[call.name].takes
         if len(takes) != len(call.words):
@@ -348,6 +349,19 @@ def _often(node: MOfN) -> Iterator[Fault]:
     yield from _time(of, "of")
     if least.dimension != SHARE or not 0 < least.base <= 1:
         yield least.span, f"'{least}' is not a share of a time", "such as 60 %", "write `60 %`"
+
+
+def _nearest(word: str, known: Iterable[str]) -> str:
+    """All that is known if it is little, else what is spelt most like a word."""
+    names = list(known)
+    if len(names) <= MOST_LISTED:
+        return _listed(names)
+    near = get_close_matches(word, names, n=MOST_LISTED, cutoff=0.0)
+    return f"{_listed(near)}, or one of {len(names) - len(near)} more (docs/rules.md)"
+
+
+MOST_LISTED = 8
+"""Longer lists nobody reads."""
 
 
 def _listed(words: Iterable[str]) -> str:

@@ -121,11 +121,20 @@ def product(v: Pair, w: Pair, p: float) -> Pair:
 
 
 @compiled
+def ratio(p: float, q: float) -> float:
+    """One number by another, which is not 0; 0 by what is infinite, whatever it is."""
+    return 0.0 if q == inf or q == -inf else p / q
+
+
+@compiled
 def quotient(v: Pair, w: Pair, p: float) -> Pair:
     """The quotient; by an interval that holds 0, nothing is known of it."""
     if w[0] <= 0.0 <= w[1]:
         return -inf, inf
-    return product(v, (1.0 / w[1], 1.0 / w[0]), p)
+    # Divided once, and not multiplied by an inverse: the last digit decides ties.
+    one, two = ratio(v[0], w[0]), ratio(v[0], w[1])
+    three, four = ratio(v[1], w[0]), ratio(v[1], w[1])
+    return min(min(one, two), min(three, four)), max(max(one, two), max(three, four))
 
 
 @compiled

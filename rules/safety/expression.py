@@ -189,7 +189,14 @@ def objects_named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, .
     return tuple(i for i in present if mind.objects[i].name in models)
 
 
+UNFINISHED = "(,<>=+-*/["
+"""Signs with which nothing ends."""
+
+
 def _rule(text: str, variables: tuple[str, ...]) -> Rule:
+    last = text.rstrip()[-1:]
+    if last and last in UNFINISHED:
+        raise RuleError(f"'{text}' ends too early", expected=f"what belongs behind '{last}'")
     lines = f"rule watched({', '.join(variables)}): info when\n{text}\n{_SAY}"
     try:
         (rule,) = parse_rules(lines, "<expression>")

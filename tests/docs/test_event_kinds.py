@@ -22,7 +22,7 @@ def constants(node: ast.AST) -> Iterator[str]:
 
 def kinds_in_code() -> set[str]:
     """First arguments of all calls that make an event; those by a variable are found where it is set."""
-    found = set(KINDS.values()) | {"stage_started"}
+    found = set(KINDS.values())
     for path in (p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and node.args:
@@ -31,6 +31,8 @@ def kinds_in_code() -> set[str]:
             if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
                 # A kind and its sentence, for a call elsewhere.
                 found |= set(constants(next(iter(node.value.elts), node.value))) & set(EVENT_KINDS)
+            if isinstance(node, ast.Yield) and node.value is not None:
+                found |= set(constants(node.value)) & set(EVENT_KINDS)
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "kind":
                 found |= set(constants(node.value)) & set(EVENT_KINDS)
     return found

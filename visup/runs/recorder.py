@@ -24,7 +24,7 @@ from visup.agent.storage.jsonable import to_jsonable
 from visup.agent.storage.wall_clock import RecordStamp, WallClock
 from visup.percepts.video import VideoSource
 from visup.redaction import has_secret, redacted
-from visup.runs.settings import SECRET_LEFT_OUT, RunOptions, WatchSettings
+from visup.runs.settings import SOURCE_REDACTED, RunOptions, WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
 from visup.version import __version__
@@ -233,7 +233,7 @@ class Recorder:
 
 def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
     """What is noted of a run when it begins."""
-    left_out = {SECRET_LEFT_OUT: True} if has_secret(settings.source) else {}
+    left_out = {SOURCE_REDACTED: True} if has_secret(settings.source) else {}
     return {
         "visup": __version__,
         "source": source.name,

@@ -27,7 +27,7 @@ from visup.percepts.video import VideoSource
 from visup.redaction import redacted
 from visup.runs.checkpoints import Checkpoint, read_checkpoint
 from visup.runs.runtime_faults import RuntimeFaults
-from visup.runs.settings import SECRET_LEFT_OUT, WatchSettings
+from visup.runs.settings import SOURCE_REDACTED, WatchSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ def interrupted_run(
         )
     verdict = verdict_without_task(map(_kind, filter(_is_grave, recording.events())))
     settings = _with_named_code(recorded_settings(facts, str(run)), run, behaviours, plugins)
-    settings = _with_secret(settings, run, source, needed=bool(facts.get(SECRET_LEFT_OUT)))
+    settings = _with_secret(settings, run, source, needed=bool(facts.get(SOURCE_REDACTED)))
     answers = _answers(facts, str(run))
     return InterruptedRun(recording, settings, state, why_none, recording.count(), verdict, answers)
 

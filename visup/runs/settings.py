@@ -15,7 +15,7 @@ from visup.agent.model.errors import SettingsError
 
 VIEWS_AT_END = ("unknown", "weak", "strong")
 """What may become of rules that are not decided when a run ends; as of `visup.rules`."""
-SECRET_LEFT_OUT = "source_without_secret"
+SOURCE_REDACTED = "source_without_secret"
 """The fact of a recorded run that its source had a password, which is not recorded."""
 
 

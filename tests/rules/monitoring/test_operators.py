@@ -16,6 +16,7 @@ from tests.oracles.rule_formulas import (
     random_value,
 )
 from tests.oracles.rule_oracle import robustness
+from visup.agent import Truth
 from visup.agent.model.errors import SettingsError
 from visup.rules.formula.nodes import Formula, Predicate
 from visup.rules.formula.units import ticks
@@ -292,3 +293,11 @@ def test_times_that_do_not_increase_are_refused_and_leave_the_monitor_as_it_was(
     with pytest.raises(SettingsError, match="sample"):
         monitor.step(times[-1], {"x": 1})
     assert monitor.state is before
+
+
+def test_a_quotient_is_rounded_once() -> None:
+    """The last digit decides a tie: 2.5 / (2.5 / 0.75) is 0.75 again."""
+    monitor = Monitor(parse_formula("x() / (x() / y()) == 0.75", signals("x", "y")))
+    assert verdict(monitor.step(0.0, {"x": 2.5, "y": 0.75})) is Truth.TRUE
+    told = monitor.step(0.1, {"x": (2.0, 3.0), "y": (-1.0, 1.0)})
+    assert verdict(told) is Truth.UNKNOWN
