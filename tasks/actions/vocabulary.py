@@ -7,7 +7,7 @@ and every quantity can be compared. A fact of a task file that is not a plain re
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -130,9 +130,7 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             amounts = [task.amount(a) for a in bounds_of(fact)]
             measured = _measure(task, fact, amounts[0])
             looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
-            said = " and ".join(map(str, amounts))
-            text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
-            text = f"as `{fact}` says" if name in SIGNAL_WORDS else text
+            text = _compared(fact, name, amounts)
         elif name in SIGNAL_WORDS:
             looks[key] = _word(name, tuple(map(str, fact.words)))
             text = f"as `{fact}` says"
@@ -140,12 +138,10 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
             text = f"{text} {zone}"
-        if isinstance(fact, Comparison) and name in NEARNESS and fact.operator in ("<", "<="):
-            # Whoever shall be near another may draw nearer to it.
-            actions = {**actions, name: replace(actions[name], expects=("converging",))}
-        takes = tuple(k for k in actions[name].kinds if k == "object")
+        meaning = _draws_near(actions[name]) if _asks_for_nearness(fact) else actions[name]
+        takes = tuple(k for k in meaning.kinds if k == "object")
         meanings[key] = replace(
-            actions[name], name=key, holds=(key,), arity=len(takes), takes=takes, text=text
+            meaning, name=key, holds=(key,), arity=len(takes), takes=takes, text=text
         )
         if isinstance(fact, Comparison) and fact.operator == BETWEEN:
             # To stay within a range goes on until the next thing begins, and fails outside it.
@@ -155,6 +151,27 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
     return TaskVocabulary(
         MappingProxyType(meanings), MappingProxyType(looks), MappingProxyType(rhythms)
     )
+
+
+def _compared(fact: Comparison, name: str, amounts: Sequence[Number]) -> str:
+    """How a comparison is told: "at a gap below 20 px"."""
+    if name in SIGNAL_WORDS:
+        return f"as `{fact}` says"
+    said = " and ".join(map(str, amounts))
+    return f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
+
+
+def _asks_for_nearness(fact: Fact) -> bool:
+    return (
+        isinstance(fact, Comparison)
+        and action_of(fact).name in NEARNESS
+        and fact.operator in ("<", "<=")
+    )
+
+
+def _draws_near(action: ActionDefinition) -> ActionDefinition:
+    """Whoever shall be near another may draw nearer to it."""
+    return replace(action, expects=("converging",))
 
 
 def _again(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 from visup.agent.model.errors import LONGEST_QUOTE, TaskError
+from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Source
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import ParsedFile, parse
+from visup.tasks.grammar.conditions import Name
 from visup.tasks.grammar.nodes import Include, Task
-from visup.tasks.grammar.relocation import relocated
 
 Read = Callable[[str, str], tuple[str, str]]
 """(path, the file that includes it) -> (name of the file, its text); raises TaskError."""
@@ -75,7 +77,7 @@ class _Joiner:
         source = self.source.included[file] = Source(text, file)
         code, odd = normalise(text, source)
         parsed = parse(code, source)
-        task = relocated(parsed.task, file)
+        task = _relocated(parsed.task, file)
         stages = tuple(replace(s, is_task=False) for s in task.stages)
         told = replace(parsed, task=replace(task, stages=stages), faults=(*odd, *parsed.faults))
         return self.join(told, (*chain, file))
@@ -101,3 +103,21 @@ def _joined(one: ParsedFile, other: ParsedFile) -> ParsedFile:
     return ParsedFile(
         task, (*one.faults, *other.faults), one.defined | other.defined, one.used | other.used
     )
+
+
+def _relocated(task: Task, file: str) -> Task:
+    """The same tree with every place said to be in an included file."""
+    return cast("Task", _moved(task, file))
+
+
+def _moved(node: object, file: str) -> object:
+    if isinstance(node, Span):
+        return replace(node, file=file)
+    if isinstance(node, Name):
+        return Name(node, replace(node.span, file=file))
+    if isinstance(node, tuple):
+        return tuple(_moved(n, file) for n in node)
+    fields = getattr(node, "__dataclass_fields__", None)
+    if fields is None:
+        return node
+    return replace(node, **{f: _moved(getattr(node, f), file) for f in fields})  # type: ignore[type-var]

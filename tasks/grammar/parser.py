@@ -7,32 +7,18 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal, Protocol, TypeVar, cast
 
-from lark import Lark, Token, Transformer
+from lark import Lark, Token
 
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span, Unit
+from visup.tasks.grammar.actor_builder import ActorBuilder, span_of
 from visup.tasks.grammar.ast_courses import ConditionKind
 from visup.tasks.grammar.conditions import EVERY, Condition, Lasted, PartName, Period, Range, lasted
 from visup.tasks.grammar.copies import MOST_COPIES, copy_names, one_of, with_copies
-from visup.tasks.grammar.criteria import (
-    Another,
-    Colours,
-    Conduct,
-    Criterion,
-    Extent,
-    OtherModels,
-    PartOf,
-    Place,
-    Rank,
-    Ranked,
-    Side,
-    in_order,
-)
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
-    Actors,
     Already,
     Amount,
     AnyOrder,
@@ -153,7 +139,7 @@ def _parser() -> Lark:
     )
 
 
-class _TaskBuilder(Transformer[Token, Any]):
+class _TaskBuilder(ActorBuilder):
     """One method for each rule of the grammar."""
 
     def start(self, items: list[Any]) -> list[Any]:
@@ -163,49 +149,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         marked = items[0].type == "TASK"
         head, *rest = items[1:] if marked else items
         text = str(rest[0])[1:-1] if isinstance(rest[0], Token) else ""
-        return Stage(_bare(head), rest[-1], text, marked, _of(head))
-
-    def actors(self, items: list[Token]) -> Actors:
-        return Actors(_names(items), _of(items[0]).to(_of(items[-1])))
-
-    def actor(self, items: list[Any]) -> Actor:
-        optional = items[0].type == "OPTIONAL"
-        name, *rest = items[1:] if optional else items
-        size = next((i for i in rest if isinstance(i, Number | ParameterRef)), None)
-        traits = [t for i in rest if isinstance(i, list) for t in i]
-        models, criteria = _who(traits)
-        return Actor(str(name), models, size, optional, _of(name), criteria)
-
-    # What is said of an actor: each a list of criteria, models as `OtherModels`.
-    def models(self, items: list[Token]) -> list[Criterion]:
-        return [OtherModels(tuple(map(str, items)))]
-
-    def colours(self, items: list[str]) -> list[Criterion]:
-        return [Colours(tuple(items))]
-
-    def colour(self, items: list[Token]) -> str:
-        return " ".join(map(str, items))
-
-    def rank(self, items: list[Any]) -> list[Criterion]:
-        return [*(items[2] if len(items) > 2 else []), Ranked(cast("Rank", str(items[1])))]
-
-    def another(self, items: list[Any]) -> list[Criterion]:
-        return [*(items[1] if len(items) > 1 else []), Another()]
-
-    def place(self, items: list[Any]) -> list[Criterion]:
-        return [Place(items[1])]
-
-    def extent(self, items: list[Any]) -> list[Criterion]:
-        return [Extent(cast('Literal["larger", "smaller"]', str(items[0])), items[1])]
-
-    def conduct(self, items: list[Token]) -> list[Criterion]:
-        kind = cast('Literal["enters", "moves", "rests"]', str(items[1]))
-        side = cast("Side", str(items[3])) if len(items) > 3 else ""
-        return [Conduct(kind, side)]
-
-    def part(self, items: list[Token]) -> list[Criterion]:
-        machine = Name(str(items[1]), _of(items[1]))
-        return [PartOf(machine, _of(items[0]).to(_of(items[1])))]
+        return Stage(_bare(head), rest[-1], text, marked, span_of(head))
 
     def size(self, items: list[Amount]) -> Amount:
         return items[0]
@@ -213,21 +157,13 @@ class _TaskBuilder(Transformer[Token, Any]):
     def zone(self, items: list[Any]) -> ZoneDeclaration:
         name, *corners = items
         if corners and isinstance(corners[0][0], Number):
-            return ZoneDeclaration(str(name), (), _of(name), tuple(corners))
-        return ZoneDeclaration(str(name), tuple(corners), _of(name))
-
-    def bystander(self, items: list[Any]) -> Actor:
-        _, name, *rest = items
-        models, criteria = _who([t for i in rest for t in i])
-        return Actor(str(name), models, span=_of(name), criteria=criteria, bystander=True)
-
-    def ignored(self, items: list[Token]) -> Actor:
-        return Actor("", span=_of(items[0]), bystander=True)
+            return ZoneDeclaration(str(name), (), span_of(name), tuple(corners))
+        return ZoneDeclaration(str(name), tuple(corners), span_of(name))
 
     def ground(self, items: list[Any]) -> Ground:
         word, *points = items
         image, floor = zip(*points, strict=True)
-        return Ground(image, floor, _of(word))
+        return Ground(image, floor, span_of(word))
 
     def point(self, items: list[Any]) -> tuple[tuple[float, float], FloorPoint]:
         return items[0], items[1]
@@ -236,22 +172,22 @@ class _TaskBuilder(Transformer[Token, Any]):
         return items[0], items[1]
 
     def length(self, items: list[Token]) -> Number:
-        return Number(float(items[0]), str(items[1]), _of(items[0]).to(_of(items[1])))
+        return Number(float(items[0]), str(items[1]), span_of(items[0]).to(span_of(items[1])))
 
     def corner(self, items: list[Token]) -> tuple[float, float]:
         return float(items[0]), float(items[1])
 
     def parameter(self, items: list[Any]) -> Parameter:
-        return Parameter(str(items[0]), items[1], _of(items[0]))
+        return Parameter(str(items[0]), items[1], span_of(items[0]))
 
     def include(self, items: list[Token]) -> Include:
-        return Include(str(items[0])[1:-1], _of(items[0]))
+        return Include(str(items[0])[1:-1], span_of(items[0]))
 
     def invariant(self, items: list[Any]) -> Invariant:
         when = cast('Literal["never", "always"]', str(items[0]))
         lasting = next((i for i in items if isinstance(i, Hold)), None)
         during = next((i for i in items if isinstance(i, tuple)), ())
-        span = _of(items[0]).to(during[-1].span if during else items[-1].span)
+        span = span_of(items[0]).to(during[-1].span if during else items[-1].span)
         return Invariant(when, items[1], lasting, during, span)
 
     def during(self, items: list[Reference]) -> tuple[Reference, ...]:
@@ -267,28 +203,28 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Together(tuple(items), _all(items))
 
     def any_order(self, items: list[Any]) -> AnyOrder:
-        return AnyOrder(tuple(items[1:-1]), _of(items[0]).to(_of(items[-1])))
+        return AnyOrder(tuple(items[1:-1]), span_of(items[0]).to(span_of(items[-1])))
 
     def any_of(self, items: list[Any]) -> AnyOrder:
         first, count, *courses, last = items
-        return AnyOrder(tuple(courses), _of(first).to(_of(last)), int(count))
+        return AnyOrder(tuple(courses), span_of(first).to(span_of(last)), int(count))
 
     def for_each(self, items: list[Any]) -> AnyOrder:
         first, variable, *actors, course = items
         made = (bound(course, {str(variable): str(a)}) for a in actors)
-        return AnyOrder(tuple(made), _of(first).to(course.span))
+        return AnyOrder(tuple(made), span_of(first).to(course.span))
 
     def for_copies(self, items: list[Any]) -> AnyOrder:
         first, said, plural, course = items
         name, count = one_of(str(plural), course), min(int(said), MOST_COPIES)
         made = (bound(course, {name: copy}) for copy in copy_names(name, count))
-        return AnyOrder(tuple(made), _of(first).to(course.span), copies=(name, count))
+        return AnyOrder(tuple(made), span_of(first).to(course.span), copies=(name, count))
 
     def already(self, items: list[Any]) -> Already:
-        return Already(items[1], _of(items[0]).to(items[1].span))
+        return Already(items[1], span_of(items[0]).to(items[1].span))
 
     def recovery(self, items: list[Any]) -> Recovery:
-        return Recovery(items[1], items[2], _of(items[0]).to(items[2].span))
+        return Recovery(items[1], items[2], span_of(items[0]).to(items[2].span))
 
     def judged(self, items: list[Any]) -> Conditioned:
         return Conditioned(items[0], tuple(items[1:]), _all(items))
@@ -302,47 +238,49 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Counted(items[0], bounds.get("least", 1), bounds.get("most"), span)
 
     def at_least(self, items: list[Token]) -> tuple[str, int, Span]:
-        return "least", int(items[1]), _of(items[1])
+        return "least", int(items[1]), span_of(items[1])
 
     def at_most(self, items: list[Token]) -> tuple[str, int, Span]:
-        return "most", int(items[1]), _of(items[1])
+        return "most", int(items[1]), span_of(items[1])
 
     def repeated(self, items: list[Any]) -> Repeated:
         mark = cast('Literal["?", "*", "+"]', str(items[1]))
-        return Repeated(items[0], mark, items[0].span.to(_of(items[1])))
+        return Repeated(items[0], mark, items[0].span.to(span_of(items[1])))
 
     def hold(self, items: list[Any]) -> Hold:
-        return Hold(items[1], _of(items[0]).to(items[1].span))
+        return Hold(items[1], span_of(items[0]).to(items[1].span))
 
     def deadline(self, items: list[Any]) -> Deadline:
-        return Deadline(items[1], _of(items[0]).to(items[1].span))
+        return Deadline(items[1], span_of(items[0]).to(items[1].span))
 
     def delay(self, items: list[Any]) -> Delay:
-        return Delay(items[1], _third(items), _of(items[0]).to(items[-1].span))
+        return Delay(items[1], _third(items), span_of(items[0]).to(items[-1].span))
 
     def sign(self, items: list[Any]) -> StageCondition:
         kind = cast("ConditionKind", str(items[0]))
-        return StageCondition(kind, items[1], _third(items), _of(items[0]).to(items[-1].span))
+        return StageCondition(kind, items[1], _third(items), span_of(items[0]).to(items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:
-        span = _of(items[0]).to(_of(items[-1]))
+        span = span_of(items[0]).to(span_of(items[-1]))
         if len(items) == 1:
             return ParameterRef(str(items[0]), span)
         return Number(float(items[0]), str(items[1]), span)
 
     def action(self, items: list[Token]) -> Action:
         name, *actors, last = items
-        words = tuple(a if isinstance(a, Name) else Name(str(a), _of(a)) for a in actors)
-        return Action(str(name), words, _of(name).to(_of(last)))
+        words = tuple(a if isinstance(a, Name) else Name(str(a), span_of(a)) for a in actors)
+        return Action(str(name), words, span_of(name).to(span_of(last)))
 
     signal = action
 
     def bare(self, items: list[Token]) -> Number:
-        return Number(float(items[0]), Unit.NONE, _of(items[0]))
+        return Number(float(items[0]), Unit.NONE, span_of(items[0]))
 
     def part_of(self, items: list[Token]) -> Name:
         part, machine = items
-        return PartName(str(part), Name(str(machine), _of(machine)), _of(part).to(_of(machine)))
+        return PartName(
+            str(part), Name(str(machine), span_of(machine)), span_of(part).to(span_of(machine))
+        )
 
     def comparison(self, items: list[Any]) -> Comparison:
         quantity = Measure(items[0].name, items[0].words, items[0].span)
@@ -361,7 +299,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Comparison(again, EVERY, cast("Term", period), span=action.span.to(span))
 
     def reference(self, items: list[Token]) -> Reference:
-        return Reference(_bare(items[0]), _of(items[0]))
+        return Reference(_bare(items[0]), span_of(items[0]))
 
     def or_(self, items: list[Condition]) -> Or:
         return Or(tuple(items), _all(items))
@@ -370,18 +308,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         return And(tuple(items), _all(items))
 
     def not_(self, items: list[Any]) -> Not:
-        return Not(items[1], _of(items[0]).to(items[1].span))
-
-
-def _who(traits: Several[Criterion]) -> tuple[tuple[str, ...], tuple[Criterion, ...]]:
-    """The models that are said first, and all other criteria in the order of their kinds."""
-    models = next((t for t in traits if isinstance(t, OtherModels)), None)
-    others = in_order(t for t in traits if t is not models)
-    return (models.names if models is not None else ()), others
-
-
-def _names(tokens: list[Token]) -> tuple[Name, ...]:
-    return tuple([Name(str(t), _of(t)) for t in tokens])
+        return Not(items[1], span_of(items[0]).to(items[1].span))
 
 
 def _bare(token: Token) -> str:
@@ -391,13 +318,6 @@ def _bare(token: Token) -> str:
 
 def _third(items: list[Any]) -> Any:
     return items[2] if len(items) > 2 else None
-
-
-def _of(token: Token) -> Span:
-    """Where a token stands; of a head only the part in angle brackets."""
-    line, column = token.line or 0, token.column or 0
-    width = str(token).index(">") + 1 if token.type == "HEAD" else len(token)
-    return Span(line, column, line, column + width)
 
 
 def _all(items: Several[_Placed]) -> Span:

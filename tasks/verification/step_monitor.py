@@ -149,7 +149,7 @@ def update(
     worked = partial(seen.elapsed, step)
     if monitor.early:
         monitor, seen = _not_yet(monitor, seen, moment, settings, worked)
-    noted = _note_progress(monitor, step, meaning, seen, moment, settings, worked)
+    noted = _note_progress(monitor, step, meaning, seen, moment, settings)
     noted = _note_contrary(noted, seen, now)
     noted = _note_lateness(noted, step, meaning, seen, now)
     status = _status(noted, seen, now, settings, worked)
@@ -251,7 +251,6 @@ def _note_progress(
     seen: ActionObservation,
     moment: Moment,
     settings: TaskSettings,
-    worked: Worked,
 ) -> StepMonitor:
     now, dt = moment
     if not seen.observed:
@@ -262,10 +261,10 @@ def _note_progress(
         held, broken = held + dt, None
         if step.hold_s is None and seen.held_by is not None:
             # What held already when the step began need not hold for as long once more.
-            held = max(held, worked(seen.held_by.since, now))
+            held = max(held, seen.elapsed(step, seen.held_by.since, now))
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
-        if worked(broken, now) >= settings.gap_s:
+        if seen.elapsed(step, broken, now) >= settings.gap_s:
             held, ceased = 0.0, ceased or monitor.fulfilled
     helping = seen.helps is not None
     must = meaning.hold_s if step.hold_s is None else step.hold_s

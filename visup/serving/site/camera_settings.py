@@ -63,9 +63,18 @@ def camera_of(
         patience_s=one.patience_s,
         attention=one.attention,
     )
+    options = _options(site, one, folder, environment)
+    limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
+    return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
+
+
+def _options(
+    site: SiteTable, one: CameraTable, folder: Path, environment: Mapping[str, str]
+) -> RunOptions:
+    """How the runs of a camera are recorded, and where its alerts go."""
     sinks = (filled(s, environment, folder) for s in (*site.sinks, *one.sinks))
     access = _access(site, folder, environment)
-    options = RunOptions(
+    return RunOptions(
         video=site.recording.video,
         report=site.recording.report,
         sinks=tuple(_sink(s, folder) for s in dict.fromkeys(sinks)),
@@ -76,8 +85,6 @@ def camera_of(
         webhook_key=access.key,
         closing_s=CLOSING_S,
     )
-    limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
-    return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
 
 
 def _access(site: SiteTable, folder: Path, environment: Mapping[str, str]) -> WebhookAccess:
