@@ -4,5 +4,5 @@ Read in this order: `tasks.lark` (the language), `conditions.py` and `ast_course
 inside a stage), `nodes.py` (the file as a whole), `parser.py` (text to tree), `statement.py` (one
 statement of the text), `analysis.py` (what is reachable, nullable, recursive), `structure.py` (stages
 and actors of a task), `units.py` (units peculiar to tasks), `graphs.py` (graphs of stage names),
-`relocation.py` (the tree of an included file).
+`actor_builder.py` (what is said of actors).
 """
