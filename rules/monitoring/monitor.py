@@ -56,8 +56,9 @@ class Monitor:
     What is decided before a window of the future is over, `foreseen` tells if asked to:
 
     >>> monitor = Monitor(parse_formula("eventually[60 s] x() > 1", signals("x")), early=True)
-    >>> monitor.step(0.0, {"x": 3.0}), monitor.foreseen()
-    ((-inf, inf), (2.0, inf))
+    >>> _ = monitor.step(0.0, {"x": 3.0})  # of a minute ago
+    >>> monitor.foreseen(), monitor.early_delay, monitor.delay
+    ((2.0, inf), 0.0, 60.0)
 
     Args:
         formula: Its quantities are the signals, written `name()`.
