@@ -19,15 +19,28 @@ class Registry:
     def __init__(self) -> None:
         self._offers: dict[str, BehaviourFactory | EntryPoint] = {}
 
-    def add(self, name: str, kind: Constructor | EntryPoint) -> None:
+    def add(self, name: str, kind: Constructor) -> None:
         """Add a class of behaviours, or whatever makes one.
 
         Raises:
             BehaviourError: The name is taken.
         """
+        self._add(name, BehaviourFactory(kind, name))
+
+    def add_entry_point(self, point: EntryPoint) -> None:
+        """Add what a package offers; it is imported when it is asked for.
+
+        Raises:
+            BehaviourError: The name is taken.
+        """
+        # Not told from a class by its type: once some package imports the backport
+        # `importlib_metadata`, entry points are of that one's class.
+        self._add(point.name, point)
+
+    def _add(self, name: str, offer: BehaviourFactory | EntryPoint) -> None:
         if name in self._offers:
             raise BehaviourError(f"a behaviour called '{name}' is registered already")
-        self._offers[name] = kind if isinstance(kind, EntryPoint) else BehaviourFactory(kind, name)
+        self._offers[name] = offer
 
     def names(self) -> list[str]:
         """Names in alphabetical order."""
@@ -89,5 +102,5 @@ def discover_behaviours() -> Registry:
     registry = Registry()
     for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
         if point.name not in registry.names():
-            registry.add(point.name, point)
+            registry.add_entry_point(point)
     return registry

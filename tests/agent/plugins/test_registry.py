@@ -72,3 +72,15 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
     assert "eye" in str(caught.value)
     with pytest.raises(BehaviourError, match="already"):
         registry.add("eye", lambda: Scripted("eye", ("x",)))
+
+
+def test_entry_points_of_the_backport_are_found_too() -> None:
+    """Any package that imports `importlib_metadata` changes the class of all entry points."""
+    backport = pytest.importorskip("importlib_metadata")
+    point = backport.EntryPoint(
+        "health", "visup.percepts.health:HealthBehaviour", "visup.behaviours"
+    )
+    registry = Registry()
+    registry.add_entry_point(point)
+    assert registry.make("health").contract.name == "health"
+    assert discover_behaviours().make("health").contract.name == "health"
