@@ -27,7 +27,7 @@ from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
 
 arrow = pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
-parquet = pytest.importorskip("pyarrow.parquet")
+parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `cluster`")
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from visup.archive.lake import Lake
 from visup.runs.settings import WatchSettings
 
 pytest.importorskip("duckdb", reason="needs the extra `cluster`")
-parquet = pytest.importorskip("pyarrow.parquet")
+parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `cluster`")
 
 DOCK = WatchSettings("", tasks=("dock",), actors={"satellite": ("spartan",)})
 

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import NamedTuple, cast
 
 import pytest
 
@@ -74,13 +77,17 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
         registry.add("eye", lambda: Scripted("eye", ("x",)))
 
 
-def test_entry_points_of_the_backport_are_found_too() -> None:
-    """Any package that imports `importlib_metadata` changes the class of all entry points."""
-    backport = pytest.importorskip("importlib_metadata")
-    point = backport.EntryPoint(
-        "health", "visup.percepts.health:HealthBehaviour", "visup.behaviours"
-    )
+def test_entry_points_of_another_class_are_loaded_too() -> None:
+    """Any package that imports the backport `importlib_metadata` changes the class of all entry points."""
+
+    class BackportPoint(NamedTuple):
+        name: str
+        value: str
+
+        def load(self) -> Callable[[], Scripted]:
+            return lambda: Scripted("eye", ("x",))
+
     registry = Registry()
-    registry.add_entry_point(point)
-    assert registry.make("health").contract.name == "health"
-    assert discover_behaviours().make("health").contract.name == "health"
+    registry.add_entry_point(cast("EntryPoint", BackportPoint("eye", "eyes:Eye")))
+    assert registry.where("eye") == "eyes:Eye"
+    assert registry.make("eye").contract.name == "eye"
