@@ -2,30 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.video.capture import Capture, CaptureFactory, frame_rate
+from visup.percepts.video.waiting_clock import WaitingClock
 
 LOOP = "loop:"
 """Before the name of such a clip: `loop:clip.mp4`."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlaybackClock:
-    """By what a clip is played; arguments for tests.
-
-    Attributes:
-        now: Seconds from any start.
-        wait: Waits so many seconds.
-    """
-
-    now: Callable[[], float] = time.monotonic
-    wait: Callable[[float], None] = time.sleep
 
 
 class LoopedCapture:
@@ -46,10 +30,10 @@ class LoopedCapture:
         path: str,
         factory: CaptureFactory,
         fps: float | None = None,
-        clock: PlaybackClock | None = None,
+        clock: WaitingClock | None = None,
     ) -> None:
         self._path, self._factory = path, factory
-        self._clock = clock or PlaybackClock()
+        self._clock = clock or WaitingClock()
         self._clip: Capture = factory(path)
         self._pause = 1.0 / frame_rate(self._clip, fps)[0]
         self._due: float | None = None

@@ -11,11 +11,12 @@ import pytest
 from tests.serving.fakes import Bench, site_camera
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.file_lock import acquire_lock
+from visup.percepts.video.waiting_clock import WaitingClock
 from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
 from visup.serving.reports import ReportKind
 from visup.serving.site.records import Site, SiteCamera
-from visup.serving.site_supervisor import ServiceClock, SiteSupervisor, serve_site
+from visup.serving.site_supervisor import SiteSupervisor, serve_site
 
 
 def site(store: Path, *cameras: SiteCamera) -> Site:
@@ -62,8 +63,8 @@ class Script:
                 act()
 
     @property
-    def clock(self) -> ServiceClock:
-        return ServiceClock(lambda: self.now, self.wait)
+    def clock(self) -> WaitingClock:
+        return WaitingClock(lambda: self.now, self.wait)
 
 
 def test_a_stop_ends_all_and_is_told_the_service_manager(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.storage.file_lock import acquire_lock
+from visup.percepts.video.waiting_clock import WaitingClock
 from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
 from visup.serving.camera_child import CameraChild
@@ -24,19 +23,6 @@ TURN_S = 0.1
 
 SITE = "site"
 """What messages that are about no camera are about."""
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceClock:
-    """By what a service goes; arguments for tests.
-
-    Attributes:
-        now: Seconds from any start.
-        wait: Waits so many seconds.
-    """
-
-    now: Callable[[], float] = time.monotonic
-    wait: Callable[[float], None] = time.sleep
 
 
 class SiteSupervisor:
@@ -112,7 +98,7 @@ def serve_site(
     tell: Tell,
     stop: StopRequest,
     start: Callable[[CameraJob], Child] = CameraChild,
-    clock: ServiceClock | None = None,
+    clock: WaitingClock | None = None,
 ) -> ExitCode:
     """Watch a site until a stop is asked for, or every source was seen to its end.
 
@@ -129,7 +115,7 @@ def serve_site(
     Raises:
         OutputError: The store cannot be written, or another service uses it.
     """
-    clock = clock or ServiceClock()
+    clock = clock or WaitingClock()
     with _only_service(site.store):
         supervisor = SiteSupervisor(site, tell, start)
         supervisor.turn(clock.now())

@@ -12,7 +12,8 @@ from tests.clips import moving_disc, write_clip
 from visup.agent.model.errors import SourceError
 from visup.percepts.video import open_source
 from visup.percepts.video.capture import open_capture
-from visup.percepts.video.looped import LoopedCapture, PlaybackClock
+from visup.percepts.video.looped import LoopedCapture
+from visup.percepts.video.waiting_clock import WaitingClock
 
 
 class FakeTime:
@@ -35,7 +36,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_begins_anew_at_its_end(clip: Path) -> None:
     time = FakeTime()
     capture = LoopedCapture(
-        str(clip), open_capture, clock=PlaybackClock(lambda: time.now, time.wait)
+        str(clip), open_capture, clock=WaitingClock(lambda: time.now, time.wait)
     )
     images = []
     for _ in range(12):
@@ -49,7 +50,7 @@ def test_it_begins_anew_at_its_end(clip: Path) -> None:
 def test_frames_come_when_they_are_due_and_at_once_to_who_is_late(clip: Path) -> None:
     time = FakeTime()
     capture = LoopedCapture(
-        str(clip), open_capture, clock=PlaybackClock(lambda: time.now, time.wait)
+        str(clip), open_capture, clock=WaitingClock(lambda: time.now, time.wait)
     )
     for _ in range(3):
         capture.grab()
