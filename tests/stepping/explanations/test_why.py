@@ -9,6 +9,7 @@ from visup.agent import Hypothesis, Region
 from visup.agent.model.errors import VisupError
 from visup.stepping import Stepper
 from visup.stepping.explanations.evidence import Why
+from visup.stepping.explanations.why import REPORTED
 from visup.terminal.display import html, shown
 
 
@@ -54,6 +55,13 @@ def test_why_has_its_reasons_and_its_percepts(it: Stepper, text: str) -> None:
     assert why.text.startswith(head)
     assert any(below in w.text for w in why.walk())
     assert any(isinstance(p.value, Region | Hypothesis) for p in why.percepts)
+    assert "`" not in str(why)  # as the narrative has it
+
+
+def test_a_stage_is_explained_with_what_was_last_reported_of_it(it: Stepper) -> None:
+    reported = next(w for w in it.why("approach").walk() if w.text == REPORTED)
+    assert reported.parts
+    assert all("Stage 'approach'" in w.line() for w in reported.parts)
 
 
 def test_records_themselves_can_be_asked_about(it: Stepper) -> None:
