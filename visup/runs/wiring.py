@@ -220,7 +220,7 @@ _GRAVITY = (
 
 def _limits(settings: WatchSettings, live: bool) -> Limits:
     usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
-    return replace(usual, hang_s=LIVE_HANG_S) if live else usual
+    return replace(usual, hang_s=LIVE_HANG_S, patient=False) if live else usual
 
 
 def _behaviours(
