@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -18,12 +19,15 @@ from visup.archive.asking.views import quoted
 from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import read_pattern
 from visup.archive.finding.possible import HELD, PossibleTimes, possible_times
+from visup.archive.finding.task_search import TaskSearch
 from visup.archive.lake import Lake
+from visup.archive.parallel import each_run
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import load_rules
 from visup.rules.safety.expression import Expression
 from visup.runs.replay import replay
 from visup.runs.settings import WatchSettings
+from visup.tasks import load_tasks
 
 _BY_ID = re.compile(r"object_(\d+)")
 
@@ -136,28 +140,35 @@ class RulesSearch:
 
 
 def read_search(text: str, *, unknown: bool = False) -> Search:
-    """What is looked for, from a condition or the name of a rules file.
+    """What is looked for, from a condition or the name of a rules file or a task file.
 
     Raises:
-        RuleError: It is neither.
+        RuleError: It is none of them.
         ManyErrors: It has several faults.
     """
-    if text.endswith(".rules"):
+    if text.endswith((".rules", ".task")):
         if unknown:
             raise SettingsError(
-                "alerts are raised or not", hint="leave out --unknown, or look for a condition"
+                "alerts are raised or not, and tasks carried out or not",
+                hint="leave out --unknown, or look for a condition",
             )
-        return RulesSearch(Path(text), load_rules(text))
+        if text.endswith(".rules"):
+            return RulesSearch(Path(text), load_rules(text))
+        load_tasks(text)  # what is wrong with it is told before the first run
+        return TaskSearch(Path(text))
     return ConditionSearch(read_pattern(text), unknown)
 
 
-def find(lake: Lake, search: Search, runs: Iterable[str]) -> Iterator[FoundRun]:
+def find(
+    lake: Lake, search: Search, runs: Iterable[str], workers: int | None = 0
+) -> Iterator[FoundRun]:
     """Look into runs.
 
     Args:
         lake: The lake.
         search: What is looked for.
         runs: Which runs; those that are possible are enough.
+        workers: Processes that share them; None for one for each core.
 
     Yields:
         Each run, also one without hits.
@@ -165,10 +176,13 @@ def find(lake: Lake, search: Search, runs: Iterable[str]) -> Iterator[FoundRun]:
     Raises:
         OutputError: A run is damaged.
     """
-    for run in runs:
-        recording, settings = lake.recorded(run)
-        hits = search.hits(recording, settings)
-        yield FoundRun(run, settings.source, lake.folder_of(run), hits)
+    yield from each_run(partial(_looked_into, lake, search), list(runs), workers)
+
+
+def _looked_into(lake: Lake, search: Search, run: str) -> FoundRun:
+    recording, settings = lake.recorded(run)
+    hits = search.hits(recording, settings)
+    return FoundRun(run, settings.source, lake.folder_of(run), hits)
 
 
 def runs_of(

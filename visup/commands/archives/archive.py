@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from visup.archive.filling.pool_settings import PoolSettings
+from visup.archive.parallel import Workers
 from visup.commands.options import REPLAYED, Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import Option, WatchSettings
@@ -52,6 +53,13 @@ FILLED = (
 """Settings of all clips; those of live sources, and of one clip alone, are left out."""
 
 app = typer.Typer(no_args_is_help=True)
+
+
+@dataclass(frozen=True, slots=True)
+class ManyRuns:
+    """How many runs are looked into."""
+
+    workers: Workers = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,9 +172,10 @@ def compact(
 
 
 @app.command("replay")
-@takes(WatchSettings, only=REPLAYED)
+@takes(WatchSettings, ManyRuns, only=(*REPLAYED, "workers"))
 def replay(
     setting: Given,
+    wanted: Given,
     lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
 ) -> None:
     """Reason again about all runs of a lake, with other rules, tasks or actors, and say what changes.
@@ -178,7 +187,7 @@ def replay(
     from visup.terminal.console import make_console
 
     console, summary, found = make_console(), ChangeSummary(), Lake.open(lake)
-    for one in changes(found, found.runs(), **setting):
+    for one in changes(found, found.runs(), **wanted, **setting):
         summary.take(one)
         if one.diff:
             console.print(_changed(one), soft_wrap=True, markup=False)
