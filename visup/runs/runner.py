@@ -134,6 +134,7 @@ class _Run:
         answered: bool,
     ) -> None:
         self._faults = RuntimeFaults()
+        self._meter, self._roll_over = PhaseMeter(), RollOver(options)
         self.source = stack.enter_context(open_video(settings))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
@@ -159,7 +160,6 @@ class _Run:
         self._alarms = VerdictMonitor(past.verdict if past else None)
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
-        self._meter, self._roll_over = PhaseMeter(), RollOver(options)
         self._options = options
         self._last: Step | None = None  # while none is under way
         self._stopped = False
