@@ -238,7 +238,7 @@ class VerdictMonitor:
 
 def _limits(settings: WatchSettings, live: bool) -> Limits:
     usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
-    return replace(usual, hang_s=LIVE_HANG_S) if live else usual
+    return replace(usual, hang_s=LIVE_HANG_S, patient=False) if live else usual
 
 
 def _behaviours(
