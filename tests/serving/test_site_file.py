@@ -193,7 +193,8 @@ def test_the_page_has_every_key_and_its_example_is_a_site(tmp_path: Path) -> Non
     tables = [kind.annotation for kind in SiteTable.model_fields.values()]
     own = [t for t in tables if isinstance(t, type) and issubclass(t, BaseModel)]
     assert len(own) >= 6
-    for table in (SiteTable, CameraTable, *own):
+    every: list[type[BaseModel]] = [SiteTable, CameraTable, *own]
+    for table in every:
         assert [key for key in table.model_fields if not re.search(rf"[`\[]{key}[`\]]", text)] == []
     block, *_ = (b for b in blocks() if b.page == page and b.kind == "toml")
     example = block.text.replace("/run/secrets/cell", "secret.txt")
