@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from random import Random
 
 import pytest
 
@@ -26,6 +25,7 @@ from visup.archive.finding.search import (
     read_search,
 )
 from visup.archive.lake import Lake
+from visup.evaluation.archive.conditions import random_conditions
 from visup.rules.language.parser import load_rules
 from visup.rules.safety.queries import verdicts
 from visup.runs.replay import replay
@@ -35,10 +35,6 @@ pytest.importorskip("duckdb", reason="needs the extra `cluster`")
 pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
 
 DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
-RELATIONS = (
-    *("converging", "diverging", "keeping_distance", "touching", "coupled"),
-    *("north_of", "moving_towards", "close_to", "partially_overlapping"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -58,57 +54,7 @@ def database(lake: Lake) -> Iterator[LakeDatabase]:
         yield found
 
 
-def random_condition(rng: Random, depth: int) -> str:
-    """A condition about `a` and `b` with any of the operators."""
-    if depth == 0 or rng.random() < 0.15:
-        names = ("a, b", "b, a")
-        return rng.choice(
-            [f"{rng.choice(RELATIONS)}({rng.choice(names)})"] * 6
-            + ["gap(a, b) < 60 px", "(moving(a) and touching(a, b))"]
-        )
-
-    def part() -> str:
-        return f"({random_condition(rng, depth - 1)})"
-
-    span = f"{rng.choice((0.2, 0.7, 1.5))} s"
-    operators: list[Callable[[], str]] = [
-        lambda: f"{part()} and {part()}",
-        lambda: f"{part()} or {part()}",
-        lambda: f"not {part()}",
-        lambda: f"{part()} implies {part()}",
-        lambda: f"{part()} within {span}",
-        lambda: f"{part()} for {span}",
-        lambda: f"{part()} within 0.3 s to 1.1 s ago",
-        lambda: f"{part()} for 0.3 s to 1.1 s ago",
-        lambda: f"once {part()}",
-        lambda: f"always {part()}",
-        lambda: f"previous {part()}",
-        lambda: f"{part()} since {part()}",
-        lambda: f"{part()} since[{span}] {part()}",
-        lambda: f"{part()} until[{span}] {part()}",
-        lambda: f"{part()} release[{span}] {part()}",
-        lambda: f"eventually[{span}] {part()}",
-        lambda: f"henceforth[{span}] {part()}",
-        lambda: f"{part()} in 60 % of {span}",
-        lambda: f"{part()} in 2 of 4 samples",
-        lambda: f"last({part()}, {span})",
-        lambda: f"(exists c: (touching(b, c) and converging(a, c))) or {part()}",
-        lambda: f"(exists c: converging(a, c)) and {part()}",
-        lambda: f"{part()} and (forall c: not touching(a, c))",
-    ]
-    return rng.choice(operators)()
-
-
-def conditions(count: int) -> list[str]:
-    rng, found = Random(23), dict[str, None]()
-    while len(found) < count:
-        text = random_condition(rng, rng.randint(0, 3))
-        if "a" in text and "b" in text:
-            found[text] = None
-    return list(found)
-
-
-CONDITIONS = conditions(24)
+CONDITIONS = random_conditions(24, 23)
 
 
 def test_what_is_found_is_what_the_agent_says(

@@ -84,6 +84,7 @@ def make_plan(lake: Lake | None, clips: Iterable[Clip], settings: WatchSettings)
     Raises:
         VisupError: A file that the settings name cannot be read.
     """
+    there = frozenset(lake.runs() if lake else ())
     hashes: dict[str, str] = {}
     jobs: dict[str, Job] = {}
     present, same, failed = 0, 0, list[FailedClip]()
@@ -100,7 +101,7 @@ def make_plan(lake: Lake | None, clips: Iterable[Clip], settings: WatchSettings)
             continue
         if job.run in jobs:
             same += 1
-        elif lake is not None and lake.has(job.run):
+        elif job.run in there:
             present += 1
         elif lake is not None and Attempts(lake.path, job.run).exhausted:
             failed.append(put_aside(job))

@@ -179,19 +179,22 @@ def runs_of(
     Args:
         database: The lake.
         times: When it may be; None for always.
-        who: Variable -> SELECT of `run` and `object`.
+        who: Variable -> SELECT of `run`, as a number, and `object`.
     """
     named = {v: f'"who_{v}"' for v in who}
     parts = [f"{named[v]} AS MATERIALIZED ({select})" for v, select in who.items()]
     if times:
-        parts.append(HELD.format(names=", ".join(map(quoted, times.relations))))
+        known = "".join(f" AND number IN (SELECT run FROM {table})" for table in named.values())
+        parts.append(HELD.format(names=", ".join(map(quoted, times.relations)), known=known))
     for variable, table in named.items():
         times = times and times.meant(variable, f"FROM {table}")
-    sql = f"SELECT run FROM ({times.sql if times else 'SELECT run FROM lake.runs'})"
+    sql = f"SELECT run FROM ({times.sql if times else 'SELECT number AS run FROM lake_index.runs'})"
     for table in named.values():
         sql = f"SELECT run FROM ({sql}) SEMI JOIN {table} USING (run)"
     first = f"WITH {', '.join(parts)} " if parts else ""
-    answer = database.ask(f"{first}SELECT DISTINCT run FROM ({sql}) ORDER BY run")
+    answer = database.ask(
+        f"{first}SELECT k.run FROM lake_index.runs k SEMI JOIN ({sql}) f ON f.run = k.number ORDER BY run"
+    )
     found: list[str] = answer["run"].to_pylist()
     return found
 
@@ -199,22 +202,17 @@ def runs_of(
 def objects_meant(variable: str) -> str | None:
     """The objects that a name may ever have stood for, as a SELECT; None for a name that is anybody's."""
     if by_id := _BY_ID.fullmatch(variable):
-        return f"SELECT run, object FROM lake.objects WHERE object = {by_id[1]}"
+        return (
+            "SELECT n.number AS run, o.object FROM lake.objects o JOIN lake_index.runs n USING (run)"
+            f" WHERE o.object = {by_id[1]}"
+        )
     if len(variable) == 1:
         return None
-    name, path = quoted(variable), quoted(f'$."{variable}"[*]')
-    return (
-        "SELECT o.run, o.object FROM lake.objects o JOIN lake.runs r USING (run)"
-        f" WHERE list_contains(o.names, {name}) OR list_contains(o.actors, {name})"
-        f" OR list_has_any(o.names, json_extract_string(r.actors, {path}))"
-    )
+    return f"SELECT number AS run, object FROM lake_index.meant WHERE name = {quoted(variable)}"
 
 
 def _nobody(database: LakeDatabase, name: str) -> QueryError:
-    known = database.ask(
-        "SELECT DISTINCT name FROM (SELECT unnest(names) AS name FROM lake.objects"
-        " UNION ALL SELECT unnest(actors) FROM lake.objects) ORDER BY name"
-    )
+    known = database.ask("SELECT DISTINCT name FROM lake_index.meant ORDER BY name")
     names = [n for n in known.column("name").to_pylist() if " " not in n]
     return QueryError(
         f"nobody in this lake was ever taken for '{name}'",

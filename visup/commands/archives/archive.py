@@ -86,6 +86,7 @@ def run(
     from visup.archive.filling.clips import clips_of
     from visup.archive.filling.filling import begin_anew, only_filler
     from visup.archive.filling.plan import make_plan
+    from visup.archive.joining.compacting import compact_if_worth_it
     from visup.archive.lake import MARK, Lake
     from visup.terminal.console import make_console
 
@@ -102,6 +103,7 @@ def run(
         todo = make_plan(lake, clips, settings)
         _print_plan(console, into, todo, pool.processes)
         result = _filled(console, lake, todo, pool)
+        compact_if_worth_it(lake)
     for text in _closing(result):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if result.failed else 0)
@@ -133,6 +135,32 @@ def add(
         else:
             echo(f"{key}  {folder}" if added else f"{key}  {folder} was there already")
     raise typer.Exit(1 if failed else 0)
+
+
+@app.command("compact")
+def compact(
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    now: Annotated[
+        bool,
+        typer.Option("--now", help="Remove what is replaced at once; when nobody asks the lake."),
+    ] = False,
+) -> None:
+    """Join the files of many runs, so that questions to large lakes are answered in seconds.
+
+    What is replaced is removed by the next call, ten minutes later at the earliest: others may be reading it.
+    """
+    from visup.archive.filling.filling import only_filler
+    from visup.archive.joining import compacting
+    from visup.archive.lake import Lake
+    from visup.terminal.console import echo
+
+    found = Lake.open(lake)
+    with only_filler(found):
+        done = compacting.compact(found, grace_s=0.0 if now else compacting.GRACE_S)
+    ending = "" if done.partitions == 1 else "s"
+    said = f"Joined: {done.joined} runs; the lake has {done.partitions} partition{ending}."
+    gone = f" Files that were replaced went, of {done.tidied} runs." if done.tidied else ""
+    echo(f"{said}{gone}")
 
 
 @app.command("replay")
