@@ -171,6 +171,28 @@ def compact(
     echo(f"{said}{gone}")
 
 
+@app.command("report")
+def report(
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The page (default: report.html in the lake)."),
+    ] = None,
+) -> None:
+    """Write a page about all runs: durations of stages by week and actor, drifts, how runs fail."""
+    from visup.archive.asking.database import open_database
+    from visup.archive.lake import Lake
+    from visup.archive.reporting.page import write_lake_page
+    from visup.archive.reporting.statistics import lake_statistics
+    from visup.terminal.console import echo
+
+    path = out or lake / "report.html"
+    with open_database(Lake.open(lake)) as database:
+        found = lake_statistics(database)
+    write_lake_page(found, lake, path)
+    echo(f"{path}: {found.runs} runs")
+
+
 @app.command("replay")
 @takes(WatchSettings, ManyRuns, only=(*REPLAYED, "workers"))
 def replay(
