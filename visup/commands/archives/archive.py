@@ -79,7 +79,8 @@ def run(
     sources: Annotated[
         list[str],
         typer.Argument(
-            metavar="SOURCE...", help="Clips, folders, patterns ('*.mp4'), or manifests (.csv)."
+            metavar="SOURCE...",
+            help="Clips, folders, patterns ('*.mp4'), URLs, manifests (.csv, .parquet).",
         ),
     ],
     into: Into,
