@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Played, Script, Spell, play, task_of
-from visup.agent import Status, Verdict
+from tests.tasks.scripted import Played, Script, Spell, mind_at, play, task_of
+from visup.agent import Observation, Status, Verdict
+from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
@@ -125,3 +126,15 @@ def test_rounds_that_may_come_are_one_prospect_while_their_parts_are_not_there()
     next_ones = task_of(watched(loop(), replace(emptied(()), objects=one), 0)).prospects
     rounds = [p.stage for p in next_ones if p.stage.startswith("take")]
     assert rounds == ["take(part_2)"]
+
+
+def test_a_run_that_is_taken_up_again_in_a_round_goes_on_as_if_it_had_not_been_left() -> None:
+    script, whole = emptied((1, 0)), watched(loop(), emptied((1, 0)), 2)
+    reasoner = task_reasoner([parse_task(loop())])
+    at = next(i for i, m in enumerate(whole.minds) if m.time >= 4.0)
+    mind, events = load_state(dump_state(whole.minds[at])), []
+    for index in range(at + 1, len(whole.minds)):
+        now = mind_at(script, index / 4.0, index, mind)
+        outcome = reasoner(now, Observation(index, index / 4.0, (640, 480)))
+        mind, events = outcome.mind, [*events, *outcome.events]
+    assert events == [e for e in whole.events if e.time > 4.0]
