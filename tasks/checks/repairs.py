@@ -52,7 +52,7 @@ def with_tried_hints(
     for number, fault in enumerate(faults):
         hint = None
         if number < MOST_HINTS and trial.left > 0 and not trial.helps(fault):
-            hint = trial.best(fault, _hints(text, fault)) or trial.best(fault, _edits(fault))
+            hint = trial.mend(fault)
         said = None if fix_of(text, fault.place, fault.hint) else fault.hint  # what helps nothing
         found.append(fault if hint is None else replace(fault, hint=_joined(said, hint)))
     return tuple(found)
@@ -62,8 +62,9 @@ FAULT_COST = 100
 """A fault takes as long to explain as so many characters take to read, or longer."""
 LONGEST_HINT = 400
 """Characters of a hint: what is longer, nobody reads."""
-NOTHING, IN_PART, WHOLLY = range(3)
-"""How much a change helps: not, by what could not be read only, or by a fault and to no new one."""
+NOTHING, ONE_STEP, IN_PART, WHOLLY = range(4)
+"""How much a change helps: not; so that the next fault lies further on; by what could not be read only; or
+by a fault and to no new one."""
 
 
 @dataclass
@@ -82,20 +83,30 @@ class _HintTrial:
     check: Check
     left: int = CHARACTERS_TRIED
 
-    def best(self, fault: Diagnostic, hints: Iterable[str]) -> str | None:
-        """The first hint that helps wholly, else the first that helps in part."""
+    def mend(self, fault: Diagnostic) -> str | None:
+        """A hint that helps: what is usually meant before small edits, one step before none."""
+        usual, helps = self.best(fault, _hints(self.text, fault))
+        if helps > ONE_STEP:
+            return usual
+        edit, helps = self.best(fault, _edits(fault))
+        return edit if helps > ONE_STEP else usual
+
+    def best(self, fault: Diagnostic, hints: Iterable[str]) -> tuple[str | None, int]:
+        """The first hint that helps wholly, else the first that helps most; and how much."""
         partly: str | None = None
+        most = NOTHING
         for hint in hints:
-            if len(hint) > LONGEST_HINT:
+            if len(hint) > LONGEST_HINT or "..." in hint:
                 continue
             self.left -= len(self.text) + FAULT_COST * len(self.faults)
             if self.left < 0:
                 break
             helps = self.helps(replace(fault, hint=hint))
             if helps == WHOLLY:
-                return hint
-            partly = partly or (hint if helps else None)
-        return partly
+                return hint, WHOLLY
+            if helps > most:
+                partly, most = hint, helps
+        return partly, most
 
     def helps(self, fault: Diagnostic) -> int:
         """How much the change helps that a hint speaks of."""
@@ -103,12 +114,27 @@ class _HintTrial:
         if fix is None:
             return NOTHING
         after = self.check(fix.applied(self.text))
-        known = {(f.code, f.message) for f in self.faults}
+        known = told(self.faults)
         if len(after) < len(self.faults) and all((f.code, f.message) in known for f in after):
             return WHOLLY
         # What could not be read hid what comes to light now.
         unread = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
-        return IN_PART if fault.code < "E2" and unread[0] < unread[1] else NOTHING
+        if fault.code >= "E2":
+            return NOTHING
+        if unread[0] < unread[1]:
+            return IN_PART
+        new = [f for f in after if (f.code, f.message) not in known]
+        further = all(_at(f) > _at(fault) for f in new) and len(after) <= len(self.faults)
+        return ONE_STEP if further and (fault.code, fault.message) not in told(after) else NOTHING
+
+
+def told(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
+    """What is said of faults, wherever they stand."""
+    return {(f.code, f.message) for f in faults}
+
+
+def _at(fault: Diagnostic) -> tuple[int, int]:
+    return fault.place.line, fault.place.column
 
 
 def _joined(said: str | None, hint: str) -> str:

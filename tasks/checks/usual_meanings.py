@@ -38,6 +38,10 @@ SYNONYMS = {
     "hold": "coupled", "above": "on", "upon": "on", "atop": "on", "connected": "coupled",
     "released": "decoupled", "release": "decoupled",
     "leaving": "diverging", "retreating": "diverging", "contact": "touching", "visible": "present",
+    "take": "coupled", "grab": "coupled", "pick": "coupled", "lift": "coupled", "carry": "coupled",
+    "bring": "converging", "move": "moving", "goto": "converging", "reach": "converging",
+    "put": "decoupled", "place": "decoupled", "drop": "decoupled", "leave": "diverging",
+    "touch": "touching", "wait": "present", "push": "touching", "insert": "touching",
     "left": "gone", "away": "gone", "in": "inside", "separate": "apart", "moving_apart": "diverging",
 }  # fmt: skip
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
@@ -60,6 +64,11 @@ PREFIXES = ("already", "task", "never", "always")
 def _listed(word: str, stages: str) -> str:
     """Stages in a list behind a word: `any order (<a>, <b>)`."""
     return f"{word} ({', '.join(stages.split())})"
+
+
+def _action_meant(name: str) -> str:
+    """What everyday speech says, by the whole of a name or a part of it; else the name."""
+    return next((SYNONYMS[p] for p in (name, *name.split("_")) if p in SYNONYMS), name)
 
 
 USUAL = (
@@ -94,6 +103,18 @@ USUAL = (
     _usual("E101 E228", rf"({CALL})\s*={{1,3}}\s*(\d)", r"\1 <= \2"),
     _usual("E101", rf"({CALL})\s*!=\s*(\d)", r"\1 > \2"),
     _usual("E101", r"<=>|<->|->|=>", " "),
+    _usual("E101 E103 E117 E119 E135", r",\s*,", ","),
+    _usual("E101 E119 E103", r"\b(any\s+\d+)\s*(?=\()", r"\1 of "),
+    _usual("E101 E115", rf"\b(for\s+each\s+{NAME}\s+(?:of|in))\s+({NAME}(?:\s*,\s*{NAME})+)\s+", r"\1 (\2) "),
+    _usual("E101 E119", r"\bany\s+of\s*(?=\()", "any 1 of "),
+    _usual("E101 E103",
+           r"\b(?:from|in|within)\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|\.\.)\s*([\d.]+\s*[a-z%/]+)",
+           r"between \1 and \2"),
+    _usual("E127 E134", rf"\brepeat\s+({PARTS})\s+until\s+({PARTS})", r"\1+ \2"),
+    _usual("E101 E103 E134", r"\b(?:maximum|max|up\s+to|no\s+more\s+than)\s+(\d+)\s+times?\b",
+           r"at most \1 times"),
+    _usual("E101 E103 E134", r"\b(?:minimum|min|no\s+(?:less|fewer)\s+than)\s+(\d+)\s+times?\b",
+           r"at least \1 times"),
     _usual("E119", r"\s*,(?=\s)", ""),
     _usual("E119", r"\band\b", "&"),
     _usual("E119", r"\bor\b", "|"),
@@ -192,7 +213,8 @@ USUAL = (
     _usual("E127", rf"\b(?:if)\s+({CALL})\s*(?:then)?", r"\1"),
     _usual("E108", r"<\s*([^<>]+?)\s*>", lambda m: f"<{re.sub(r'[^0-9a-zA-Z_]+', '_', m[1])}>"),
     _usual("E107", rf"<({NAME})(?![\w>])", r"<\1>"),
-    _usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: SYNONYMS.get(m[1].lower(), m[1].lower())),
+    _usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: _action_meant(m[1].lower())),
+    _usual("E201", rf"\b{NAME}(?=\s*\(\s*{NAME}\s*\))", "moving"),
     _usual("E202", rf"<({NAME})>\s*", ""),
     _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*\)", r"\1(\2, other)"),
     _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),

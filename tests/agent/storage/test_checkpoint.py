@@ -21,9 +21,9 @@ from visup.agent import Health, HealthStatus, Region
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.checkpoint import MAGIC, StateError, dump_state, load_state
+from visup.agent.storage.codec import pack_observation
 from visup.rules.formula.units import Span
 from visup.tasks.grammar.conditions import Name, PartName
-from visup.agent.storage.codec import pack_observation
 
 
 @settings(max_examples=40)
