@@ -179,5 +179,7 @@ def _nearest(path: Path) -> str:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:
         return f"there is no folder {path.parent} that can be read"
-    near = closest(path.name, names)
+    # The endings are often the same, and make any two names look alike.
+    alike = [n for n in names if closest(path.stem, [Path(n).stem])]
+    near = closest(path.name, alike)
     return f"did you mean {path.parent / near}?" if near else "check the name"

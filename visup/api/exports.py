@@ -22,6 +22,7 @@ COLUMNS = (
     "name",
     "share",
     "presence",
+    "confirmed",
     "x",
     "y",
     "width",
@@ -39,11 +40,11 @@ def export(
         run: A run, or its folder.
         form: `mot` (MOT Challenge: a line a box, frames from 1), `coco` (COCO JSON with `track_id`),
             `fiftyone` (labels of a video for FiftyOne: boxes as shares of the picture, frames from 1) or
-            `csv` (all that is believed, also of hidden objects).
+            `csv` (all that is believed, also of hidden objects and passing impressions).
         target: The file.
 
     Returns:
-        How many boxes were written.
+        How many boxes of objects in view were written: of one run the same in each form.
 
     Raises:
         SettingsError: There is no such form.
@@ -63,7 +64,11 @@ def export(
 
 def _seen(run: RecordedRun) -> Iterator[RecordedObject]:
     """Objects in view that are more than a passing impression."""
-    return (o for o in run.objects if o.confirmed and o.presence == "seen")
+    return filter(_in_view, run.objects)
+
+
+def _in_view(o: RecordedObject) -> bool:
+    return o.confirmed and o.presence == "seen"
 
 
 def _mot(run: RecordedRun) -> tuple[str, int]:
@@ -143,8 +148,9 @@ def _csv(run: RecordedRun) -> tuple[str, int]:
     writer.writerow(COLUMNS)
     count = 0
     for o in run.objects:
-        writer.writerow((o.frame_index, o.time, o.id, o.name, o.share, o.presence, *o.bbox, o.area))
-        count += 1
+        believed = (o.name, o.share, o.presence, o.confirmed)
+        writer.writerow((o.frame_index, o.time, o.id, *believed, *o.bbox, o.area))
+        count += _in_view(o)
     return out.getvalue(), count
 
 

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+WITH_HIDDEN = ", and rows for what is hidden or not yet confirmed"
+
 
 def export(
     run: Annotated[Path, typer.Argument(help="Run folder of `visup watch`, or its journal.")],
@@ -21,4 +23,5 @@ def export(
 
     suffix = {"mot": "txt", "coco": "json", "fiftyone": "json"}.get(form, form)
     target = out or Path(f"{run.name}-{form}.{suffix}")
-    echo(f"{target}: {write(run, form, target)} boxes")
+    boxes = f"{write(run, form, target)} boxes of objects in view"
+    echo(f"{target}: {boxes}{WITH_HIDDEN if form == 'csv' else ''}")

@@ -91,16 +91,37 @@ class CheckpointWriter:
         if not self._every_s or self.note or busy or early:
             return
         self._last = step.time
+        data = self._data(agent, step, kept())
+        if data is not None:
+            with suppress(RuntimeError):  # no room for a thread
+                self._writing = self._disk.submit(self._write, data)
+
+    def keep(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> None:
+        """Keep the state after a step at once, and wait until it is on the disk.
+
+        Args:
+            agent: After the step.
+            step: The step, which the journal holds already.
+            kept: What the recorder remembers.
+        """
+        if not self._every_s or self.note:
+            return
+        self._last = step.time
+        data = self._data(agent, step, kept)
+        if data is not None:
+            self._disk.submit(self._write, data).result()
+
+    def _data(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> bytes | None:
+        """The state as it is written, or None where there can be none."""
         try:
-            data = self._frozen(agent, step, kept())
+            data = self._frozen(agent, step, kept)
         except StateError as fault:
             self.note = _none_kept(fault)
-            return
+            return None
         except MemoryError:
-            return  # no room for a copy: the older state stays, supervision goes on
+            return None  # no room for a copy: the older state stays, supervision goes on
         self.largest = max(self.largest, len(data))
-        with suppress(RuntimeError):  # no room for a thread
-            self._writing = self._disk.submit(self._write, data)
+        return data
 
     def _write(self, data: bytes) -> None:
         packed = seal(PACKED + zlib.compress(data, 1), self._key)

@@ -92,6 +92,12 @@ def interrupted_run(
     facts = recording.facts()
     if "settings" not in facts:
         raise OutputError("nothing was recorded of this run", where=str(run), hint="begin it anew")
+    if facts.get("ended") == "rolled":
+        raise OutputError(
+            "this run is over: it goes on in another one",
+            where=str(run),
+            hint=f"that is {run.parent / str(facts.get('next_run'))}",
+        )
     if facts.get("ended") == "complete":
         raise OutputError(
             "this run is over: its source was seen to the end",
@@ -100,9 +106,10 @@ def interrupted_run(
         )
     state, why_none = read_checkpoint(recording.path.parent)
     ends = recording.first_and_last()
-    if state is not None and (ends is None or not ends[0] - 1 <= state.frame_index <= ends[1]):
+    continues = facts.get("continues") is not None
+    if state is not None and not _belongs(state, ends, continues=continues):
         state, why_none = None, "its checkpoint does not belong to this journal"
-    if state is None and facts.get("steps_dropped"):
+    if state is None and (facts.get("steps_dropped") or continues):
         raise OutputError(
             "neither the first steps of this run nor a later checkpoint is kept",
             where=str(run),
@@ -113,6 +120,15 @@ def interrupted_run(
     settings = _with_secret(settings, run, source, needed=bool(facts.get(SOURCE_REDACTED)))
     answers = _answers(facts, str(run))
     return InterruptedRun(recording, settings, state, why_none, recording.count(), verdict, answers)
+
+
+def _belongs(state: Checkpoint, ends: tuple[int, int] | None, *, continues: bool) -> bool:
+    """Whether a state is that of one of the steps that are kept, or of the run that this one continues."""
+    if ends is None:
+        return continues
+    return ends[0] - 1 <= state.frame_index <= ends[1] or (
+        continues and state.frame_index < ends[0]
+    )
 
 
 def _with_named_code(

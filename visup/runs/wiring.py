@@ -6,12 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from visup.agent import Behaviour, Contract, Mind, Verdict, Zone
+from visup.agent import Behaviour, Contract, Frame, Mind, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.step import Observer
+from visup.agent.model.step import Observer, Step
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
@@ -219,9 +219,27 @@ _GRAVITY = (
 )
 
 
+class VerdictMonitor:
+    """What comes of the events of a run without a task: an observer.
+
+    Args:
+        verdict: What came of it before.
+
+    Attributes:
+        verdict: What has come of it.
+    """
+
+    def __init__(self, verdict: Verdict | None) -> None:
+        self.verdict = verdict
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Take note of a step."""
+        self.verdict = verdict_without_task(grave_kinds(step.events), self.verdict)
+
+
 def _limits(settings: WatchSettings, live: bool) -> Limits:
     usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
-    return replace(usual, hang_s=LIVE_HANG_S) if live else usual
+    return replace(usual, hang_s=LIVE_HANG_S, patient=False) if live else usual
 
 
 def _behaviours(

@@ -29,14 +29,14 @@ class CameraChild:
     It is of a session of its own: Ctrl-C in the supervisor's terminal is the supervisor's alone to hear.
 
     Args:
-        job: What it is to do.
+        job: What it is to do; None of one that stands ready, and is given its job later.
         command: What is run.
 
     Raises:
         OSError: No process can be begun.
     """
 
-    def __init__(self, job: CameraJob, command: Command = camera_command) -> None:
+    def __init__(self, job: CameraJob | None, command: Command = camera_command) -> None:
         self._reports, theirs = os.pipe()
         os.set_blocking(self._reports, False)
         try:
@@ -50,6 +50,11 @@ class CameraChild:
             os.close(theirs)
         self.pid = self._process.pid
         self._rest = b""
+        if job:
+            self.give(job)
+
+    def give(self, job: CameraJob) -> None:
+        """Give it its job."""
         self._send(job_line(job))
 
     def reports(self) -> list[CameraReport]:
@@ -89,6 +94,13 @@ class CameraChild:
         """End it at once, with all that it began; `exit_code` tells when it has."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, signal.SIGKILL)
+
+    def end(self, wait_s: float = 5.0) -> None:
+        """End it at once, wait until it has, and free what is held of it."""
+        self.kill()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(wait_s)
+        self.close()
 
     def let_go(self) -> None:
         """Supervise it no more: it closes its books, as when its supervisor has died."""

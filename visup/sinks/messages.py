@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from visup.agent import Alert, Frame, Verdict
@@ -46,6 +46,10 @@ class AlertSender:
         outboxes: Of the sinks.
         source: What is watched.
         stamp: What else stands in every record: camera, host, time of the wall.
+
+    Attributes:
+        links: Tells where the evidence of an alert is, by keys of its record.
+        gate: Tells which alerts of a step are sent now.
     """
 
     def __init__(
@@ -54,12 +58,14 @@ class AlertSender:
         self._outboxes = outboxes
         self._stamp = stamp or RecordStamp()
         self._source = redacted(source)
+        self.links: Callable[[Alert], Mapping[str, str]] = lambda alert: {}
+        self.gate: Callable[[Step], Sequence[Alert]] = lambda step: step.alerts
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Send the alerts that a step opened or closed."""
-        for alert in step.alerts:
+        for alert in self.gate(step):
             when = alert.opened if alert.closed is None else alert.closed
-            self._send(alert_record(alert, self._source), when)
+            self._send({**alert_record(alert, self._source), **self.links(alert)}, when)
 
     def notice(self, text: str) -> None:
         """Send a sentence that cannot wait for a step."""

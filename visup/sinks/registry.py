@@ -58,6 +58,7 @@ class Sinks:
 
     Attributes:
         outboxes: One for each.
+        alerts: What leaves records of alerts in them.
     """
 
     def __init__(
@@ -72,20 +73,20 @@ class Sinks:
         made = [open_sink(w, access) for w in wanted]
         self.outboxes = [Outbox(s, _room(s)) for s in made]
         self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
-        self._alerts = AlertSender(self._of_alerts, source, stamp)
+        self.alerts = AlertSender(self._of_alerts, source, stamp)
         self._observers: list[Observer] = [
             _sender(o, _OF_STEPS[_kind(o)]) for o in self.outboxes if _kind(o) in _OF_STEPS
         ]
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Leave what a step tells in the outboxes."""
-        self._alerts(step, frame)
+        self.alerts(step, frame)
         for observer in self._observers:
             observer(step, frame)
 
     def notice(self, text: str) -> None:
         """Send a sentence that cannot wait for a step."""
-        self._alerts.notice(text)
+        self.alerts.notice(text)
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with sinks now."""
@@ -93,7 +94,7 @@ class Sinks:
 
     def end(self, verdict: Verdict | None, steps: int) -> tuple[str, ...]:
         """Send the verdict, close everything, and say what was not delivered."""
-        self._alerts.end(verdict, steps)
+        self.alerts.end(verdict, steps)
         self.close()
         return tuple(o.note for o in self.outboxes if o.note)
 

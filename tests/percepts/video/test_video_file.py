@@ -162,6 +162,14 @@ def test_a_near_miss_in_the_name_is_suggested(tmp_path: Path) -> None:
     assert caught.value.hint == f"did you mean {tmp_path / 'capture.avi'}?"
 
 
+@pytest.mark.parametrize("there", ["short.mp4", "b.mp4", "report.mp4"])
+def test_that_the_endings_are_alike_makes_no_name_near(tmp_path: Path, there: str) -> None:
+    (tmp_path / there).touch()
+    with pytest.raises(SourceError) as caught:
+        open_source(str(tmp_path / "cart.mp4"))
+    assert caught.value.hint == "check the name"
+
+
 def test_a_file_that_may_not_be_read_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

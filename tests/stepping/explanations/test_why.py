@@ -9,6 +9,7 @@ from visup.agent import Hypothesis, Region
 from visup.agent.model.errors import VisupError
 from visup.stepping import Stepper
 from visup.stepping.explanations.evidence import Why
+from visup.stepping.explanations.why import REPORTED
 from visup.terminal.display import html, shown
 
 
@@ -39,7 +40,7 @@ TOLD = {
     "approach": ("stage approach: failing", "the arm and the satellite have been diverging"),
     "stage captured": ("stage captured: pending", "arm is played by object 3"),
     "touching 1 2": ("touching(the satellite, the hubble) has been false", "its value is"),
-    "coupled 1 3": ("coupled(the satellite, the arm) has been false", "touching"),
+    "coupled 1 3": ("coupled(the satellite, the arm) is false", "touching"),
     "identity 1": ("object 1 is spartan", "votes, share"),
     "object 3": ("object 3 is believed to be seen", "first seen at 0.00 s"),
     "collision_course 1 2": ("collision_course(the", "converging("),
@@ -54,6 +55,13 @@ def test_why_has_its_reasons_and_its_percepts(it: Stepper, text: str) -> None:
     assert why.text.startswith(head)
     assert any(below in w.text for w in why.walk())
     assert any(isinstance(p.value, Region | Hypothesis) for p in why.percepts)
+    assert "`" not in str(why)  # as the narrative has it
+
+
+def test_a_stage_is_explained_with_what_was_last_reported_of_it(it: Stepper) -> None:
+    reported = next(w for w in it.why("approach").walk() if w.text == REPORTED)
+    assert reported.parts
+    assert all("Stage 'approach'" in w.line() for w in reported.parts)
 
 
 def test_records_themselves_can_be_asked_about(it: Stepper) -> None:

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tasks.scripted import Played, Script, Spell, mind_at, play, task_of
-from visup.agent import Observation, Status, Verdict
+from visup.agent import Event, Observation, Status, Verdict
 from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -132,7 +132,7 @@ def test_a_run_that_is_taken_up_again_in_a_round_goes_on_as_if_it_had_not_been_l
     script, whole = emptied((1, 0)), watched(loop(), emptied((1, 0)), 2)
     reasoner = task_reasoner([parse_task(loop())])
     at = next(i for i, m in enumerate(whole.minds) if m.time >= 4.0)
-    mind, events = load_state(dump_state(whole.minds[at])), []
+    mind, events = load_state(dump_state(whole.minds[at])), list[Event]()
     for index in range(at + 1, len(whole.minds)):
         now = mind_at(script, index / 4.0, index, mind)
         outcome = reasoner(now, Observation(index, index / 4.0, (640, 480)))

@@ -2,5 +2,6 @@
 
 Read `pattern.py` (what is looked for), `possible.py` (which runs can have it, by the intervals of relations),
 `judge.py` (a condition judged step by step) and `search.py` (those runs reasoned about again, which gives
-what an agent would have said).
+what an agent would have said); `task_search.py` asks where a task was carried out, `clips.py` cuts hits out
+of the footage.
 """

@@ -301,3 +301,15 @@ def hardening_closing(figures: Figures) -> Iterator[str]:
 def any_failures(figures: Figures) -> bool:
     """Whether there were failures."""
     return bool(figures.get("failed", figures.get("failures")))
+
+
+def archive_closing(figures: Figures) -> Iterator[str]:
+    """Each part in a line."""
+    for name, part in figures["items"].items():
+        told = (f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items())
+        yield f"{name}: {', '.join(told)}"
+
+
+def anything_different(figures: Figures) -> bool:
+    """Whether something is not equal that ought to be."""
+    return bool(figures["total"]["different"])

@@ -25,6 +25,37 @@ MACHINERY_EVALUATIONS = (
         failed=adapters.any_failures,
     ),
     EvaluationCommand(
+        "archive",
+        """Lakes: filled whatever is killed, found as replays say, and large ones asked fast.
+
+        Exit code: 0 when nothing differs that ought to be equal, else 1.
+        """,
+        "visup.evaluation.archive.runner:evaluate_archive",
+        "archiving",
+        (),
+        (
+            Setting(
+                "part",
+                list[str] | None,
+                None,
+                Option("exact, kills, large, throughput, scheduler; all if none."),
+            ),
+            count("formulas", 50, "exact: random conditions.", 1),
+            count("every", 4, "exact, large: use every n-th frame of a mission."),
+            count("kills", 4, "kills: of workers; a tenth as many of the scheduler.", 0),
+            count("clips", 8, "kills: short clips."),
+            count("runs", 1_000, "large: runs, of a thousand rows each."),
+            count("frames", 100, "throughput: frames of each mission."),
+            count("rounds", 1, "throughput: how often."),
+            count("jobs", 1_000, "scheduler: jobs."),
+            count("workers", 100, "scheduler: workers that sleep."),
+            _SEED,
+        ),
+        folder_argument("A mission, or a folder of missions."),
+        adapters.archive_closing,
+        adapters.anything_different,
+    ),
+    EvaluationCommand(
         "hardening",
         """Damaged files of every kind, attacks, races of writers, cuts of power: nothing gets in or lost.
 

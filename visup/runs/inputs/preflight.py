@@ -134,3 +134,13 @@ def _refusal(
         else f"visup models list {settings.models}; then --actor {actor}=MODEL in place of "
         f"{' or '.join(models)}",
     )
+
+
+def told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
+    """A sentence on each actor that is what was taught, other than its task declares."""
+    return tuple(
+        f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
+        "models that its task names."
+        for actor in actors
+        if actor not in given
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from visup.agent import Depth, Health, Hypothesis, Observation, Percept, Region
 from visup.agent.model.display import enable_display
 from visup.rules.safety.explain import RuleExplanation
+from visup.wording import prose
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +37,10 @@ class Why:
 
     def line(self) -> str:
         """This node alone."""
+        text = prose(self.text)
         if self.frame_index is None or self.time is None:
-            return self.text
-        return f"{self.text} [frame {self.frame_index}, {self.time:.2f} s]"
+            return text
+        return f"{text} [frame {self.frame_index}, {self.time:.2f} s]"
 
     def walk(self) -> Iterator[Why]:
         """This node and all below it."""
@@ -112,7 +114,9 @@ def percept_text(value: object) -> str:
             return f"that region {value.region_id} looks like {looks}"
         case Depth():
             far = f"{value.depth:.1f} ± {value.sigma:.1f}"
-            return f"that region {value.region_id} as {value.name} is {far} away"
+            return (
+                f"that region {value.region_id}, if it is {value.name}, is {far} model units away"
+            )
         case Health():
             return f"camera {value.status.value}" + (f": {value.detail}" if value.detail else "")
     text = str(value)

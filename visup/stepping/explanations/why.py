@@ -38,6 +38,10 @@ LOOK_BACK = 250
 """How many steps back the latest percepts that name an object are looked for."""
 
 
+REPORTED = "what was last reported of it:"
+"""Heads the latest events of a stage."""
+
+
 class RunTimeline(Protocol):
     """What reasons are looked up in: a stepper."""
 
@@ -113,8 +117,8 @@ class ReasonFinder:
         for number, event in self.course.told(last=self.number):
             if event.kind == "alert" and event.data.get("alert") == alert_id:
                 return number, event
-        known = ", ".join(str(a.id) for a in self.mind.alerts) or "none is open"
-        raise SettingsError(f"there was no alert {alert_id}", expected=known)
+        known = ", ".join(str(a.id) for a in self.mind.alerts) or "none is open now"
+        raise SettingsError(f"no alert {alert_id} has been raised so far", expected=known)
 
     def _cause(self, kind: str, event: Event) -> Why:
         """Why a concern of some kind held after this step."""
@@ -171,10 +175,12 @@ class ReasonFinder:
             named = f"{name}({', '.join(map(str, objects))})"
             raise SettingsError(f"{named} is not judged", expected="a relation of objects in view")
         who = ", ".join(short(self.mind, i) for i in objects)
-        text = (
-            f"{name}({who}) has been {r.truth.value} since {r.since:.2f} s, "
-            f"confidence {r.confidence:.2f}"
+        # Since when some are false is not kept: they carry the time of the step.
+        lasting = r.since < self.mind.time
+        stands = (
+            f"has been {r.truth.value} since {r.since:.2f} s" if lasting else f"is {r.truth.value}"
         )
+        text = f"{name}({who}) {stands}, confidence {r.confidence:.2f}"
         parts = self._measured(r) + (self._coupled(objects) if name == "coupled" else ())
         sights = tuple(self._sight(i) for i in objects) if deep else ()
         return Why(text, (*parts, *sights), *self._here)
@@ -190,7 +196,7 @@ class ReasonFinder:
         pending = self.mind.recall(COUPLING).get((low, high))
         since = {
             "they last converged at": getattr(pending, "converged_at", None),
-            "apart since": getattr(pending, "apart_since", None),
+            "apart, or leaving each other, since": getattr(pending, "apart_since", None),
         }
         dated = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
         if pending is not None:
@@ -272,7 +278,7 @@ class ReasonFinder:
             if e.kind.startswith("stage_") and e.data.get("stage") == s.stage
         ]
         parts = [Why(s.evidence)] if s.evidence else []
-        parts += [Why("it was told", tuple(since[-3:]))] if since else []
+        parts += [Why(REPORTED, tuple(since[-3:]))] if since else []
         parts += self._asked(task) if task.current == s.stage else []
         text = f"stage {s.stage}: {s.status.value} since {s.since:.2f} s"
         return Why(f"{text}, confidence {s.confidence:.2f}", (*parts, *self._actors(task)))
