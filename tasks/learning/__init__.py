@@ -5,5 +5,6 @@ Kim and Demiris, "Learning action symbols for hierarchical grammar induction", 2
 that all runs share kept and every other order left free, as task graphs do.
 
 Read in this order: `traces.py` (a run as happenings), `order.py` (loops and order), `periods.py`
-(loops that keep a rhythm), `induction.py` (the task file), `judging.py` (a task on a run), `fitting.py`, `coverage.py`, `languages.py`.
+(loops that keep a rhythm), `induction.py` (the task file), `judging.py` (a task on a run), `fitting.py`,
+`coverage.py`, `languages.py`.
 """

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import ceil, floor
 
-from visup.tasks.learning.order import Item, Loop, Times
+from visup.tasks.learning.order import Loop, Times
 from visup.tasks.learning.relevance import MEETINGS, CourseEvent
 from visup.tasks.learning.traces import Symbol
 
@@ -47,10 +47,10 @@ def periods_of(times: Times, rows: Sequence[Sequence[CourseEvent]]) -> dict[Loop
 
 def beat_of(loop: Loop) -> Symbol | None:
     """The meeting of which a loop is made: one, of one pair, with what leads to it and its end; else None."""
-    symbols = [s for s in loop.body if _is_symbol(s)]
+    symbols = [s for s in loop.body if isinstance(s, tuple)]
     meetings = [s for s in symbols if s[0] in MEETINGS]
     alone = len(symbols) == len(loop.body) and len({s[1] for s in symbols}) == 1
-    return meetings[0] if alone and len(meetings) == 1 else None  # type: ignore[return-value]
+    return meetings[0] if alone and len(meetings) == 1 else None
 
 
 def with_margin(period: Period) -> Period:
@@ -67,10 +67,6 @@ def course_of(loop: Loop, period: Period) -> str:
     return (
         f"{action}({', '.join(actors)}) every {said}  # every {period[0]:.1f} to {period[1]:.1f} s"
     )
-
-
-def _is_symbol(item: Item) -> bool:
-    return isinstance(item, tuple)
 
 
 def _steps(row: Sequence[CourseEvent], beat: Symbol) -> list[float]:
