@@ -142,7 +142,7 @@ def load_rules(path: str | Path) -> tuple[Rule, ...]:
 
 @cache
 def shipped_rules() -> tuple[Rule, ...]:
-    """The rules of `safety.rules`, which ships with visup; read once, however many runs are reasoned about."""
+    """The rules of `safety.rules`, which ships with visup; read once a process."""
     text = files("visup.rules.safety").joinpath("safety.rules").read_text(encoding="utf-8")
     return parse_rules(text, "safety.rules")
 

@@ -78,7 +78,7 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
             processes=True,
             host="127.0.0.1",
             memory_limit=memory,
-            dashboard_address="127.0.0.1:0" if has_dashboard else None,
+            dashboard_address="127.0.0.1:0",  # any free port: several may fill lakes here
             silence_logs=logging.CRITICAL,
         ) as cluster,
         distributed.Client(cluster) as client,
