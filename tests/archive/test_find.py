@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -19,8 +20,10 @@ from tests.clips import moving_disc, write_clip
 from visup.agent import Truth
 from visup.agent.model.errors import ErrorGroup, RuleError, SettingsError, SourceError, TaskError
 from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
 from visup.archive.adding import add_run
 from visup.archive.asking.database import LakeDatabase, QueryError, open_database
+from visup.archive.finding.beliefs import read_minds
 from visup.archive.finding.clips import cut_hits, spans
 from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import desugared, read_pattern
@@ -30,7 +33,7 @@ from visup.archive.finding.search import (
     find,
     read_search,
 )
-from visup.archive.lake import Lake
+from visup.archive.lake import BELIEFS, Lake
 from visup.archive.parallel import each_run
 from visup.evaluation.archive.conditions import random_conditions
 from visup.percepts.video.open import open_source
@@ -72,7 +75,7 @@ def test_what_is_found_is_what_the_agent_says(
     rules.write_text(
         "\n".join(f'rule f{n}(a, b): info when {text} say "."' for n, text in enumerate(CONDITIONS))
     )
-    compared, pruned = 0, 0
+    compared, pruned, quick = 0, 0, 0
     searches = [ConditionSearch(read_pattern(text)) for text in CONDITIONS]
     possible = [set(search.possible_runs(database)) for search in searches]
     for run in lake.runs():
@@ -93,10 +96,14 @@ def test_what_is_found_is_what_the_agent_says(
 
         replay(recording, replace(settings, rules=(rules,)), tell=look)
         for n, judge in enumerate(judges):
-            is_hit = any(h.truth == Truth.TRUE for h in judge.hits())
-            assert not is_hit or run in possible[n], CONDITIONS[n]
+            hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
+            assert not hits or run in possible[n], CONDITIONS[n]
+            if searches[n].quick:
+                assert searches[n].hits(recording, settings) == hits, CONDITIONS[n]
+                quick += bool(hits)
             pruned += run not in possible[n]
     assert compared > 5_000
+    assert quick > 10
     assert pruned > 0.1 * len(CONDITIONS) * len(lake.runs())
 
 
@@ -137,6 +144,41 @@ def test_names_are_those_whom_the_agent_meant(lake: Lake, database: LakeDatabase
     assert all(0 < (h.confidence or 0) <= 1 for hits in found for h in hits)
     with pytest.raises(QueryError, match="nobody in this lake was ever taken for 'satelite'"):
         ConditionSearch(read_pattern("touching(arm, satelite)")).possible_runs(database)
+
+
+@pytest.mark.parametrize("change", ["gone", "cut", "other"])
+def test_a_run_without_notes_is_reasoned_about_again(
+    lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    search = read_search("converging(arm, satellite) and then diverging(arm, b) within 1 s")
+    run = lake.runs()[0]
+    copy = Path(shutil.copytree(lake.folder_of(run), tmp_path / run))
+    notes, settings = copy / BELIEFS, lake.recorded(run)[1]
+    assert read_minds(copy) is not None
+    hits = search.hits(Recording.open(copy), settings)
+    if change == "gone":
+        notes.unlink()
+    if change == "cut":
+        notes.write_bytes(notes.read_bytes()[:-200])
+    if change == "other":
+        monkeypatch.setattr("visup.archive.finding.beliefs.__version__", "0.0")
+    assert read_minds(copy) is None
+    assert search.hits(Recording.open(copy), settings) == hits
+
+
+@pytest.mark.parametrize(
+    ("text", "quick"),
+    [
+        ("touching(a, b) and not (exists c: (converging(a, c) and diverging(b, c)))", True),
+        ("touching(arm, 2) since[1 s] north_of(arm, 2)", True),
+        ("coupled(a, b)", False),  # judged of what is hidden, too
+        ("gap(a, b) < 60 px", False),
+        ("touching(a, b) and moving(a)", False),
+        ("stale(region)", False),
+    ],
+)
+def test_conditions_about_relations_alone_need_no_reasoning(text: str, quick: bool) -> None:
+    assert read_search(text).quick is quick
 
 
 def test_unknown_is_kept_apart_and_looked_for_everywhere(

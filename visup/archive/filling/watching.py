@@ -15,6 +15,7 @@ from visup.agent.storage.journal_reader import Recording
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.plan import FailedClip, Job, put_aside
 from visup.archive.filling.stores import fetched, note_source
+from visup.archive.finding.beliefs import BeliefNotes
 from visup.archive.inputs import run_inputs
 from visup.archive.lake import Lake
 from visup.archive.run_tables import run_tables
@@ -102,8 +103,9 @@ def _committed(lake: Lake, job: Job, folder: Path) -> tuple[str | None, float]:
     """Put a recorded run into the lake; its verdict and its seconds of video."""
     recording = Recording.open(folder)
     settings = recorded_settings(recording.facts(), str(recording.path))
-    tables = run_tables(recording, settings, job.provenance)
-    lake.commit(tables, recording, run_inputs(settings))
+    notes = BeliefNotes()
+    tables = run_tables(recording, settings, job.provenance, notes)
+    lake.commit(tables, recording, run_inputs(settings), notes.content())
     row = dict(zip(TABLES["runs"].names, tables["runs"][0], strict=True))
     return row["verdict"], row["seconds"]
 

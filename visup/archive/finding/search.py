@@ -16,6 +16,7 @@ from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
 from visup.archive.asking.database import LakeDatabase, QueryError
 from visup.archive.asking.views import quoted
+from visup.archive.finding.beliefs import read_minds, told_by_relations
 from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import read_pattern
 from visup.archive.finding.possible import HELD, PossibleTimes, possible_times
@@ -29,6 +30,8 @@ from visup.runs.replay import replay
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 
+MANY_QUICK = 200
+"""Fewer runs that are looked into in a moment are done before other processes have begun."""
 _BY_ID = re.compile(r"object_(\d+)")
 
 
@@ -51,6 +54,10 @@ class FoundRun:
 
 class Search(Protocol):
     """What is looked for."""
+
+    @property
+    def quick(self) -> bool:
+        """Whether a run is looked into in a moment, without reasoning about it again."""
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """The runs in which it may be; in all others it is not.
@@ -75,6 +82,11 @@ class ConditionSearch:
     pattern: Expression
     unknown: bool = False
 
+    @property
+    def quick(self) -> bool:
+        """See `Search`."""
+        return told_by_relations(self.pattern)
+
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """See `Search`."""
         variables = self.pattern.rule.variables
@@ -89,7 +101,11 @@ class ConditionSearch:
     def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
         """See `Search`."""
         judge = ConditionJudge(self.pattern)
-        replay(recording, settings, tell=judge)
+        minds = read_minds(recording.path.parent) if self.quick else None
+        if minds is None:
+            replay(recording, settings, tell=judge)
+        for mind in minds or ():
+            judge.judge(mind)
         return tuple(h for h in judge.hits() if self.unknown or h.truth == Truth.TRUE)
 
 
@@ -104,6 +120,7 @@ class RulesSearch:
 
     file: Path
     rules: tuple[Rule, ...]
+    quick: bool = False
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """See `Search`."""
@@ -176,7 +193,10 @@ def find(
     Raises:
         OutputError: A run is damaged.
     """
-    yield from each_run(partial(_looked_into, lake, search), list(runs), workers)
+    wanted = list(runs)
+    if workers is None and search.quick and len(wanted) < MANY_QUICK:
+        workers = 0
+    yield from each_run(partial(_looked_into, lake, search), wanted, workers)
 
 
 def _looked_into(lake: Lake, search: Search, run: str) -> FoundRun:

@@ -23,6 +23,7 @@ class TaskSearch:
     """
 
     file: Path
+    quick: bool = False
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """See `Search`: any run may have it, with whoever plays its actors."""
