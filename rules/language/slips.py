@@ -67,6 +67,8 @@ SLIPS = (
     _slip(rf"\b(once|always|eventually|henceforth|since|until|release)\s*\(\s*({_AMOUNT})\s*\)", r"\1[\2]"),
     _slip(rf"({_CALL})\s+(?:for\s+)?at\s+least\s+(\d[\d.]*\s*(?:ms|s|min|h))\b", r"\1 for \2"),
     _slip(r"\bout\s+of\b", "of"),
+    _slip(rf"({_CALL})\s*([<>]=?)\s*({_AMOUNT})\s*(and|or)\s+([<>]=?)\s*({_AMOUNT})",
+          r"\1 \2 \3 \4 \1 \5 \6"),
     _slip(r"\b([A-Za-z_]\w*)\s*[\[{]\s*([a-z]\w*(?:\s*,\s*[a-z]\w*)*)\s*[\]}]", r"\1(\2)"),
     _slip(r"\b([a-z]\w?)\.([a-z_]{3,})\s*\(\s*([a-z]\w*)\s*\)", r"\2(\1, \3)"),
     _slip(r"\b([a-z]\w?)\.([a-z_]{3,})\b(?:\(\))?", r"\2(\1)"),

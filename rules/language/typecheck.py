@@ -300,7 +300,8 @@ class _FormulaChecker:
             yield call.span, what, None, hint or "rename the variable"
 
 
-SYNONYMS = {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
+SYNONYMS = {"count": "objects", "number": "objects", "height_above": "position_y"}
+SYNONYMS |= {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
 SYNONYMS |= {"visible": "seen", "present": "seen", "gone": "lost", "contact": "touching"}
 SYNONYMS |= {
     "near": "close_to",

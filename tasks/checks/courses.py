@@ -7,6 +7,7 @@ from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
 
+from visup.agent.model.did_you_mean import closest
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition, contradict
 from visup.tasks.grammar.analysis import Grammar
@@ -31,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Together,
     walk,
 )
+from visup.tasks.grammar.templates import names_in
 from visup.tasks.grammar.units import value
 
 MOST_IN_ANY_ORDER = 12
@@ -232,7 +234,9 @@ class CourseCheck:
             yield self.source.fault("E234", what, loop.span, f"at most {MOST_ROUNDS} times")
         if alike(loop):
             what = f"`for each new {loop.new}`, but what is to be done names no `{loop.new}`"
+            near = closest(loop.new, names_in(loop.items[0]))
             hint = f"name it, such as `<take({loop.new})>`"
+            hint = f"write `{loop.new}` in place of `{near}`" if near else hint
             yield self.source.fault("E225", what, loop.span, f"`{loop.new}` among the actors", hint)
 
     def repetitions(self) -> Iterator[Diagnostic]:

@@ -27,7 +27,7 @@ MOST_HINTS = 12
 Check = Callable[[str], Sequence[Diagnostic]]
 
 WORDS = (*RESERVED_WORDS, *ACTIONS, *KEYWORDS, "leftmost", "rightmost", "ignored")
-LONE_WORD = re.compile(rf"(?<![<\w.]){NAME}(?![\w>]|\s*\()")
+LONE_WORD = re.compile(rf"(?<![<\w.]){NAME}(?![\w>(])")
 """A word that is neither an action nor a stage."""
 PHRASES = ("at least", "at most", "any order", "for each", "on failure of", "ends when", "fails when",
            "begins when", "pauses when", "progresses when", "each of", "each new")  # fmt: skip
