@@ -208,6 +208,8 @@ class _Run:
         """Let everyone follow the agent, and its surroundings report their faults."""
         if self._recorder:
             self._stamp.changed = self._recorder.keep_clock
+            if self._stamp.clock.anchors:
+                self._recorder.keep_clock(self._stamp.clock)
         # The journal comes first: what is told was recorded before.
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()

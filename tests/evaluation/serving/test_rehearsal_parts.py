@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -15,7 +16,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.evaluation.serving.account import account_of
-from visup.evaluation.serving.night import Killer, Timetable
+from visup.evaluation.serving.night import Kill, Killer, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
 from visup.evaluation.serving.rehearsal import evaluate_serving, failed
 from visup.evaluation.serving.scene import CROSSING, SIZE, jpegs, scene
@@ -109,6 +110,13 @@ def test_who_was_killed_is_back_with_the_next_frame(tmp_path: Path) -> None:
     killer = Killer(tmp_path, ["cell"], 0)
     killer.strike({"cell": 5.0})
     assert killer.kills == []  # there is no such process
+    kill = Kill("cell", time.monotonic(), restarts=2.0)
+    killer.kills.append(kill)
+    killer.look({"cell": 2.0}, {"cell": 90.0})  # what the one before had told last
+    killer.look({"cell": 3.0}, {"cell": 92.0})
+    assert kill.back_s is None
+    killer.look({"cell": 3.0}, {"cell": 93.0})
+    assert kill.back_s is not None
 
 
 def test_a_store_that_holds_something_is_left_alone(tmp_path: Path) -> None:

@@ -212,7 +212,7 @@ MACHINERY_EVALUATIONS = (
         "rehearsing",
         (
             *("alerts", "lost", "twice", "resent", "without_evidence", "kills", "slowest_s"),
-            *("median_s", "memory_growth", "frames", "dropped"),
+            *("median_s", "memory_growth", "frames", "dropped", "cpu"),
         ),
         (
             Setting("minutes", float, 120.0, Option("How long.", at_least=1.0)),

@@ -7,7 +7,7 @@ import random
 import shutil
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,13 +34,15 @@ class Kill:
     Attributes:
         camera: Whose.
         at: When, seconds of the clock.
-        frames: That had been told of.
+        restarts: Of the camera until then.
+        frames: That were told of when its process had been begun again; None before.
         back_s: How long until the next frame was told of; None as long as none is.
     """
 
     camera: str
     at: float
-    frames: float
+    restarts: float
+    frames: float | None = None
     back_s: float | None = None
 
 
@@ -82,18 +84,23 @@ class Killer:
         self._store, self._cameras = store, cameras
         self._rng = random.Random(seed)  # dice, not secrets
 
-    def strike(self, frames: dict[str, float]) -> None:
-        """Kill one."""
+    def strike(self, restarts: Mapping[str, float]) -> None:
+        """Kill one, given how often each was begun again."""
         camera = self._rng.choice(self._cameras)
         pid = pid_of(self._store, camera)
         if pid:
             os.kill(pid, signal.SIGKILL)
-            self.kills.append(Kill(camera, time.monotonic(), frames.get(camera, 0.0)))
+            self.kills.append(Kill(camera, time.monotonic(), restarts.get(camera, 0.0)))
 
-    def look(self, frames: dict[str, float]) -> None:
-        """Learn who is back."""
+    def look(self, restarts: Mapping[str, float], frames: Mapping[str, float]) -> None:
+        """Learn who is back: a frame more than when its process was begun again."""
         for kill in self.kills:
-            if kill.back_s is None and frames.get(kill.camera, 0.0) > kill.frames:
+            now = frames.get(kill.camera, 0.0)
+            if kill.back_s is not None or restarts.get(kill.camera, 0.0) <= kill.restarts:
+                continue
+            if kill.frames is None:
+                kill.frames = now
+            elif now > kill.frames:
                 kill.back_s = time.monotonic() - kill.at
 
 

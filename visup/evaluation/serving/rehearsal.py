@@ -62,7 +62,7 @@ def evaluate_serving(
 
     Returns:
         `items` by camera: `alerts`, `lost`, `twice`, `resent`, `without_evidence`, `kills`, `slowest_s`,
-        `frames`, `dropped`, `restarts`; `total`: sums, `median_s` of a return, `memory_growth` (share,
+        `frames`, `dropped`, `restarts`, `cpu` (share of a processor); `total`: sums, `median_s` of a return, `memory_growth` (share,
         from the second quarter to the last), `closing_s`, `exit_code`, and what went wrong how often.
     """
     if store is not None and (not store.is_dir() or any(store.iterdir())):
@@ -101,6 +101,7 @@ class Stage:
         self._write_site()
         self._figures: dict[str, dict[str, float]] = {}
         self._memory: list[float] = []
+        self._watched_s = 1.0
         self._wrongs = {"reloads": 0, "sink_down": 0}
         self._ends: list[tuple[float, Any]] = []
 
@@ -120,6 +121,7 @@ class Stage:
                 progress(f"{left:.1f} minutes left, {len(self._killer.kills)} kills")
                 time.sleep(LOOK_S)
             asked = time.monotonic()
+            self._watched_s = asked - begin
             process.send_signal(signal.SIGTERM)
             code = process.wait(60)
             return self._told(time.monotonic() - asked, code)
@@ -179,7 +181,7 @@ class Stage:
                 self._ends.append((time.monotonic() + FULL_S, self._balloon.empty))
 
         def kill() -> None:
-            self._killer.strike(self._frames())
+            self._killer.strike(self._of_each("visup_restarts_total"))
 
         return Timetable(((kill_every, kill), (100.0, reload), (75.0, sink_down), (130.0, full)))
 
@@ -191,8 +193,8 @@ class Stage:
             self._ends.remove(due)
             due[1]()
 
-    def _frames(self) -> dict[str, float]:
-        return {n: f.get("visup_frames_seen_total", 0.0) for n, f in self._figures.items()}
+    def _of_each(self, figure: str) -> dict[str, float]:
+        return {name: told.get(figure, 0.0) for name, told in self._figures.items()}
 
     def _look(self, pid: int) -> None:
         """What the service tells of itself."""
@@ -202,7 +204,8 @@ class Stage:
                 page = answer.read().decode()
             for figure, camera, value in _SAMPLE.findall(page):
                 self._figures.setdefault(camera, {})[figure] = float(value)
-            self._killer.look(self._frames())
+            frames = self._of_each("visup_frames_seen_total")
+            self._killer.look(self._of_each("visup_restarts_total"), frames)
             cameras = [f.get("visup_memory_bytes", 0.0) for f in self._figures.values()]
             if len(cameras) == len(NAMES) and all(cameras):
                 self._memory.append(sum(cameras) / 2**20 + _resident_mb(pid))
@@ -236,6 +239,7 @@ class Stage:
             "restarts": figures.get("visup_restarts_total", 0.0),
             "frames": figures.get("visup_frames_seen_total", 0.0),
             "dropped": figures.get("visup_frames_dropped_total", 0.0),
+            "cpu": figures.get("visup_cpu_seconds_total", 0.0) / self._watched_s,
         }
 
 
