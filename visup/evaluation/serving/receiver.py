@@ -45,7 +45,7 @@ class AlertReceiver:
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         take = self._take
 
-        class Handler(BaseHTTPRequestHandler):
+        class ReceiverHandler(BaseHTTPRequestHandler):
             def do_POST(self) -> None:
                 size = min(int(self.headers.get("Content-Length", 0)), LARGEST)
                 self.send_response(take(self.rfile.read(size)))
@@ -54,4 +54,4 @@ class AlertReceiver:
             def log_message(self, *said: Any) -> None:
                 pass
 
-        return Handler
+        return ReceiverHandler

@@ -62,18 +62,19 @@ def evaluate_serving(
 
     Returns:
         `items` by camera: `alerts`, `lost`, `twice`, `resent`, `without_evidence`, `kills`, `slowest_s`,
-        `frames`, `dropped`, `restarts`, `cpu` (share of a processor); `total`: sums, `median_s` of a return, `memory_growth` (share,
-        from the second quarter to the last), `closing_s`, `exit_code`, and what went wrong how often.
+        `frames`, `dropped`, `restarts`, `cpu` (share of a processor); `total`: sums, `median_s` of a return,
+        `memory_growth` (share, from the second quarter to the last), `closing_s`, `exit_code`, and what went
+        wrong how often.
     """
     if store is not None and (not store.is_dir() or any(store.iterdir())):
         raise SettingsError("the store is not an empty folder", where=str(store))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        stage = Stage(folder, store or folder / "store", seed, stack)
+        stage = Rehearsal(folder, store or folder / "store", seed, stack)
         return stage.rehearse(minutes, kill_every, progress)
 
 
-class Stage:
+class Rehearsal:
     """All that takes part.
 
     Args:

@@ -76,7 +76,7 @@ class TroubledStream:
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         send_to = self._send_to
 
-        class Handler(BaseHTTPRequestHandler):
+        class StreamHandler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
                 self.send_response(200)
                 kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
@@ -90,4 +90,4 @@ class TroubledStream:
             def log_message(self, *said: Any) -> None:
                 pass
 
-        return Handler
+        return StreamHandler
