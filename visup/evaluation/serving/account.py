@@ -46,7 +46,7 @@ def account_of(camera: Path, taken: Iterable[Mapping[str, Any]]) -> Account:
     own = [r for r in taken if r.get("record") == "alert" and r.get("camera") == camera.name]
     counts = Counter(_key(r) for r in own)
     extra = sum(n - 1 for n in counts.values())
-    deliveries = Counter(str(r.get(DELIVERY)) for r in own)
+    deliveries = Counter(str(r[DELIVERY]) for r in own if DELIVERY in r)
     return Account(
         alerts=sum(told[3] == "opened" for told in expected),
         lost=len(expected - set(counts)),

@@ -21,6 +21,7 @@ from typing import Any
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent, sums_of
 from visup.evaluation.serving.account import account_of
+from visup.evaluation.serving.costs import camera_costs
 from visup.evaluation.serving.night import Balloon, Killer, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
 from visup.evaluation.serving.scene import (
@@ -63,15 +64,17 @@ def evaluate_serving(
     Returns:
         `items` by camera: `alerts`, `lost`, `twice`, `resent`, `without_evidence`, `kills`, `slowest_s`,
         `frames`, `dropped`, `restarts`, `cpu` (share of a processor); `total`: sums, `median_s` of a return,
-        `memory_growth` (share, from the second quarter to the last), `closing_s`, `exit_code`, and what went
-        wrong how often.
+        `memory_growth` (share, from the second quarter to the last), `closing_s`, `exit_code`, what went
+        wrong how often, and `camera_costs`.
     """
     if store is not None and (not store.is_dir() or any(store.iterdir())):
         raise SettingsError("the store is not an empty folder", where=str(store))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         stage = Rehearsal(folder, store or folder / "store", seed, stack)
-        return stage.rehearse(minutes, kill_every, progress)
+        told = stage.rehearse(minutes, kill_every, progress)
+    progress("what a camera takes")
+    return {**told, "total": {**told["total"], **camera_costs(seed)}}
 
 
 class Rehearsal:
