@@ -32,6 +32,8 @@ from visup.runs.settings import WatchSettings
 MARK = "lake.json"
 TABLES_FOLDER = "tables"
 RECORDINGS = "recordings"
+BELIEFS = "beliefs.npz"
+"""Beside the journal of a run: what conditions about relations depend on, so that they are judged at once."""
 SCHEMA_FILE = "schema.parquet"
 """Beside the runs' files of a table: one without rows, so that a table is there before its first row."""
 
@@ -56,12 +58,11 @@ class LakeSnapshot:
         """The files of the index of that name, one for each partition."""
         return [self.path / FOLDER / part.name / f"{name}.parquet" for part in self.partitions]
 
-    def numbers(self) -> Iterator[tuple[str, int, bool]]:
-        """Of each run its key, its number in the index, and whether its files are its own."""
-        for part in self.partitions:
-            yield from ((run, part.run_number(n), False) for n, run in enumerate(part.runs))
+    def numbered(self) -> Iterator[tuple[tuple[str, ...], int, bool]]:
+        """Runs whose numbers in the index follow each other, from which, and whether their files are own."""
+        yield from ((part.runs, part.run_number(0), False) for part in self.partitions)
         first = max((part.run_number(MOST_RUNS) for part in self.partitions), default=0)
-        yield from ((run, first + n, True) for n, run in enumerate(self.loose))
+        yield self.loose, first, True
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,13 +156,16 @@ class Lake:
             },
         )
 
-    def commit(self, tables: RunTables, recording: Recording, inputs: RunInputs) -> bool:
+    def commit(
+        self, tables: RunTables, recording: Recording, inputs: RunInputs, beliefs: bytes = b""
+    ) -> bool:
         """Add a run whole, or nothing of it.
 
         Args:
             tables: Its rows, as of `run_tables`.
             recording: Its journal.
             inputs: The files that it was reasoned with.
+            beliefs: What `BeliefNotes` gives of it, or nothing.
 
         Returns:
             Whether it was added; False when it was there already.
@@ -174,6 +178,8 @@ class Lake:
             return False
         try:
             self._keep(self.folder_of(run), recording, inputs)
+            if beliefs:
+                write_whole(self.folder_of(run) / BELIEFS, beliefs)
             for table in sorted(TABLES, key=lambda name: name == "runs"):  # it commits the others
                 if tables[table]:
                     self._write_table(self.table_file(table, run), table, tables[table])

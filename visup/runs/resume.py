@@ -11,9 +11,10 @@ import shlex
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from visup.agent import Frame, Observation, Severity, Verdict
 from visup.agent.cycle.agent import Agent
@@ -28,6 +29,9 @@ from visup.redaction import redacted
 from visup.runs.checkpoints import Checkpoint, read_checkpoint
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import SOURCE_REDACTED, WatchSettings
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,16 +201,24 @@ def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
         raise OutputError("the run's answers cannot be read", where=where) from fault
 
 
+@cache
+def _settings_form() -> TypeAdapter[WatchSettings]:
+    """Made once: that takes longer than to read the settings of a run."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(WatchSettings)
+
+
 def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
     """The settings of a recorded run.
 
     Raises:
         OutputError: They are not there, or not as they should be.
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     try:
-        return TypeAdapter(WatchSettings).validate_python(facts.get("settings"))
+        return _settings_form().validate_python(facts.get("settings"))
     except ValidationError as fault:
         said = fault.errors()[0]["msg"]
         raise OutputError(f"the run's settings cannot be read ({said})", where=where) from fault

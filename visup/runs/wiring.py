@@ -45,6 +45,7 @@ from visup.tasks.grammar.criteria import Place
 from visup.tasks.grammar.structure import (
     declared_sizes,
     needs_ground,
+    spare_kinds,
     task_actors,
     undrawn_zones,
     with_bystanders,
@@ -325,7 +326,7 @@ def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
 def _check_actors(
     settings: WatchSettings, tasks: Sequence[Task], database: ModelDatabase | None
 ) -> None:
-    known = {actor for task in tasks for actor in task_actors(task)}
+    known = {actor for task in tasks for actor in (*task_actors(task), *spare_kinds(task))}
     for actor, models in settings.actors.items():
         if tasks and actor not in known:
             raise SettingsError(

@@ -104,11 +104,18 @@ def open_database(lake: Lake, memory_gb: float = MEMORY_GB) -> Iterator[LakeData
 def _number_runs(connection: Any, found: LakeSnapshot) -> None:
     """Make the table of runs with their numbers in the index."""
     arrow = imported("pyarrow")
-    columns = list(zip(*found.numbers(), strict=True)) or [(), (), ()]
-    kinds = (arrow.string(), arrow.uint32(), arrow.bool_())
-    arrays = [arrow.array(c, k) for c, k in zip(columns, kinds, strict=True)]
+    parts = [
+        arrow.table(
+            {
+                "run": arrow.array(runs, arrow.string()),
+                "number": arrow.array(range(first, first + len(runs)), arrow.uint32()),
+                "own": arrow.array([own] * len(runs), arrow.bool_()),
+            }
+        )
+        for runs, first, own in found.numbered()
+    ]
     connection.execute("CREATE SCHEMA lake_index")
-    connection.register("numbered", arrow.table(arrays, ["run", "number", "own"]))
+    connection.register("numbered", arrow.concat_tables(parts))
     connection.execute("CREATE TABLE lake_index.runs AS SELECT * FROM numbered")
     connection.unregister("numbered")
 

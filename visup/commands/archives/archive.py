@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from visup.archive.filling.pool_settings import PoolSettings
+from visup.archive.parallel import Workers
 from visup.commands.options import REPLAYED, Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import Option, WatchSettings
@@ -55,6 +56,13 @@ app = typer.Typer(no_args_is_help=True)
 
 
 @dataclass(frozen=True, slots=True)
+class ManyRuns:
+    """How many runs are looked into."""
+
+    workers: Workers = None
+
+
+@dataclass(frozen=True, slots=True)
 class FillOptions:
     """What else may be wanted of filling a lake."""
 
@@ -71,7 +79,8 @@ def run(
     sources: Annotated[
         list[str],
         typer.Argument(
-            metavar="SOURCE...", help="Clips, folders, patterns ('*.mp4'), or manifests (.csv)."
+            metavar="SOURCE...",
+            help="Clips, folders, patterns ('*.mp4'), URLs, manifests (.csv, .parquet).",
         ),
     ],
     into: Into,
@@ -163,10 +172,33 @@ def compact(
     echo(f"{said}{gone}")
 
 
+@app.command("report")
+def report(
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The page (default: report.html in the lake)."),
+    ] = None,
+) -> None:
+    """Write a page about all runs: durations of stages by week and actor, drifts, how runs fail."""
+    from visup.archive.asking.database import open_database
+    from visup.archive.lake import Lake
+    from visup.archive.reporting.page import write_lake_page
+    from visup.archive.reporting.statistics import lake_statistics
+    from visup.terminal.console import echo
+
+    path = out or lake / "report.html"
+    with open_database(Lake.open(lake)) as database:
+        found = lake_statistics(database)
+    write_lake_page(found, lake, path)
+    echo(f"{path}: {found.runs} runs")
+
+
 @app.command("replay")
-@takes(WatchSettings, only=REPLAYED)
+@takes(WatchSettings, ManyRuns, only=(*REPLAYED, "workers"))
 def replay(
     setting: Given,
+    wanted: Given,
     lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
 ) -> None:
     """Reason again about all runs of a lake, with other rules, tasks or actors, and say what changes.
@@ -178,7 +210,7 @@ def replay(
     from visup.terminal.console import make_console
 
     console, summary, found = make_console(), ChangeSummary(), Lake.open(lake)
-    for one in changes(found, found.runs(), **setting):
+    for one in changes(found, found.runs(), **wanted, **setting):
         summary.take(one)
         if one.diff:
             console.print(_changed(one), soft_wrap=True, markup=False)

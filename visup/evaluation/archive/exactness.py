@@ -32,6 +32,7 @@ class FindComparison:
         different: How many of them differ, or are hits in a run that was left out.
         looked: Pairs of a condition and a run that had to be looked into.
         pairs: All of these pairs.
+        quick: Those whose hits were compared that are found without reasoning again.
         examples: Conditions that differ.
     """
 
@@ -39,6 +40,7 @@ class FindComparison:
     different: int = 0
     looked: int = 0
     pairs: int = 0
+    quick: int = 0
     examples: set[str] | None = None
 
     def note(self, text: str, same: bool) -> None:
@@ -62,7 +64,8 @@ def compare_find(
         progress: Shows what is being done.
 
     Returns:
-        `formulas`, `verdicts`, `different` (0 when all is well), `scanned` (share of runs that had to be
+        `formulas`, `verdicts`, `different` (0 when all is well), `quick` (share that is judged without
+        reasoning again), `scanned` (share of runs that had to be
         looked into) and `examples` of conditions that differ.
     """
     found = FindComparison()
@@ -74,6 +77,7 @@ def compare_find(
         "formulas": formulas,
         "verdicts": found.verdicts,
         "different": found.different,
+        "quick": found.quick / max(1, found.pairs),
         "scanned": found.looked / max(1, found.pairs),
         "examples": sorted(found.examples or ()),
     }
@@ -96,8 +100,11 @@ def _compare(lake: Lake, texts: Sequence[str], rules: Path, found: FindCompariso
 
         replay(recording, replace(settings, rules=(rules,)), tell=look)
         for n, judge in enumerate(judges):
-            hit = any(h.truth == Truth.TRUE for h in judge.hits())
-            found.note(texts[n], not hit or run in possible[n])
+            hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
+            found.note(texts[n], not hits or run in possible[n])
+            if searches[n].quick:
+                found.quick += 1
+                found.note(texts[n], searches[n].hits(recording, settings) == hits)
             found.looked += run in possible[n]
             found.pairs += 1
 
