@@ -112,7 +112,11 @@ def test_it_ends_without_its_supervisor_and_the_next_goes_on(tmp_path: Path) -> 
     assert kept.frame_index == last  # the state after the last step was kept, too
     assert read_by_a_new_process(tmp_path / "run") == "None"
 
-    later = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGTERM))
+    def stop_once_it_watches() -> None:
+        wait_for(lambda: Recording.open(tmp_path / "run").count() > before)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    later = threading.Thread(target=stop_once_it_watches)
     later.start()
     _, told = watched(CameraJob(settings, OPTIONS, tmp_path / "run", resume=True))
     later.join()
