@@ -16,8 +16,8 @@ from visup.serving.site.records import RetentionLimits
 
 DAY_S = 86400.0
 FRESH_S = 120.0
-"""A run that was written to so lately may have just begun, or its books are being closed; whoever was told of an
-alert so lately may still look at its evidence."""
+"""A run that was written to so lately may have just begun, or its books are being closed; whoever was told of
+an alert so lately may still look at its evidence."""
 
 SLACK = 1.1
 """So much more than is wanted is freed on a full disk, that not every look finds it full again."""
