@@ -1,4 +1,4 @@
-"""Why, why not, and what if, asked of a recorded run: `visup.stepping` behind a lock, for any number of pages.
+"""Why, why not, and what if, asked of a recorded run: `visup.stepping` behind a lock, for many pages.
 
 The console adds no logic of its own here. Reasons come from the mind that reasoned, which a journal does not
 keep; so the run is reasoned again up to the moment that is asked about. That takes a second for a thousand

@@ -1,6 +1,6 @@
 """What was believed at one moment of a recorded run, from the summary that its journal keeps.
 
-Nothing is reasoned again, so it comes at once, however long the run. It knows less than the mind that reasoned:
+Nothing is reasoned again, so it comes at once, however long the run. It knows less than the mind did:
 no relations, no poses, no likelihoods; of what is out of sight only where it was.
 """
 

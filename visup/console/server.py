@@ -14,6 +14,7 @@ from visup.agent.model.errors import SettingsError, VisupError
 from visup.console.access import WHO, Access, AccessGuard, Role
 from visup.console.pages.library_page import library_page
 from visup.console.pages.run_page import run_page
+from visup.console.pages.wall_page import wall_page
 from visup.console.state import ConsoleState
 
 FAVICON = "◉"
@@ -52,6 +53,10 @@ def _pages(state: ConsoleState) -> None:
     @ui.page("/")
     def listed() -> None:
         library_page(state)
+
+    @ui.page("/wall")
+    def wall() -> None:
+        wall_page(state)
 
     @ui.page("/run/{key}")
     def one(request: Request, key: str, t: float = 0.0) -> None:

@@ -1,4 +1,4 @@
-"""The timeline as SVG: one row for each track, with neither text nor a cursor in it, so that it may be stretched."""
+"""The timeline as SVG: one row for each track; no text in it, so that it may be stretched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why, and why not: questions to the agent as it was at the cursor, answered as a tree whose leaves are frames."""
+"""Why, and why not, at the cursor: the answer is a tree whose leaves are frames."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
     async def ask(what: str) -> None:
         answer.clear()
         with answer:
+            ui.label("The run is reasoned again up to here ...").classes("dim")
             ui.spinner(size="md")
         try:
             asked = head.number
@@ -31,6 +32,8 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
             _say(str(fault))
             return
         answer.clear()
+        if why is None:  # the console is being stopped
+            return
         with answer:
             ui.label(f"{what}, at {clock(head.run.times[asked])}").classes("dim")
             _tree(why, head)
@@ -49,9 +52,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
     def proposed() -> None:
         with ui.row().classes("gap-1"):
             for what in proposals(head):
-                ui.button(what, on_click=lambda w=what: ask(w)).props(
-                    "outline dense no-caps size=sm"
-                )
+                ui.button(what, on_click=lambda w=what: ask(w)).props("outline dense no-caps")
 
     proposed()
     head.listen(proposed.refresh)

@@ -1,4 +1,4 @@
-"""What is believed at the cursor: tasks with their stages, who is there, and how sure each name is over time."""
+"""What is believed at the cursor: tasks with their stages, who is there, and how sure each name is."""
 
 from __future__ import annotations
 

@@ -33,6 +33,7 @@ def page_frame(title: str, *, back: bool = False) -> Iterator[None]:
     with ui.header(elevated=False).classes("bar"):
         with ui.element("nav").props('aria-label="Main"'):
             ui.link("visup", "/").classes("brand")
+            ui.link("cameras", "/wall").classes("nav")
         if back:
             ui.label("›").props("aria-hidden=true")
             ui.label(shown_text(title)).classes("crumb")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from visup.console.run_view import RunView
 
-Listener = Callable[[], None]
+Listener = Callable[[], object]
 TICK_S = 0.125
 """How often a page moves on while it plays, seconds."""
 

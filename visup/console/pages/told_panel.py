@@ -84,7 +84,7 @@ def alerts_panel(head: Playhead, role: Role) -> None:
 
 
 def _alert(
-    alert: Alert, said: AlertFeedback | None, head: Playhead, role: Role, again: Callable[[], None]
+    alert: Alert, said: AlertFeedback | None, head: Playhead, role: Role, again: Callable[[], object]
 ) -> None:
     _line(alert.opened, alert.cause, alert.severity, head)
     until = "still open" if alert.closed is None else f"until {clock(alert.closed)}"
@@ -97,7 +97,7 @@ def _alert(
             _opinions(alert, head, again)
 
 
-def _opinions(alert: Alert, head: Playhead, again: Callable[[], None]) -> None:
+def _opinions(alert: Alert, head: Playhead, again: Callable[[], object]) -> None:
     """What an operator can say of an alert."""
 
     def keep(opinion: Opinion, note: str = "") -> None:
@@ -110,8 +110,12 @@ def _opinions(alert: Alert, head: Playhead, again: Callable[[], None]) -> None:
 
     for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
         made = ui.button(opinion.value, on_click=lambda o=opinion: keep(o))
-        made.props("flat dense no-caps size=sm")
-    mute = ui.button("mute ...", on_click=lambda: _mute(keep)).props("flat dense no-caps size=sm")
+        made.props("flat dense no-caps").classes("act")
+    mute = (
+        ui.button("mute ...", on_click=lambda: _mute(keep))
+        .props("flat dense no-caps")
+        .classes("act")
+    )
     mute.tooltip("needs a reason")
 
 

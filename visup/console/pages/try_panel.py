@@ -39,8 +39,9 @@ def try_panel(state: ConsoleState, head: Playhead, key: str, role: Role) -> None
                 ui.label(shown_text(str(fault))).classes("why")
             return
         answer.clear()
-        with answer:
-            _course(found, head)
+        if found is not None:  # the console is being stopped
+            with answer:
+                _course(found, head)
 
     _assume(
         lambda what, number: tried(lambda: state.inquiry(key).what_if(number, what, steps)), head
