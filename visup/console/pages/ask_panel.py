@@ -56,7 +56,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
 
     proposed()
     head.listen(proposed.refresh)
-    with ui.element("div").classes("scroll").props('tabindex=0 aria-label="Answer"'):
+    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Answer"'):
         answer = ui.column().classes("w-full gap-0")
 
 

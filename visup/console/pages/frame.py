@@ -21,22 +21,22 @@ VERDICT_COLOURS = {
     "unsafe": css(STATUS_COLOURS[Status.FAILED]),
     "in_progress": css(STATUS_COLOURS[Status.PROGRESSING]),
 }
-OTHER_COLOUR = css(STATUS_COLOURS[Status.PENDING])
+OTHER_COLOUR = "#5a6573"
 
 
 @contextmanager
-def page_frame(title: str, *, back: bool = False) -> Iterator[None]:
+def page_frame(title: str) -> Iterator[None]:
     """The bar at the top, with room for more in it; the page's own elements come after."""
     ui.add_css(STYLE)
+    ui.add_head_html('<script>document.documentElement.lang = "en"</script>')
     ui.page_title(f"{title} · visup")
     dark = ui.dark_mode(value=None)
     with ui.header(elevated=False).classes("bar"):
         with ui.element("nav").props('aria-label="Main"'):
             ui.link("visup", "/").classes("brand")
             ui.link("cameras", "/wall").classes("nav")
-        if back:
-            ui.label("›").props("aria-hidden=true")
-            ui.label(shown_text(title)).classes("crumb")
+        with ui.element("h1").classes("crumb"):
+            ui.label(shown_text(title))
         yield
         ui.space()
         button("contrast", "Dark or light", lambda: dark.set_value(not dark.value))

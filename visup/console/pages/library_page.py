@@ -31,7 +31,7 @@ def library_page(state: ConsoleState) -> None:
         if not found:
             ui.label("No run is called so." if wanted else "There is no run yet.").classes("dim")
 
-    with ui.element("main").classes("card w-full"):
+    with ui.element("div").classes("card w-full"):
         ui.input("Search runs", on_change=lambda e: listed.refresh(str(e.value or ""))).props(
             'dense outlined clearable aria-label="Search runs"'
         ).classes("w-full max-w-md")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from nicegui import events, ui
 
 from visup.agent.model.errors import VisupError
@@ -39,17 +41,17 @@ def run_page(state: ConsoleState, key: str, role: Role, begin: float) -> None:
     try:
         run = state.view(key, refresh=True)
     except VisupError as fault:
-        with page_frame("Run", back=True):
+        with page_frame("Run"):
             pass
         ui.label(shown_text(str(fault))).classes("card w-full")
         return
     head = Playhead(run)
-    with page_frame(run.folder.name, back=True):
+    with page_frame(run.folder.name):
         verdict_badge(run.verdict, ended=run.ended)
     if not run.frames:
         ui.label("Nothing was judged in this run yet.").classes("card w-full")
         return
-    with ui.element("main").classes("run-grid"):
+    with ui.element("div").classes("run-grid"):
         with ui.element("section").classes("card").props('aria-label="Picture and timeline"'):
             _picture(head, key)
             _controls(head)
@@ -165,7 +167,7 @@ def _keys(head: Playhead) -> None:
         if not e.action.keydown or e.modifiers.ctrl or e.modifiers.alt or e.modifiers.meta:
             return
         by = 10 if e.modifiers.shift else 1
-        acts = {
+        acts: dict[str, Callable[[], object]] = {
             " ": head.toggle,
             "ArrowLeft": lambda: head.step(-by),
             "ArrowRight": lambda: head.step(by),

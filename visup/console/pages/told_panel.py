@@ -32,7 +32,7 @@ def events_panel(head: Playhead) -> None:
         if not told:
             ui.label("Nothing was told.").classes("dim")
 
-    with ui.element("div").classes("scroll").props('tabindex=0 aria-label="Events"'):
+    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Events"'):
         lines()
     head.listen(lines.refresh)
 
@@ -78,13 +78,17 @@ def alerts_panel(head: Playhead, role: Role) -> None:
         listed.refresh()
 
     ui.checkbox("only what is open at the cursor", on_change=lambda e: only_open(bool(e.value)))
-    with ui.element("div").classes("scroll").props('tabindex=0 aria-label="Alerts"'):
+    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"'):
         listed()
     head.listen(lambda: listed.refresh() if wanted["open"] else None)
 
 
 def _alert(
-    alert: Alert, said: AlertFeedback | None, head: Playhead, role: Role, again: Callable[[], object]
+    alert: Alert,
+    said: AlertFeedback | None,
+    head: Playhead,
+    role: Role,
+    again: Callable[[], object],
 ) -> None:
     _line(alert.opened, alert.cause, alert.severity, head)
     until = "still open" if alert.closed is None else f"until {clock(alert.closed)}"

@@ -47,7 +47,11 @@ def try_panel(state: ConsoleState, head: Playhead, key: str, role: Role) -> None
         lambda what, number: tried(lambda: state.inquiry(key).what_if(number, what, steps)), head
     )
     _write(lambda kind, text: tried(lambda: state.inquiry(key).judged_by(kind, text, steps)))
-    with ui.element("div").classes("scroll").props('tabindex=0 aria-label="What would differ"'):
+    with (
+        ui.element("div")
+        .classes("scroll")
+        .props('tabindex=0 role=region aria-label="What would differ"')
+    ):
         answer = ui.column().classes("w-full gap-0")
 
 

@@ -30,13 +30,13 @@ def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
 
 def wall_page(state: ConsoleState) -> None:
     """Lay out the wall; it looks anew every few seconds."""
-    with page_frame("Cameras", back=True):
+    with page_frame("Cameras"):
         pass
 
     @ui.refreshable
     def tiles() -> None:
         found = latest_by_camera(state.library.scan())[:MOST_TILES]
-        with ui.element("main").classes("wall"):
+        with ui.element("div").classes("wall"):
             for entry in found:
                 _tile(state, entry)
         if not found:
