@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from visup.agent import Alert, Event, Severity, Status
 from visup.console.timeline_svg import timeline_svg
-from visup.console.tracks import PRESENCE, Track, tracks_of
+from visup.console.tracks import PRESENCE, TimelineTrack, tracks_of
 
 TIMES = st.floats(0.0, 50.0)
 STAGES = st.builds(
@@ -54,7 +54,7 @@ ALERTS = st.lists(
 )
 
 
-def one_after_the_other(track: Track) -> bool:
+def one_after_the_other(track: TimelineTrack) -> bool:
     pairs = zip(track.spans, track.spans[1:], strict=False)
     return all(a.end <= b.start + 1e-9 for a, b in pairs)
 

@@ -44,6 +44,7 @@ EXTRAS = {
     "ros": ("the pictures of ROS 2 bags", ("rosbags",)),
     "rerun": ("the Rerun viewer", ("rerun-sdk",)),
     "tables": ("runs as pandas and Arrow tables", ("pandas", "pyarrow")),
+    "console": ("visup console: runs in the browser", ("nicegui",)),
     "cluster": ("visup archive: tables of many runs", ("distributed", "duckdb", "pyarrow")),
     "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),
 }

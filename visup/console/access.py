@@ -33,7 +33,7 @@ LONGEST_BODY = 2**20
 """Bytes of a request; what pages send is far smaller."""
 
 
-class Role(StrEnum):
+class ConsoleRole(StrEnum):
     """What somebody may do."""
 
     VIEWER = "viewer"
@@ -54,13 +54,13 @@ class Access:
     viewer: str | None = None
     hosts: tuple[str, ...] = LOOPBACK
 
-    def role(self, token: str) -> Role | None:
+    def role(self, token: str) -> ConsoleRole | None:
         """Who has a token, or None."""
         given = token.encode()
         if secrets.compare_digest(given, self.operator.encode()):
-            return Role.OPERATOR
+            return ConsoleRole.OPERATOR
         if self.viewer and secrets.compare_digest(given, self.viewer.encode()):
-            return Role.VIEWER
+            return ConsoleRole.VIEWER
         return None
 
 

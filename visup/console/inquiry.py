@@ -26,7 +26,7 @@ _INCLUDE = re.compile(r"^[^#\n]*\binclude\b", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class AlternativeCourse:
     """What a branch tells otherwise than the run did.
 
     Attributes:
@@ -76,7 +76,7 @@ class Inquiry:
             self._stepper.go(number)
             return self._stepper.mind
 
-    def what_if(self, number: int, what: str, steps: int) -> Course:
+    def what_if(self, number: int, what: str, steps: int) -> AlternativeCourse:
         """How the run would have gone on from a step, had something been otherwise.
 
         Args:
@@ -96,7 +96,7 @@ class Inquiry:
             branch = here.branch(parse_assumption(here.mind, words, here.agent.models))
             return _course(" ".join(words), branch, steps - number)
 
-    def judged_by(self, kind: str, text: str, steps: int) -> Course:
+    def judged_by(self, kind: str, text: str, steps: int) -> AlternativeCourse:
         """How the whole run is judged by another task or other rules.
 
         Args:
@@ -123,7 +123,7 @@ class Inquiry:
             return _course(f"other {kind}", self._stepper.branch(reasoners=given), steps)
 
 
-def _course(assumed: str, branch: Stepper, steps: int) -> Course:
+def _course(assumed: str, branch: Stepper, steps: int) -> AlternativeCourse:
     if steps > 0:
         branch.step(steps)
-    return Course(assumed, branch.compare(), branch.mind.time)
+    return AlternativeCourse(assumed, branch.compare(), branch.mind.time)

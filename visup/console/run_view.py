@@ -17,7 +17,7 @@ from visup.agent.model.errors import OutputError, VisupError
 from visup.api.recorded import open_run
 from visup.console.pictures import RunPictures, jpeg
 from visup.console.recorded_mind import recorded_mind
-from visup.console.tracks import Track, tracks_of
+from visup.console.tracks import TimelineTrack, tracks_of
 from visup.report.annotate import annotate
 from visup.runs.settings import WatchSettings
 
@@ -95,7 +95,7 @@ class RunView:
         return tuple(self._run.alerts)
 
     @cached_property
-    def tracks(self) -> tuple[Track, ...]:
+    def tracks(self) -> tuple[TimelineTrack, ...]:
         """What happened, laid out over time."""
         return tracks_of(self.events, self.alerts, self.seconds, self.actors)
 

@@ -11,7 +11,7 @@ from fastapi import FastAPI, HTTPException, Request, Response
 from nicegui import ui
 
 from visup.agent.model.errors import SettingsError, VisupError
-from visup.console.access import WHO, Access, AccessGuard, Role
+from visup.console.access import WHO, Access, AccessGuard, ConsoleRole
 from visup.console.pages.library_page import library_page
 from visup.console.pages.run_page import run_page
 from visup.console.pages.wall_page import wall_page
@@ -60,7 +60,7 @@ def _pages(state: ConsoleState) -> None:
 
     @ui.page("/run/{key}")
     def one(request: Request, key: str, t: float = 0.0) -> None:
-        run_page(state, key, request.scope.get(WHO, Role.VIEWER), t)
+        run_page(state, key, request.scope.get(WHO, ConsoleRole.VIEWER), t)
 
 
 def serve_console(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 from visup.agent import Severity, Status
-from visup.console.tracks import Track, TrackSpan
+from visup.console.tracks import TimelineTrack, TrackSpan
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, css, object_colour
 
 WIDTH = 1000
@@ -23,7 +23,7 @@ _STATUS = {s.value: css(STATUS_COLOURS[s]) for s in Status}
 _SEVERITY = {s.name.lower(): css(SEVERITY_COLOURS[s]) for s in Severity}
 
 
-def timeline_svg(tracks: Sequence[Track], seconds: float) -> str:
+def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float) -> str:
     """All rows over one axis of time.
 
     Args:
@@ -41,7 +41,7 @@ def timeline_svg(tracks: Sequence[Track], seconds: float) -> str:
     )
 
 
-def in_words(tracks: Sequence[Track]) -> str:
+def in_words(tracks: Sequence[TimelineTrack]) -> str:
     """The same for those who cannot see it."""
     told = [f"{t.label}: {_spans_in_words(t.spans)}" for t in tracks if t.group != "object"]
     return "; ".join(told) or "Nothing was told."
@@ -51,13 +51,13 @@ def _spans_in_words(spans: Sequence[TrackSpan]) -> str:
     return ", ".join(f"{s.state} {s.start:.1f} to {s.end:.1f} s" for s in spans[:12])
 
 
-def _row(track: Track, number: int, seconds: float) -> str:
+def _row(track: TimelineTrack, number: int, seconds: float) -> str:
     top = number * ROW
     ground = f'<rect class="row" x="0" y="{top + 1}" width="{WIDTH}" height="{ROW - 2}"/>'
     return ground + "".join(_bar(track, span, top, seconds) for span in track.spans)
 
 
-def _bar(track: Track, span: TrackSpan, top: int, seconds: float) -> str:
+def _bar(track: TimelineTrack, span: TrackSpan, top: int, seconds: float) -> str:
     left = WIDTH * min(1.0, max(0.0, span.start / seconds))
     wide = max(LEAST_WIDTH, WIDTH * min(1.0, span.end / seconds) - left)
     told = f"{track.label}: {span.state}, {span.start:.1f} to {span.end:.1f} s. {span.text}"
@@ -68,7 +68,7 @@ def _bar(track: Track, span: TrackSpan, top: int, seconds: float) -> str:
     )
 
 
-def colour_of(track: Track, span: TrackSpan) -> str:
+def colour_of(track: TimelineTrack, span: TrackSpan) -> str:
     """The colour of a bar, as CSS writes it."""
     if track.group == "stage":
         return _STATUS[span.state]

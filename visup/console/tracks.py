@@ -45,7 +45,7 @@ class TrackSpan:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class TimelineTrack:
     """A row of the timeline.
 
     Attributes:
@@ -66,7 +66,7 @@ def tracks_of(
     alerts: Iterable[Alert],
     seconds: float,
     actors: Mapping[str, Sequence[str]] = MappingProxyType({}),
-) -> tuple[Track, ...]:
+) -> tuple[TimelineTrack, ...]:
     """The rows of a timeline, from what was told.
 
     Args:
@@ -132,7 +132,7 @@ def _health_changes(events: Sequence[Event]) -> Iterator[Change]:
             yield "camera", None, e.time, "left" if state == "ok" else state, e.text
 
 
-def _rows(group: str, changes: Iterable[Change], seconds: float) -> Iterator[Track]:
+def _rows(group: str, changes: Iterable[Change], seconds: float) -> Iterator[TimelineTrack]:
     """One row for each label and object: each state lasts until the next one of the same."""
     rows: dict[tuple[str, int | None], list[TrackSpan]] = {}
     for label, number, time, state, text in changes:
@@ -143,10 +143,10 @@ def _rows(group: str, changes: Iterable[Change], seconds: float) -> Iterator[Tra
     for (label, number), spans in rows.items():
         kept = tuple(s for s in spans if s.state not in NOTHING)
         if kept:
-            yield Track(group, label, kept, number)
+            yield TimelineTrack(group, label, kept, number)
 
 
-def _alert_rows(alerts: Iterable[Alert], seconds: float) -> Iterator[Track]:
+def _alert_rows(alerts: Iterable[Alert], seconds: float) -> Iterator[TimelineTrack]:
     rows: dict[str, list[TrackSpan]] = {}
     for a in sorted(alerts, key=lambda a: (a.opened, a.id)):
         if a.severity > Severity.INFO:
@@ -154,10 +154,10 @@ def _alert_rows(alerts: Iterable[Alert], seconds: float) -> Iterator[Track]:
             span = TrackSpan(a.opened, max(end, a.opened), a.severity.name.lower(), a.cause)
             rows.setdefault(a.kind, []).append(span)
     for kind, spans in rows.items():
-        yield Track("alert", kind.replace("_", " "), tuple(spans))
+        yield TimelineTrack("alert", kind.replace("_", " "), tuple(spans))
 
 
-def _longest(rows: Iterable[Track]) -> list[Track]:
+def _longest(rows: Iterable[TimelineTrack]) -> list[TimelineTrack]:
     """The objects that were in view longest, in the order of their first sight."""
     found = list(rows)
     stayed = sorted(found, key=lambda t: -sum(s.end - s.start for s in t.spans))[:MOST_OBJECTS]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from nicegui import events, ui
 
 from visup.agent.model.errors import VisupError
-from visup.console.access import Role
+from visup.console.access import ConsoleRole
 from visup.console.pages.ask_panel import ask_panel
 from visup.console.pages.belief_panel import belief_panel
 from visup.console.pages.frame import button, clock, page_frame, shown_text, verdict_badge
@@ -29,7 +29,7 @@ KEYS = (
 )
 
 
-def run_page(state: ConsoleState, key: str, role: Role, begin: float) -> None:
+def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> None:
     """Lay out the page.
 
     Args:
@@ -143,7 +143,7 @@ def _timeline(head: Playhead) -> None:
     show()
 
 
-def _tabs(state: ConsoleState, head: Playhead, key: str, role: Role) -> None:
+def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     names = ("Now", "Told", "Alerts", "Ask", "Try")
     with ui.tabs().props("dense align=left no-caps") as tabs:
         made = {name: ui.tab(name) for name in names}

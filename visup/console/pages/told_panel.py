@@ -8,7 +8,7 @@ from nicegui import ui
 
 from visup.agent import Alert, Event, Severity
 from visup.agent.model.errors import VisupError
-from visup.console.access import Role
+from visup.console.access import ConsoleRole
 from visup.console.feedback import AlertFeedback, Opinion, read_feedback, say
 from visup.console.pages.frame import clock, shown_text
 from visup.console.pages.playhead import Playhead
@@ -57,7 +57,7 @@ def _line(
         button.on("click", lambda: head.go_to_time(time))
 
 
-def alerts_panel(head: Playhead, role: Role) -> None:
+def alerts_panel(head: Playhead, role: ConsoleRole) -> None:
     """Lay out the alerts, with what people said of them."""
     wanted = {"open": False}
 
@@ -87,7 +87,7 @@ def _alert(
     alert: Alert,
     said: AlertFeedback | None,
     head: Playhead,
-    role: Role,
+    role: ConsoleRole,
     again: Callable[[], object],
 ) -> None:
     _line(alert.opened, alert.cause, alert.severity, head)
@@ -97,7 +97,7 @@ def _alert(
         if said:
             note = f": {said.note}" if said.note else ""
             ui.label(shown_text(f"{said.opinion.value}{note}")).classes("dim")
-        if role is Role.OPERATOR:
+        if role is ConsoleRole.OPERATOR:
             _opinions(alert, head, again)
 
 

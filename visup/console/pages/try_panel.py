@@ -7,8 +7,8 @@ from collections.abc import Awaitable, Callable
 from nicegui import run, ui
 
 from visup.agent.model.errors import VisupError
-from visup.console.access import Role
-from visup.console.inquiry import Course
+from visup.console.access import ConsoleRole
+from visup.console.inquiry import AlternativeCourse
 from visup.console.pages.frame import clock, shown_text
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
@@ -20,14 +20,14 @@ MOST_LINES = 200
 LONGEST_TEXT = 100_000
 
 
-def try_panel(state: ConsoleState, head: Playhead, key: str, role: Role) -> None:
+def try_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     """Lay out the panel."""
-    if role is not Role.OPERATOR:
+    if role is not ConsoleRole.OPERATOR:
         ui.label("Who may only look cannot try things out.").classes("dim")
         return
     steps = len(head.run.frames)
 
-    async def tried(course: Callable[[], Course]) -> None:
+    async def tried(course: Callable[[], AlternativeCourse]) -> None:
         answer.clear()
         with answer:
             ui.spinner(size="md")
@@ -80,7 +80,7 @@ def _write(begin: Callable[[str, str], Awaitable[None]]) -> None:
         ui.button("Judge", on_click=judge).props("no-caps unelevated")
 
 
-def _course(course: Course, head: Playhead) -> None:
+def _course(course: AlternativeCourse, head: Playhead) -> None:
     """What both courses tell, side by side."""
     was, would = (v or "none" for v in course.differs.verdicts)
     verdicts = f"verdict: {was}" if was == would else f"verdict: {was} → {would}"
