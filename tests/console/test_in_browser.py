@@ -159,7 +159,11 @@ def violations(browser: Browser) -> list[str]:
     browser.value("window.found = null; axe.run().then(r => window.found = r.violations); 0")
     browser.until("window.found !== null")
     grave = "window.found.filter(v => ['serious', 'critical'].includes(v.impact))"
-    return list(browser.value(f"{grave}.map(v => v.id + ': ' + v.nodes[0].html)"))
+    return list(
+        browser.value(
+            f"{grave}.map(v => v.id + ': ' + v.nodes[0].html + v.nodes[0].failureSummary)"
+        )
+    )
 
 
 def test_everybody_can_use_it(browser: Browser, address: str) -> None:

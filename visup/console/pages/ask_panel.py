@@ -6,7 +6,7 @@ from nicegui import run, ui
 
 from visup.agent import Severity
 from visup.agent.model.errors import VisupError
-from visup.console.pages.frame import clock, shown_text
+from visup.console.pages.frame import clock, shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.console.recorded_mind import open_at
 from visup.console.state import ConsoleState
@@ -46,13 +46,13 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
     with ui.row().classes("w-full items-center no-wrap"):
         asked = ui.input(placeholder=EXAMPLE).props('dense outlined aria-label="Why ...?"')
         asked.classes("grow").on("keydown.enter", lambda: ask(str(asked.value or "")))
-        ui.button("Why?", on_click=lambda: ask(str(asked.value or ""))).props("no-caps unelevated")
+        worded_button("Why?", lambda: ask(str(asked.value or "")), main=True)
 
     @ui.refreshable
     def proposed() -> None:
         with ui.row().classes("gap-1"):
             for what in proposals(head):
-                ui.button(what, on_click=lambda w=what: ask(w)).props("outline dense no-caps")
+                worded_button(what, lambda w=what: ask(w))
 
     proposed()
     head.listen(proposed.refresh)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.resources import files
 
@@ -42,11 +42,18 @@ def page_frame(title: str) -> Iterator[None]:
         button("contrast", "Dark or light", lambda: dark.set_value(not dark.value))
 
 
-def button(icon: str, says: str, act: object) -> ui.button:
+def button(icon: str, says: str, act: Callable[[], object]) -> ui.button:
     """A round button with an icon, and words for those who point at it or cannot see it."""
-    made = ui.button(icon=icon, on_click=act).props(f'flat round dense aria-label="{says}"')  # type: ignore[arg-type]
+    made = ui.button(icon=icon, on_click=act, color=None)
+    made.props(f'flat round dense aria-label="{says}"').classes("icon")
     made.tooltip(says)
     return made
+
+
+def worded_button(text: str, act: Callable[[], object], *, main: bool = False) -> ui.button:
+    """A button with a word; the main one of its place stands out."""
+    made = ui.button(text, on_click=act, color=None).props("dense no-caps unelevated")
+    return made.classes("act main" if main else "act")
 
 
 def badge(text: str, colour: str) -> ui.label:

@@ -10,7 +10,7 @@ from visup.agent import Alert, Event, Severity
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.feedback import AlertFeedback, Opinion, read_feedback, say
-from visup.console.pages.frame import clock, shown_text
+from visup.console.pages.frame import clock, shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.console.recorded_mind import open_at
 from visup.wording import prose, worded_once
@@ -113,14 +113,8 @@ def _opinions(alert: Alert, head: Playhead, again: Callable[[], object]) -> None
         again()
 
     for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
-        made = ui.button(opinion.value, on_click=lambda o=opinion: keep(o))
-        made.props("flat dense no-caps").classes("act")
-    mute = (
-        ui.button("mute ...", on_click=lambda: _mute(keep))
-        .props("flat dense no-caps")
-        .classes("act")
-    )
-    mute.tooltip("needs a reason")
+        worded_button(opinion.value, lambda o=opinion: keep(o))
+    worded_button("mute ...", lambda: _mute(keep)).tooltip("needs a reason")
 
 
 def _mute(keep: Callable[[Opinion, str], None]) -> None:
@@ -133,5 +127,5 @@ def _mute(keep: Callable[[Opinion, str], None]) -> None:
             dialog.close()
             keep(Opinion.MUTED, str(reason.value or ""))
 
-        ui.button("Mute", on_click=done)
+        worded_button("Mute", done, main=True)
     dialog.open()

@@ -9,7 +9,7 @@ from nicegui import run, ui
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.inquiry import AlternativeCourse
-from visup.console.pages.frame import clock, shown_text
+from visup.console.pages.frame import clock, shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
 from visup.wording import prose
@@ -60,8 +60,7 @@ def _assume(begin: Callable[[str, int], Awaitable[None]], head: Playhead) -> Non
     with ui.row().classes("w-full items-center no-wrap"):
         said = ui.input(placeholder=ASSUMED).props('dense outlined aria-label="What is assumed"')
         said.classes("grow")
-        act = ui.button("Try", on_click=lambda: begin(str(said.value or ""), head.number + 1))
-        act.props("no-caps unelevated")
+        worded_button("Try", lambda: begin(str(said.value or ""), head.number + 1), main=True)
 
 
 def _write(begin: Callable[[str, str], Awaitable[None]]) -> None:
@@ -77,7 +76,7 @@ def _write(begin: Callable[[str, str], Awaitable[None]]) -> None:
                 return
             await begin(str(kind.value), written)
 
-        ui.button("Judge", on_click=judge).props("no-caps unelevated")
+        worded_button("Judge", judge, main=True)
 
 
 def _course(course: AlternativeCourse, head: Playhead) -> None:
