@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from nicegui import run, ui
 
 from visup.agent import Severity
@@ -52,7 +54,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
     def proposed() -> None:
         with ui.row().classes("gap-1"):
             for what in proposals(head):
-                worded_button(what, lambda w=what: ask(w))
+                worded_button(what, partial(ask, what))
 
     proposed()
     head.listen(proposed.refresh)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from nicegui import ui
 
@@ -113,7 +114,7 @@ def _opinions(alert: Alert, head: Playhead, again: Callable[[], object]) -> None
         again()
 
     for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
-        worded_button(opinion.value, lambda o=opinion: keep(o))
+        worded_button(opinion.value, partial(keep, opinion))
     worded_button("mute ...", lambda: _mute(keep)).tooltip("needs a reason")
 
 
