@@ -43,8 +43,8 @@ EVENT_KINDS: Mapping[str, str] = {
     "stage_done": "a stage is complete",
     "stage_unknown": "a stage cannot be judged",
     "stage_revised": "a stage that was said to be complete is believed not to have been",
-    "invariant_broken": "what a task says must never, or always, be does not hold",
-    "verdict": "what a task has come to changes",
+    "invariant_broken": "what a task says must never, or must always, be so is violated",
+    "verdict": "the verdict on a task changes",
 }
 """Kind of event -> when visup itself tells it; plug-ins may tell more."""
 

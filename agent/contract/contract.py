@@ -12,6 +12,9 @@ from visup.agent.model.records import Frame, Percept
 CONTRACT_VERSION = 1
 """Of the contract itself; it grows when a plug-in written for an older one would no longer run."""
 
+COMPILING_HANG_S = 600.0
+"""`hang_s` of behaviours whose loops are compiled in their first runs: minutes on a busy machine."""
+
 MOST_HISTORY = 64
 """Past frames that a behaviour may ask for: they are whole images, and all of them are kept."""
 
@@ -26,6 +29,8 @@ class Contract:
         needs: Kinds of percept that must be there before it runs in a step.
         every_s: Least time between two runs, seconds of video; 0 for every frame.
         cost_ms: Its budget: what one run takes at most, milliseconds; None when it does not say.
+        hang_s: After how many seconds one run counts as hanging where there is time, as on a recording; None
+            for the limit of the agent. For what is compiled or loaded at its first use.
         history: How many past frames, with what was reported of them, it wants in `observation.past`.
         deterministic: Whether the same frames give the same percepts.
         isolate: Whether it runs in a process of its own, with hard limits.
@@ -47,6 +52,7 @@ class Contract:
     needs: tuple[str, ...] = ()
     every_s: float = 0.0
     cost_ms: float | None = None
+    hang_s: float | None = None
     history: int = 0
     deterministic: bool = True
     isolate: bool = False
@@ -72,7 +78,7 @@ class Contract:
         self._expect("awake", isinstance(self.awake, str), 'a condition, such as "expected(a)"')
         self._expect("relieves", self.name not in self.relieves, "names of other behaviours")
         self._expect("every_s", _number(self.every_s, 0.0), "seconds, 0 for every frame")
-        for field in ("cost_ms", "memory_mb"):
+        for field in ("cost_ms", "hang_s", "memory_mb"):
             value = getattr(self, field)
             fine = value is None or (_number(value, 0.0) and value > 0)
             self._expect(field, fine, "a number above 0, or None")

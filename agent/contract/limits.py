@@ -31,6 +31,8 @@ class Limits:
     Attributes:
         hang_s: A run that takes longer is given up, seconds. None runs behaviours in the thread of
             the caller, without any limit: for debuggers and profilers.
+        patient: Whether a contract may ask for a longer `hang_s`, for what is compiled in its first runs. Not
+            for live sources, where a hang must be reported soon.
         start_s: How long a behaviour may take to start: to import libraries and load models, seconds.
         budgets: Whether each run is also held to its contract's `cost_ms`.
         budget_ms: Budget of behaviours that declare none, milliseconds.
@@ -43,6 +45,7 @@ class Limits:
     """
 
     hang_s: float | None = 60.0
+    patient: bool = True
     start_s: float = 60.0
     budgets: bool = False
     budget_ms: float = 1000.0
@@ -55,7 +58,9 @@ class Limits:
     def seconds(self, contract: Contract) -> float | None:
         """How long one run may take; None without limit."""
         if not self.budgets:
-            return self.hang_s
+            if self.hang_s is None or not self.patient:
+                return self.hang_s
+            return max(self.hang_s, contract.hang_s or 0.0)
         budget = (contract.cost_ms or self.budget_ms) / 1000.0
         return budget if self.hang_s is None else min(budget, self.hang_s)
 

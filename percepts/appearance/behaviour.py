@@ -15,6 +15,7 @@ from visup.agent import (
     Percept,
     Region,
 )
+from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.percepts.appearance.looks.scene import Scene, prepare_scene
 from visup.percepts.appearance.looks.thing_model import view_models
 from visup.percepts.appearance.output.explaining import shares, unexplained
@@ -39,7 +40,9 @@ class AppearanceBehaviour:
         motion: Finds what moves by itself.
     """
 
-    contract = Contract("appearance", gives=("region", "hypothesis", "camera"))
+    contract = Contract(
+        "appearance", gives=("region", "hypothesis", "camera"), hang_s=COMPILING_HANG_S
+    )
 
     def __init__(
         self, taught: Sequence[TaughtView] = (), motion: MotionBehaviour | None = None

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept
+from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.agent.model.errors import SettingsError
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.motion.behaviour import image_is_sound
@@ -24,7 +25,9 @@ class PlacedBehaviour:
         taught: Views of other things.
     """
 
-    contract = Contract("appearance", gives=("region", "hypothesis", "camera"))
+    contract = Contract(
+        "appearance", gives=("region", "hypothesis", "camera"), hang_s=COMPILING_HANG_S
+    )
 
     def __init__(
         self, places: Mapping[str, tuple[float, float]], taught: Sequence[TaughtView] = ()

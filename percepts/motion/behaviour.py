@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from visup.agent import Contract, Directive, Frame, HealthStatus, Observation, Percept
+from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.output.backward_tracking import BackwardTracker
 from visup.percepts.motion.segmenter import MotionSegmenter
@@ -35,7 +36,7 @@ class MotionBehaviour:
         settings: What can be set about seeing motion.
     """
 
-    contract = Contract("motion", gives=("region",))
+    contract = Contract("motion", gives=("region",), hang_s=COMPILING_HANG_S)
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
         self._segmenter = MotionSegmenter(settings)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.contract.behaviour import Contract
+from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Hypothesis, Observation, Percept, Region
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
@@ -78,7 +79,7 @@ class ShapeBehaviour:
         settings: How regions are matched.
     """
 
-    contract = Contract("shape", gives=("hypothesis",), needs=("region",))
+    contract = Contract("shape", gives=("hypothesis",), needs=("region",), hang_s=COMPILING_HANG_S)
 
     def __init__(
         self, database: ModelDatabase | None = None, settings: ShapeSettings | None = None

@@ -12,11 +12,14 @@ import pytest
 
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Contract, Directive, Frame, Observation, Report, ReportState
+from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent
 from visup.agent.execution.behaviour_slot import PATIENCE
 from visup.agent.execution.pipeline import ordered_slots, perceive
+from visup.agent.model.errors import BehaviourError
 from visup.agent.model.step import Step
+from visup.percepts.motion.behaviour import MotionBehaviour
 
 
 class Plug:
@@ -117,6 +120,18 @@ def test_without_budgets_no_decision_hangs_on_time() -> None:
     limits = Limits(hang_s=None, clock=lambda: float(next(ticks)))
     told = reports(Plug(lambda f, s: f.index, cost_ms=1.0), limits, 10)
     assert {r.state for r in told} == {ReportState.RAN}
+
+
+def test_what_compiles_at_its_first_use_may_take_longer_but_not_live() -> None:
+    slow, usual = Contract("slow", ("x",), hang_s=600.0), Contract("usual", ("x",))
+    assert MotionBehaviour.contract.hang_s == COMPILING_HANG_S
+    recorded, live = Limits(hang_s=60.0), Limits(hang_s=20.0, patient=False)
+    assert [recorded.seconds(slow), recorded.seconds(usual)] == [600.0, 60.0]
+    assert [live.seconds(slow), live.seconds(usual)] == [20.0, 20.0]
+    assert Limits(hang_s=None).seconds(slow) is None
+    assert Limits(budgets=True, budget_ms=40.0).seconds(slow) == 0.04
+    with pytest.raises(BehaviourError, match="a number above 0"):
+        Contract("slow", ("x",), hang_s=-1.0)
 
 
 def test_over_budget_is_late_and_too_often_late_is_suspended() -> None:

@@ -40,7 +40,7 @@ TOLD = {
     "approach": ("stage approach: failing", "the arm and the satellite have been diverging"),
     "stage captured": ("stage captured: pending", "arm is played by object 3"),
     "touching 1 2": ("touching(the satellite, the hubble) has been false", "its value is"),
-    "coupled 1 3": ("coupled(the satellite, the arm) has been false", "touching"),
+    "coupled 1 3": ("coupled(the satellite, the arm) is false", "touching"),
     "identity 1": ("object 1 is spartan", "votes, share"),
     "object 3": ("object 3 is believed to be seen", "first seen at 0.00 s"),
     "collision_course 1 2": ("collision_course(the", "converging("),

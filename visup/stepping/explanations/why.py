@@ -175,10 +175,12 @@ class ReasonFinder:
             named = f"{name}({', '.join(map(str, objects))})"
             raise SettingsError(f"{named} is not judged", expected="a relation of objects in view")
         who = ", ".join(short(self.mind, i) for i in objects)
-        text = (
-            f"{name}({who}) has been {r.truth.value} since {r.since:.2f} s, "
-            f"confidence {r.confidence:.2f}"
+        # Since when some are false is not kept: they carry the time of the step.
+        lasting = r.since < self.mind.time
+        stands = (
+            f"has been {r.truth.value} since {r.since:.2f} s" if lasting else f"is {r.truth.value}"
         )
+        text = f"{name}({who}) {stands}, confidence {r.confidence:.2f}"
         parts = self._measured(r) + (self._coupled(objects) if name == "coupled" else ())
         sights = tuple(self._sight(i) for i in objects) if deep else ()
         return Why(text, (*parts, *sights), *self._here)
