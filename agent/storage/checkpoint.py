@@ -116,6 +116,13 @@ class _StateWriter:
             return ["enum", name, self.node(value.value)]
         if isinstance(value, tuple):
             return ["named", name, [self.node(v) for v in value]]
+        if isinstance(value, str):  # a name of a task, which knows where it stands
+            return [
+                "text",
+                name,
+                str(value),
+                [[n, self.node(v)] for n, v in state_of(value).items()],
+            ]
         if isinstance(value, _BUILT_IN):
             raise StateError(f"a {kind.__qualname__}")
         return ["object", name, [[n, self.node(v)] for n, v in state_of(value).items()]]
@@ -165,7 +172,7 @@ def loaded_modules(data: bytes) -> list[str]:
     """The modules whose classes a state needs, so that another process can load them first."""
     _, size, _, _ = _HEAD.unpack_from(data)
     table, _, _ = json.loads(data[_HEAD.size : _HEAD.size + size])
-    named = {node[1] for node in table if node[0] in ("object", "enum", "named")}
+    named = {node[1] for node in table if node[0] in ("object", "enum", "named", "text")}
     return sorted({name.partition(":")[0] for name in named})
 
 
@@ -201,6 +208,15 @@ class _StateReader:
             raise ValueError(f"{name} is not a tuple")
         return tuple.__new__(kind, self.many(nodes))
 
+    def text(self, name: str, text: str, attributes: list[tuple[str, _Node]]) -> Any:
+        kind = _class(name)
+        if not issubclass(kind, str) or issubclass(kind, Enum):
+            raise ValueError(f"{name} is not a text")
+        it = str.__new__(kind, text)
+        for attribute, node in attributes:
+            object.__setattr__(it, attribute, self._of(node))
+        return it
+
     def csr(self, *parts: _Node) -> Any:
         from scipy.sparse import csr_matrix
 
@@ -230,6 +246,7 @@ _MAKERS: Mapping[str, Callable[..., Any]] = {
     "enum": _StateReader.enum,
     "csr": _StateReader.csr,
     "named": _StateReader.named,
+    "text": _StateReader.text,
 }
 
 

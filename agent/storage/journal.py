@@ -106,6 +106,11 @@ class Journal:
             self._lock.release()
             raise
 
+    @property
+    def size(self) -> int:
+        """What the steps that are kept take, bytes."""
+        return sum(self._sizes)
+
     def note(self, **facts: Any) -> None:
         """Store facts about the run (settings, source, verdict, ...), replacing older ones, on the disk."""
         rows = [(key, _text(to_jsonable(value))) for key, value in facts.items()]

@@ -75,7 +75,8 @@ def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
     if node.operator in ("==", "!="):
         yield leave.span, f"'leave' has no sense behind '{node.operator}'", "<, <=, > or >=", None
     elif dimension and leave.dimension != dimension:
-        yield leave.span, f"'leave' wants {units_of(dimension)}", None, None
+        meant = f"{number_text(leave.value)} {_base_unit(dimension) or ''}".rstrip()
+        yield leave.span, f"'leave' wants {units_of(dimension)}", None, f"write `{meant}`"
     elif not isinstance(node.right, Number):
         what = "'leave' needs a number before it too"
         yield leave.span, what, "such as speed(a) > 5 px/s leave 3 px/s", None
@@ -171,7 +172,7 @@ def _alike(
         if kind != kinds[0]:
             pair = (kinds[0], kind) if word != "subtracted from" else (kind, kinds[0])
             what = f"{_named(pair[0])} is {word} {_named(pair[1])}"
-            faults.append((span, what, units_of(kinds[0]), None))
+            faults.append((span, what, units_of(kinds[0]), f"write `{parts[0]}`"))
             return None
     return kinds[0] if kinds else None
 

@@ -20,6 +20,8 @@ BEHIND_WORD = ("()", ")")
 BETWEEN = (")", "(", ",", ">", "<", ":")
 UNITS = ("s", "px", "px/s", "%", "samples")
 ALIKE = 0.7
+NUMBERS = {"two": "2", "three": "3", "four": "4", "five": "5", "six": "6", "seven": "7", "eight": "8",
+           "nine": "9", "ten": "10"}  # fmt: skip
 JOINTS = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
 
 
@@ -74,11 +76,14 @@ def edits(
         if word[:1].isdigit() and begin <= stop <= end:
             yield from (Repair(stop, stop, f" {unit}") for unit in UNITS)
     for start, stop, word in near:
+        if word in NUMBERS:
+            yield Repair(start, stop, NUMBERS[word])
         if word.isidentifier() and word not in words:
             yield from (Repair(start, stop, meant) for meant in _ranked(word, words))
     for start, _, _ in near if unread else ():
         yield from (Repair(start, start, f"{new} ") for new in BETWEEN)
     yield from (Repair(start, stop, "") for start, stop, _ in near)
+    yield from _fillers(line, near, words)
     yield from _left_out(line, begin, end, near)
 
 
@@ -93,6 +98,19 @@ def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
         yield from ((end, new) for new in BEHIND_CALL)
     elif line[begin:end].isidentifier():
         yield from ((end, new) for new in BEHIND_WORD)
+
+
+def _fillers(
+    line: str, near: Iterable[tuple[int, int, str]], words: Sequence[str]
+) -> Iterator[Repair]:
+    """Several words in a row of which none is known, left out, or taken for a joint of two parts."""
+    known, run = {*words, *JOINTS}, r"[A-Za-z_]\w*(?:[ ]+[A-Za-z_]\w*)+(?![\w(])"
+    places = {start for start, _, _ in near}
+    for found in re.finditer(run, line):
+        some = [m for m in re.finditer(r"\w+", found[0]) if m[0] not in known]
+        if len(some) > 1 and any(found.start() <= at < found.end() for at in places):
+            begin, end = found.start() + some[0].start(), found.start() + some[-1].end()
+            yield from (Repair(begin, end, new) for new in ("", "and", "&"))
 
 
 def _left_out(

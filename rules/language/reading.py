@@ -77,12 +77,16 @@ class Patience:
         return _syntax_fault(text, start)
 
 
+def grammar() -> str:
+    """The text of `rules.lark`."""
+    return files("visup.rules.language").joinpath("rules.lark").read_text(encoding="utf-8")
+
+
 @lru_cache(maxsize=1)
 def _parser() -> Lark:
-    grammar = files("visup.rules.language").joinpath("rules.lark").read_text(encoding="utf-8")
     starts = ["start", "formula"]
     return Lark(
-        grammar, start=starts, parser="lalr", propagate_positions=True, maybe_placeholders=True
+        grammar(), start=starts, parser="lalr", propagate_positions=True, maybe_placeholders=True
     )
 
 

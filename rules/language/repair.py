@@ -27,7 +27,21 @@ WORDS = (
     *(w for w in KEYWORDS if w not in ("may", "repeat")),
     *("may repeat", "info", "warning", "critical"),
 )
-PUT_IN = (")", " s", " px", ":", " samples", ": info", "(", ",", " and", "]", ' say "{a}"', "[5 s]")
+PUT_IN = (
+    ")",
+    " s",
+    " px",
+    ":",
+    " samples",
+    ": info",
+    "(",
+    ",",
+    " and",
+    "]",
+    ' say "{a}"',
+    "[5 s]",
+    " when",
+)
 AMOUNTS = ("0", "20 px", "2 s", "20 px/s", "20 deg", "20 deg/s", "2 m")
 """What may be compared with, where nothing stands behind a sign."""
 Parses = Callable[[str], UnexpectedInput | None]

@@ -243,10 +243,9 @@ class _FormulaChecker:
         table = words if fact else quantities
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
-            meant = SYNONYMS.get(call.name, "")
-            hint = did_you_mean(meant if meant in table else call.name, table)
+            hint = did_you_mean(_meant(call.name, table), table)
             if call.name in (quantities if fact else words):
-                hint = "compare it with a number" if fact else "it is true or false"
+                hint = self._compared(call) if fact else "it is true or false"
             yield call.span, f"there is no {kind} '{call.name}'", _nearest(call.name, table), hint
             return
         takes = table[call.name].takes
@@ -262,6 +261,13 @@ class _FormulaChecker:
             hint = f"write `{call.name}({', '.join(_distinct(call.words, self.scope))})`"
             what = f"'{call.name}' is given the same object twice"
             yield call.span, what, "two different objects", hint
+
+    def _compared(self, call: Predicate | Measure) -> str:
+        """What to write in place of a quantity that stands where something is true or false."""
+        said = f"{call.name}({', '.join(call.words)})"
+        measured = Measure(call.name, call.words, call.span)
+        amount = example_amount(Comparison(measured, "<", measured), self.vocabulary)
+        return f"compare it with a number; write `{said} < {amount}` in place of `{said}`"
 
     def _filled(self, call: Predicate | Measure, takes: tuple[str, ...]) -> Iterator[str]:
         """Arguments as the call has them, the missing ones by what there is."""
@@ -294,7 +300,8 @@ class _FormulaChecker:
             yield call.span, what, None, hint or "rename the variable"
 
 
-SYNONYMS = {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
+SYNONYMS = {"count": "objects", "number": "objects", "height_above": "position_y"}
+SYNONYMS |= {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
 SYNONYMS |= {"visible": "seen", "present": "seen", "gone": "lost", "contact": "touching"}
 SYNONYMS |= {
     "near": "close_to",
@@ -305,6 +312,13 @@ SYNONYMS |= {
 """Words of other tools and of everyday speech -> the word that is meant."""
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
 EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
+
+
+def _meant(name: str, table: Iterable[str]) -> str:
+    """A word that is known, where one is meant by the whole of a name or by a part of it; else the name."""
+    parts = (name, *name.split("_"))
+    meant = (SYNONYMS.get(p, p) for p in parts)
+    return next((m for m in meant if m in table), name)
 
 
 def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:

@@ -209,15 +209,20 @@ class _Entrance(Generic[W]):
     def _any_order(self, todo: Continuation, course: AnyOrder) -> Iterator[State[W] | None]:
         items = course.items
         left = len(items) if course.count is None else course.count
+        least = left if course.least is None else course.least
         for i, item in enumerate(items):
             others = (*items[:i], *items[i + 1 :])
             if left == 1:
                 yield from self.states(replace(todo, course=item))
-            elif len(others) == 1:
+            elif len(others) == 1 and least == 2:
                 yield from self._then(todo, item, others[0])
             else:
                 count = None if left - 1 == len(others) else left - 1
-                yield from self._then(todo, item, AnyOrder(others, count=count))
+                fewest = None if least == left else max(0, least - 1)
+                again = AnyOrder(others, count=count, least=fewest, new=course.new)
+                yield from self._then(todo, item, again)
+        if least == 0:
+            yield None
 
     def _counted(self, todo: Continuation, counted: Counted) -> Iterator[State[W] | None]:
         """Once, and after it as often as is left to do."""

@@ -48,7 +48,8 @@ def guessed(
         The same, or with one actor more, played by what moves.
     """
     missed = [k for k, b in enumerate(bindings) if b.object_id is None and _told_by_looks(task, b)]
-    if len(missed) != 1 or sum(b.object_id is None for b in bindings) > 1 or len(bindings) < 2:
+    awaited = [b for b in bindings if b.object_id is None and not task.actor(b.actor).spare]
+    if len(missed) != 1 or len(awaited) > 1 or len(bindings) < 2:
         return tuple(bindings)
     (k,) = missed
     playing = {b.object_id for b in bindings if b.object_id is not None}
@@ -67,7 +68,8 @@ def guessed(
 def _told_by_looks(task: Task, binding: Binding) -> bool:
     """Whether an actor is told by its models alone, and must be there."""
     actor = task.actor(binding.actor)
-    return bool(binding.models) and not actor.criteria and not actor.optional
+    waited = not actor.optional and not actor.spare
+    return bool(binding.models) and not actor.criteria and waited
 
 
 def _unknown(belief: ObjectBelief, settings: TaskSettings) -> bool:

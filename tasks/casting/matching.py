@@ -26,7 +26,8 @@ CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two act
 
 def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
     """Model names that an actor stands for: the user's word, else the task's, else its own name."""
-    return tuple(mind.actors.get(actor, ())) or task.models(actor)
+    said = mind.actors.get(actor) or mind.actors.get(task.actor(actor).spare)
+    return tuple(said or ()) or task.models(actor)
 
 
 def match(
@@ -101,6 +102,8 @@ def _weights(
     for j, belief in enumerate(objects):
         if held == belief.id:
             weight[j] = _held_weight(weight[j], belief, settings)
+        elif belief.presence is Presence.LEFT:
+            weight[j] = 0.0  # what has left takes up no other part
     return [w if w >= settings.bind_at else 0.0 for w in weight]
 
 

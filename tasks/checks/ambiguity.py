@@ -139,7 +139,7 @@ class _Forms:
         if any(i is None for i in inner):
             return None
         if isinstance(course, Choice | Together | AnyOrder):
-            count = course.count if isinstance(course, AnyOrder) else None
+            count = (course.count, course.least) if isinstance(course, AnyOrder) else None
             return self._number((type(course).__name__, count, frozenset(inner)))
         if isinstance(course, Sequence):
             return self._number(tuple(inner))

@@ -7,10 +7,12 @@ from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
 
+from visup.agent.model.did_you_mean import closest
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition, contradict
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
+from visup.tasks.grammar.copies import MOST_ROUNDS, alike
 from visup.tasks.grammar.graphs import reachable
 from visup.tasks.grammar.nodes import (
     Action,
@@ -30,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Together,
     walk,
 )
+from visup.tasks.grammar.templates import names_in
 from visup.tasks.grammar.units import value
 
 MOST_IN_ANY_ORDER = 12
@@ -205,11 +208,36 @@ class CourseCheck:
                 elif course.most < course.least:
                     what = f"at least {course.least} and at most {course.most} times is never"
                     yield self.source.fault("E233", what, course.span, "a greater `at most`")
+            if isinstance(course, AnyOrder) and course.new:
+                yield from self.rounds(course)
+            if isinstance(course, AnyOrder) and (course.count or 0) > len(course.items):
+                what = f"{course.count} of {len(course.items)} things are never done"
+                said = f"any {len(course.items)} of"
+                hint = f"write `{said}` in place of `any {course.count} of`"
+                yield self.source.fault(
+                    "E233", what, course.span, f"`{said}`, or more things", hint
+                )
             if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
                 what = f"{len(course.items)} things in any order have too many orders to follow"
                 hint = "put those together that follow one another"
                 expected = f"at most {MOST_IN_ANY_ORDER}"
                 yield self.source.fault("E234", what, course.span, expected, hint)
+
+    def rounds(self, loop: AnyOrder) -> Iterator[Diagnostic]:
+        """A loop with something new each time that has no rounds, or in which nothing is new."""
+        least, most = loop.least or 0, loop.count
+        if most is not None and most < max(1, least):
+            what = f"at least {least} and at most {most} rounds are never"
+            yield self.source.fault("E233", what, loop.span, "a greater `at most`")
+        elif max(least, most or 0) > MOST_ROUNDS:
+            what = f"a loop with a new `{loop.new}` each time has at most {MOST_ROUNDS} rounds"
+            yield self.source.fault("E234", what, loop.span, f"at most {MOST_ROUNDS} times")
+        if alike(loop):
+            what = f"`for each new {loop.new}`, but what is to be done names no `{loop.new}`"
+            near = closest(loop.new, names_in(loop.items[0]))
+            hint = f"name it, such as `<take({loop.new})>`"
+            hint = f"write `{loop.new}` in place of `{near}`" if near else hint
+            yield self.source.fault("E225", what, loop.span, f"`{loop.new}` among the actors", hint)
 
     def repetitions(self) -> Iterator[Diagnostic]:
         """Repetitions of what may be left out."""

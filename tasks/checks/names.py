@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from math import isinf
 
 from visup.agent.model.did_you_mean import did_you_mean
@@ -41,7 +42,7 @@ from visup.tasks.grammar.nodes import (
     ZoneDeclaration,
     walk,
 )
-from visup.tasks.grammar.structure import task_actors
+from visup.tasks.grammar.structure import spare_kinds, task_actors
 from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of, value
 
 Declared = Actor | ZoneDeclaration | Parameter
@@ -101,6 +102,7 @@ class NameCheck:
         yield from self.declared()
         yield from self.unused()
         yield from self.unobserved()
+        yield from self.astray()
 
     def used(self) -> Iterator[tuple[Amount, str]]:
         """Every amount that is used, with what it should measure; empty when nobody knows."""
@@ -285,6 +287,17 @@ class NameCheck:
                 what = f"`{name}` can never be observed: it needs {said}, which nothing will give"
                 hint = "switch the behaviour on that gives it, or ask for something else"
                 yield self.source.fault("E231", what, span, hint=hint)
+
+    def astray(self) -> Iterator[Diagnostic]:
+        """Names of what is another one in each round of a loop, outside of that loop."""
+        for kind in spare_kinds(self.task):
+            outside = ((n, actors, a) for n, actors, _ in self.asked for a in actors if a == kind)
+            for name, actors, actor in islice(outside, 1):
+                what = f"`{kind}`, another one in each round of `for each new {kind}`, stands outside of it"
+                said = f"{name}({', '.join(map(str, actors))})"
+                hint = f"write `for each new {kind} {said}` in place of `{said}`"
+                expected = "an actor that stays the same, or another such loop"
+                yield self.source.fault("E240", what, actor.span, expected, hint)
 
 
 ANY = "any"

@@ -9,13 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 
-from visup.agent.model.did_you_mean import closest
 from visup.rules.language.diagnostics import Diagnostic
-from visup.rules.language.edits import edits, hint_of
+from visup.rules.language.edits import ALIKE, edits, hint_of
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
+from visup.tasks.checks.usual_meanings import NAME, USUAL
+from visup.tasks.diagnostics.recovery import KEYWORDS
 from visup.tasks.grammar.statement import RESERVED_WORDS
 from visup.tasks.grammar.units import UNITS
 
@@ -24,183 +25,17 @@ CHARACTERS_TRIED = 60_000
 MOST_HINTS = 12
 
 Check = Callable[[str], Sequence[Diagnostic]]
-New = str | Callable[[re.Match[str]], str]
 
-
-@dataclass(frozen=True, slots=True)
-class UsualMeaning:
-    """What a mistake usually means.
-
-    Attributes:
-        codes: Of the mistakes.
-        pattern: What it looks like, looked for on its line, at the caret first.
-        new: What is meant.
-    """
-
-    codes: tuple[str, ...]
-    pattern: re.Pattern[str]
-    new: New
-
-
-def _usual(codes: str, pattern: str, new: New) -> UsualMeaning:
-    return UsualMeaning(tuple(codes.split()), re.compile(pattern), new)
-
-
-SYNONYMS = {
-    "near": "converging", "approach": "converging", "approaching": "converging",
-    "attached": "coupled", "grasp": "coupled", "grasped": "held_by", "holding": "coupled",
-    "hold": "coupled", "above": "on", "upon": "on", "atop": "on", "connected": "coupled",
-    "released": "decoupled", "release": "decoupled",
-    "leaving": "diverging", "retreating": "diverging", "contact": "touching", "visible": "present",
-    "left": "gone", "away": "gone", "in": "inside", "separate": "apart", "moving_apart": "diverging",
-}  # fmt: skip
-WORDS = (*RESERVED_WORDS, *ACTIONS, "leftmost", "rightmost", "ignored")
-OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
-             "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
-KEYWORD = (
-    r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|pauses|when|any|order|already|each"
-    r"|of)"
-)
-SIGN = r"begins|ends|fails|progresses|pauses"
-MEANT = "|".join(SIGNS_MEANT)
-NAME = r"[^\W\d]\w*"
-CALL = rf"{NAME}\s*\([^()]*\)"
-TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"
-
-NUMBERS = {"one": 1, "two": 2, "three": 3}
-PREFIXES = ("already", "task", "never", "always")
-
-
-def _listed(word: str, stages: str) -> str:
-    """Stages in a list behind a word: `any order (<a>, <b>)`."""
-    return f"{word} ({', '.join(stages.split())})"
-
-
-USUAL = (
-    _usual("E101 E103 E119", rf"\b({KEYWORD})\b", lambda m: m[1].lower()),
-    _usual("E101 E103 E119", rf"(?i)\b({KEYWORD})\b", lambda m: m[1].lower()),
-    _usual("E101 E219 E103", rf"\(\s*({NAME})\s*;\s*({NAME})\s*\)", r"(\1, \2)"),
-    _usual("E238", rf"\bevery\s+({TIME})\s+to\s+({TIME})", r"every \2 to \1"),
-    _usual("E238", r"between\s+([\d.]+\s*\S+)\s+and\s+([\d.]+\s*\S+)", r"between \2 and \1"),
-    _usual("E103", rf"\bnot\s+({NAME})(?=\s*\()", lambda m: OPPOSITES.get(m[1], m[1])),
-    _usual("E103 E127", rf"\b(?:historically|always|once|eventually|globally|finally|next)\s+(?={CALL})", ""),
-    _usual("E103", rf"\b({NAME})(?=\s+(?:{CALL}|<))", lambda m: closest(m[1], PREFIXES) or m[1]),
-    _usual("E103", rf"^\s*({NAME})(?=\s*::=)", r"<\1>"),
-    _usual("E103", rf"(?<![<\w])({NAME})(?![\w>(])", r"<\1>"),
-    _usual("E102 E202", r"(?<=>)\s*(?:::\s*=|: :=|:=|=|->|→|::|:|=>|:==|<-)\s*", " ::= "),
-    _usual("E101", rf"<({NAME})>\s*\(([^()]*)\)", r"<\1(\2)>"),
-    _usual("E101 E134", r"\b(any\s+\d+\s+of)\s+((?:<[^>]*>\s*){2,})", lambda m: _listed(m[1], m[2])),
-    _usual("E101", r"\b(any)\s+(one|two|three)\s+(?=of)", lambda m: f"any {NUMBERS[m[2]]} "),
-    _usual("E101", r"(between\s+[\d.]+\s*\S*?)\s*(?:,|to|-|\.\.)\s*([\d.]+)", r"\1 and \2"),
-    _usual("E101", r"\bon\s+(?:failure|error)\s+(?!of)", "on failure of "),
-    _usual("E101 E103 E219", r"\bon\s+(?:fail(?:ing|s|ed)?|errors?)\s+of\b", "on failure of"),
-    _usual("E219", rf"\b({NAME})\s+({NAME})\s+(?:with|and|to)\s+({NAME})\b", r"\1(\2, \3)"),
-    _usual("E103", r"\b(?:each|all)\s+of\s*(?=\()", ""),
-    _usual("E101", r"\b(on\s+failure\s+of\s+<[^>]*>)\s*(?!:)", r"\1: "),
-    _usual("E101", rf"\b(?:exists|forall|some|all)\s+{NAME}\s*:\s*", ""),
-    _usual("E101", r"\b(?:rising|falling|once|previous)\s*\((.*)\)", r"\1"),
-    _usual("E101 E103", rf"({CALL})\s+(for\s+{TIME})(?=\s+(?:and|or)\b)", r"(\1 \2)"),
-    _usual("E101", rf"(\s+when\s+.*?)\s+(for\s+{TIME})\s+((?:and|or)\s+[^\n]*)", r"\1 \3 \2"),
-    _usual("E101 E228", rf"({CALL})\s*={{1,3}}\s*(\d)", r"\1 <= \2"),
-    _usual("E101", rf"({CALL})\s*!=\s*(\d)", r"\1 > \2"),
-    _usual("E101", r"<=>|<->|->|=>", " "),
-    _usual("E119", r"\s*,(?=\s)", ""),
-    _usual("E119", r"\band\b", "&"),
-    _usual("E119", r"\bor\b", "|"),
-    _usual("E119", r"\b(?:then|next|before|after|and then)\b\s*", ""),
-    _usual("E110", r"$", ")"),
-    _usual("E110", rf"({NAME}\s*\([^()&|<>]*)$", r"\1)"),
-    _usual("E111", r"\)(?=[^)]*$)", ""),
-    _usual("E112", r"\[([^\[\]]*)\]", r"(\1)?"),
-    _usual("E112", r"\{([^{}]*)\}", r"(\1)*"),
-    _usual("E114", r"\s*[|&]\s*$", ""),
-    _usual("E114", r"([|&])\s*[|&]", r"\1"),
-    _usual("E114", r"(::=)\s*[|&]", r"\1"),
-    _usual("E116", r"\b((?:for|within|after|every)\s+[\d.]+)\b(?!\s*\w)", r"\1 s"),
-    _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 px"),
-    _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 s"),
-    _usual("E116", r"\bsignal\(\s*(\w+)\s*,[^()]*\)", r"signal(\1)"),
-    _usual("E228 E223", rf"<\s*({NAME})\s*$", r"<\1>"),
-    _usual("E116", r"(\d)(?!\s*[\w%.])", r"\1 px"),
-    _usual("E115", r"\b(for|within|after|every)\s+-\s*([\d.]+)", r"\1 \2"),
-    _usual("E218 E226", r"(\d)\s*m\b", r"\1 min"),
-    _usual("E115", r"\bfor\s+(?:each|all|every)\s+of\s*(\([^()]*\))", r"for each one of \1"),
-    _usual("E115", r"\bfor\s+(?:all|every)\s+(?=\w+\s+(?:of|in)\b)", "for each "),
-    _usual("E115 E101", r"\b(for\s+each\s+\w+)\s+in\b", r"\1 of"),
-    _usual("E115", r"\b(every)\s*$", r"\1 5 s"),
-    _usual("E115", r"\s*\b(?:for|within|after)\s*$", ""),
-    _usual("E115", r"\b(for|within|after)\b", r"\1 5 s"),
-    _usual("E120", r"\s*[.;]\s*$", ""),
-    _usual("E121", r"//|--|%|/\*", "#"),
-    _usual("E122", r"&&|\|\|", lambda m: m[0][0]),
-    _usual("E124", rf"\bactor\s+({NAME})\s+(?=\w)(?!is\b)", r"actor \1 is "),
-    _usual("E124", rf"\bactor\s+({NAME})\s*=\s*", r"actor \1 is "),
-    _usual("E124", rf"\bactor\s+({NAME})\s+is\s*$", r"actor \1 is \1"),
-    _usual("E130", r"\binclude\s+([\w./-]+)", r'include "\1"'),
-    _usual("E131", rf"\bzone\s+({NAME})\b.*$", r"zone \1 is (100, 50) (300, 50) (300, 200)"),
-    _usual("E132", rf"\bparameter\s+({NAME})\s*(?:=|:|:=)?\s*(?=\d)", r"parameter \1 is "),
-    _usual("E201", rf"\bclosed\(\s*({NAME})\s*\)", r"openness(\1) < 10 %"),
-    _usual("E201", rf"\b(?:open|opened)\(\s*({NAME})\s*\)", r"openness(\1) > 20 %"),
-    _usual("E127", rf"\bperiodic\(\s*({CALL})\s*,\s*({TIME}(?:\s+to\s+{TIME})?)\s*\)", r"\1 every \2"),
-    _usual("E127", r"\s*\bperiodically\b", " every 5 s"),
-    _usual("E101", rf"\bevery\s+({TIME}(?:\s+to\s+{TIME})?)\s+({CALL})", r"\2 every \1"),
-    _usual("E101", r"\beach(?=\s+\d)", "every"),
-    _usual("E119 E116", r"(every [\d.]+)\s*\w*\s*(?:and|or|,|-|\.\.)\s*([\d.]+)\s*(\w+)", r"\1 \3 to \2 \3"),
-    _usual("E208", r"\s*\bpauses\s+when\b.*$", ""),
-    _usual("E133", rf"\b({SIGN})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
-    _usual("E133", rf"\b({SIGN})\s+(?={NAME}\()", r"\1 when "),
-    _usual("E133", rf"\b({MEANT})\s+(?:when|if|while|on)\b", lambda m: f"{SIGNS_MEANT[m[1]]} when"),
-    _usual("E133", rf"\b({MEANT})\s+(?={NAME}\()", lambda m: f"{SIGNS_MEANT[m[1]]} when "),
-    _usual("E134", r"\b(at\s+(?:least|most)\s+\d+)\b(?!\s*times?)", r"\1 times"),
-    _usual("E134", r"\btwice\b", "at least 2 times at most 2 times"),
-    _usual("E134", r"\b(?:thrice|three times)\b", "at least 3 times at most 3 times"),
-    _usual(
-        "E134",
-        rf"\brepeat\s+(\d+)\s*(?:times|x)?\s*(?:of\s+)?({CALL}|<[^>]*>)",
-        r"\2 at least \1 times at most \1 times",
-    ),
-    _usual(
-        "E134", r"\brepeat(?:ed)?\s+(\d+)(?:\s*(?:times|x))?", r"at least \1 times at most \1 times"
-    ),
-    _usual("E134", rf"\brepeat(?:edly)?\s+({CALL}|<[^>]*>)", r"\1+"),
-    _usual("E134", r"\b(\d+)\s*(?:times|x)\b", r"at least \1 times at most \1 times"),
-    _usual("E135", r"\bin\s+(?=any\s+order)", ""),
-    _usual("E135", r"\b(any\s+order)\s+((?:<[^>]*>\s*){2,})", lambda m: _listed(m[1], m[2])),
-    _usual("E204", rf"^\s*<{NAME}[^>]*>\s*::=.*$", ""),
-    _usual("E127", rf"\s*\b(?:until|unless|while|since)\s+({CALL})", r" ends when \1"),
-    _usual("E127", rf"\b(?:if)\s+({CALL})\s*(?:then)?", r"\1"),
-    _usual("E108", r"<\s*([^<>]+?)\s*>", lambda m: f"<{re.sub(r'[^0-9a-zA-Z_]+', '_', m[1])}>"),
-    _usual("E107", rf"<({NAME})(?![\w>])", r"<\1>"),
-    _usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: SYNONYMS.get(m[1].lower(), m[1].lower())),
-    _usual("E202", rf"<({NAME})>\s*", ""),
-    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*\)", r"\1(\2, other)"),
-    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),
-    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,[^()]*\)", r"\1(\2)"),
-    _usual("E206", rf"<({NAME})>\s*::=\s*<\1>\s*([^\n|]+)", r"<\1> ::= \2 <\1>?"),
-    _usual("E211", rf"\b({NAME})\(\s*({NAME})\s*,\s*\2\s*\)", r"\1(\2, other)"),
-    _usual("E218", r"\b(?:seconds?|secs?|sec)\b", "s"),
-    _usual("E218", r"\b(?:minutes?|mins|m)\b", "min"),
-    _usual("E218", r"\b(?:pixels?|pix)\b", "px"),
-    _usual("E218", r"\b(?:hours?|hrs?)\b", "h"),
-    _usual("E218", r"\bpercent\b", "%"),
-    _usual("E219", rf"\b({NAME})\s+({NAME}),?\s+({NAME})\b", r"\1(\2, \3)"),
-    _usual("E219", rf"\b(never|always)\s+({NAME})\s+({NAME})", r"\1 moving(\3)"),
-    _usual("E219", rf"\b({NAME})\s+({NAME})\s+({NAME})\b", r"\2(\1, \3)"),
-    _usual("E223", rf"\b(for|within|after|every)\s+{NAME}", r"\1 5 s"),
-    _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px"),
-    _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 s"),
-    _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px/s"),
-    _usual("E227", rf"({CALL})", r"\1 < 5 px"),
-    _usual("E227", rf"({CALL})", r"\1 < 5 s"),
-    _usual("E227", rf"({CALL})", r"\1 < 5 px/s"),
-    _usual("E229", rf"\b(?:inside|outside|reaching)\(\s*({NAME})\s*,\s*({NAME})\s*\)", r"touching(\1, \2)"),
-    _usual("E117", rf"\(\s*({NAME})\s+({NAME})\s*\)", r"(\1, \2)"),
-    _usual("E117", r",\s*\)", ")"),
-    _usual("E118", rf"\b({NAME})\s*\(\s*\)", r"\1(one, other)"),
-    _usual("E113", rf"<\s*({CALL})\s*>", r"\1"),
-    _usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
-)  # fmt: skip
-"""In the order in which they are tried."""
+WORDS = (*RESERVED_WORDS, *ACTIONS, *KEYWORDS, "leftmost", "rightmost", "ignored")
+LONE_WORD = re.compile(rf"(?<![<\w.]){NAME}(?![\w>(])")
+"""A word that is neither an action nor a stage."""
+PHRASES = ("at least", "at most", "any order", "for each", "on failure of", "ends when", "fails when",
+           "begins when", "pauses when", "progresses when", "each of", "each new")  # fmt: skip
+MEANT_WORDS = (*KEYWORDS, *PHRASES, "during", "leftmost", "rightmost", "largest", "smallest", "highest",
+               "lowest", "left", "right", "top", "bottom")  # fmt: skip
+OTHER_WORDS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
+               "topmost": "highest", "uppermost": "highest", "bottommost": "lowest"}  # fmt: skip
+"""What people say in place of a word of the language, though it is spelt otherwise."""
 
 
 def with_tried_hints(
@@ -217,8 +52,9 @@ def with_tried_hints(
     for number, fault in enumerate(faults):
         hint = None
         if number < MOST_HINTS and trial.left > 0 and not trial.helps(fault):
-            hint = trial.best(fault, _hints(text, fault)) or trial.best(fault, _edits(fault))
-        found.append(fault if hint is None else replace(fault, hint=_joined(fault.hint, hint)))
+            hint = trial.mend(fault)
+        said = None if fix_of(text, fault.place, fault.hint) else fault.hint  # what helps nothing
+        found.append(fault if hint is None else replace(fault, hint=_joined(said, hint)))
     return tuple(found)
 
 
@@ -226,8 +62,9 @@ FAULT_COST = 100
 """A fault takes as long to explain as so many characters take to read, or longer."""
 LONGEST_HINT = 400
 """Characters of a hint: what is longer, nobody reads."""
-NOTHING, IN_PART, WHOLLY = range(3)
-"""How much a change helps: not, by what could not be read only, or by a fault and to no new one."""
+NOTHING, ONE_STEP, IN_PART, WHOLLY = range(4)
+"""How much a change helps: not; so that the next fault lies further on; by what could not be read only; or
+by a fault and to no new one."""
 
 
 @dataclass
@@ -246,20 +83,30 @@ class _HintTrial:
     check: Check
     left: int = CHARACTERS_TRIED
 
-    def best(self, fault: Diagnostic, hints: Iterable[str]) -> str | None:
-        """The first hint that helps wholly, else the first that helps in part."""
+    def mend(self, fault: Diagnostic) -> str | None:
+        """A hint that helps: what is usually meant before small edits, one step before none."""
+        usual, helps = self.best(fault, _hints(self.text, fault))
+        if helps > ONE_STEP:
+            return usual
+        edit, helps = self.best(fault, _edits(fault))
+        return edit if helps > ONE_STEP else usual
+
+    def best(self, fault: Diagnostic, hints: Iterable[str]) -> tuple[str | None, int]:
+        """The first hint that helps wholly, else the first that helps most; and how much."""
         partly: str | None = None
+        most = NOTHING
         for hint in hints:
-            if len(hint) > LONGEST_HINT:
+            if len(hint) > LONGEST_HINT or "..." in hint:
                 continue
             self.left -= len(self.text) + FAULT_COST * len(self.faults)
             if self.left < 0:
                 break
             helps = self.helps(replace(fault, hint=hint))
             if helps == WHOLLY:
-                return hint
-            partly = partly or (hint if helps else None)
-        return partly
+                return hint, WHOLLY
+            if helps > most:
+                partly, most = hint, helps
+        return partly, most
 
     def helps(self, fault: Diagnostic) -> int:
         """How much the change helps that a hint speaks of."""
@@ -267,12 +114,27 @@ class _HintTrial:
         if fix is None:
             return NOTHING
         after = self.check(fix.applied(self.text))
-        known = {(f.code, f.message) for f in self.faults}
+        known = told(self.faults)
         if len(after) < len(self.faults) and all((f.code, f.message) in known for f in after):
             return WHOLLY
         # What could not be read hid what comes to light now.
         unread = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
-        return IN_PART if fault.code < "E2" and unread[0] < unread[1] else NOTHING
+        if fault.code >= "E2":
+            return NOTHING
+        if unread[0] < unread[1]:
+            return IN_PART
+        new = [f for f in after if (f.code, f.message) not in known]
+        further = all(_at(f) > _at(fault) for f in new) and len(after) <= len(self.faults)
+        return ONE_STEP if further and (fault.code, fault.message) not in told(after) else NOTHING
+
+
+def told(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
+    """What is said of faults, wherever they stand."""
+    return {(f.code, f.message) for f in faults}
+
+
+def _at(fault: Diagnostic) -> tuple[int, int]:
+    return fault.place.line, fault.place.column
 
 
 def _joined(said: str | None, hint: str) -> str:
@@ -281,6 +143,8 @@ def _joined(said: str | None, hint: str) -> str:
 
 def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
     line = fault.place.text
+    if fault.code < "E2":
+        yield from _misspelt(line, fault.place.column - 1)
     for usual in USUAL:
         if fault.code not in usual.codes:
             continue
@@ -292,6 +156,16 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
     yield from _as_expected(fault)
 
 
+def _misspelt(line: str, at: int) -> Iterator[str]:
+    """Words of the language in the place of words that are spelt nearly so, nearest to the caret first."""
+    for match in sorted(LONE_WORD.finditer(line), key=lambda m: _away(m, at)):
+        if match[0] in OTHER_WORDS:
+            yield _hint(line, match, OTHER_WORDS[match[0]], at)
+        elif match[0] not in MEANT_WORDS:
+            for meant in get_close_matches(match[0].lower(), MEANT_WORDS, n=3, cutoff=ALIKE):
+                yield _hint(line, match, meant, at)
+
+
 def _as_expected(fault: Diagnostic) -> Iterator[str]:
     """What is expected, where that is the same in other signs, or another unit."""
     at = fault.place.column - 1
@@ -299,6 +173,8 @@ def _as_expected(fault: Diagnostic) -> Iterator[str]:
     shown = re.findall(r"`([^`]+)`", fault.expected or "")
     if len(shown) != 1 or not said:
         return
+    if shown[0].startswith("<") and said.isidentifier():
+        yield f"write `<{said}>` in place of `{said}`"
     amount = re.match(r"-?[\d.]+(?=\s*\S)", said)
     if amount and shown[0] in UNITS:
         yield f"write `{amount[0]} {shown[0]}` in place of `{said}`"

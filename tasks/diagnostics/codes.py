@@ -79,5 +79,6 @@ CODES = {
     "E237": "an actor that is a part of itself",
     "E238": "a range in which nothing lies",
     "E239": "more stages, or ways to go on, than can be followed",
+    "E240": "a name that is another thing in each round of a loop, outside of that loop",
 }
 """Every code with what it stands for; a code never changes its meaning."""

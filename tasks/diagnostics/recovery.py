@@ -208,6 +208,7 @@ SAID = {
     "ANY": "`any order`",
     "ANY_OF": "`any 2 of`",
     "FOR_EACH": "`for each`",
+    "NEW": "`new`",
     "ALREADY": "`already`",
     "ON_FAILURE": "`on failure of`",
     "OPTIONAL": "`optional actor`",
@@ -219,7 +220,7 @@ KEYWORDS = (
     "ends", "progresses", "fails", "pauses",
     "every", "when", "and", "not", "another", "larger", "smaller", "than", "what",
     "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
-    "already", "each", "on", "failure", "first", "rests", "from", "part", "of", "the", "other",
+    "already", "each", "new", "on", "failure", "first", "rests", "from", "part", "of", "the", "other",
 )  # fmt: skip
 
 

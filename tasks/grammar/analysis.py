@@ -167,6 +167,8 @@ class Grammar:
                 return any(a in self._optional for a in action_of(course).words)
             case Choice(options=options):
                 return any(self._empty(o, stages) for o in options)
+            case AnyOrder(least=0):
+                return True
             case Sequence(items=parts) | Together(parts=parts) | AnyOrder(items=parts):
                 return all(self._empty(p, stages) for p in parts)
             case Timed(item=item) | Conditioned(item=item) | Already(item=item):
@@ -224,7 +226,7 @@ class Grammar:
                 return times.get(name, 0.0)
             case Choice(options=options):
                 return min(self._least(o, times) for o in options)
-            case AnyOrder(items=items, count=int(count)):
+            case AnyOrder(items=items, least=int(count)) | AnyOrder(items=items, count=int(count)):
                 return sum(sorted(self._least(i, times) for i in items)[:count])
             case Sequence(items=items) | AnyOrder(items=items):
                 return sum(self._least(i, times) for i in items)

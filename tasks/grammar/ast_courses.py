@@ -5,6 +5,7 @@ Read before: `conditions.py` (actions and conditions). Read next: `nodes.py` (th
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
@@ -165,21 +166,34 @@ class Together:
 
 @dataclass(frozen=True, slots=True)
 class AnyOrder:
-    """`any order (a, b, c)`, `any 2 of (a, b, c)`: once each, one after the other.
+    """`any order (a, b, c)`, `any 2 of (a, b, c)`, `for each new part a`: once each, one after the other.
 
     Attributes:
-        count: How many of them; None for all.
+        count: How many of them at most; None for all.
         copies: Of what and how many things the items are each one, as `leg` and 4; or None.
+        least: How many of them at least; None for as many as at most.
+        new: What is another one each time round, as `part`; empty where none is.
     """
 
     items: tuple[Course, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
     count: int | None = None
     copies: tuple[str, int] | None = field(default=None, compare=False, repr=False)
+    least: int | None = None
+    new: str = ""
 
     def __str__(self) -> str:
+        if self.new:
+            return self._rounds()
         said = "any order" if self.count is None else f"any {self.count} of"
         return f"{said} ({', '.join(map(str, self.items))})"
+
+    def _rounds(self) -> str:
+        round_ = re.sub(rf"\b{self.new}_1\b", self.new, _within(self.items[0], ATOM))
+        most = "" if self.count is None else f" at most {self.count} {_times(self.count)}"
+        if self.least == 1 and not most:
+            return f"for each new {self.new} {round_}"
+        return f"(for each new {self.new} {round_} at least {self.least} {_times(self.least or 0)}{most})"
 
 
 @dataclass(frozen=True, slots=True)

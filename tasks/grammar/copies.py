@@ -1,4 +1,8 @@
-"""`for each of 4 legs <mount(leg)>`: the actors `leg_1` to `leg_4`, each of them another leg.
+"""Several things of one kind: `for each of 4 legs <mount(leg)>`, `for each new part <take(part)>`.
+
+The first has the actors `leg_1` to `leg_4`, each of them another leg. The second is a loop with another
+part each time round: `part_1` to `part_12` stand for all parts that may come, and a round is begun
+by one that had no turn yet. Nobody waits for those that do not come.
 
 Read before: `templates.py` (stages of any actor), `nodes.py`.
 """
@@ -8,14 +12,36 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from visup.rules.formula.units import Span
-from visup.tasks.grammar.ast_courses import AnyOrder, Course, walk
+from visup.tasks.grammar.ast_courses import AnyOrder, Counted, Course, Repeated, walk
 from visup.tasks.grammar.criteria import Another, in_order
-from visup.tasks.grammar.nodes import Actor, Actors, Stage
-from visup.tasks.grammar.templates import names_in
+from visup.tasks.grammar.nodes import Actor, Actors, Invariant, Stage
+from visup.tasks.grammar.templates import bound, names_in
 
 MOST_COPIES = 13
 """So many are made at most: more than may stand in any order, which is told."""
+MOST_ROUNDS = 12
+"""So many rounds a loop has at most in which something is new each time."""
+
+
+def as_rounds(course: Counted | Repeated) -> AnyOrder | None:
+    """A repetition of a loop with something new each time says how many rounds it has; None for others."""
+    loop = course.item
+    if not isinstance(loop, AnyOrder) or not loop.new or loop.count is not None or loop.least != 1:
+        return None
+    if isinstance(course, Repeated):
+        return replace(loop, least=loop.least if course.mark == "+" else 0, span=course.span)
+    if course.most is None and course.least == 1:
+        return replace(loop, span=course.span)
+    return replace(loop, least=course.least, count=course.most, span=course.span)
+
+
+def in_turn(loop: AnyOrder) -> bool:
+    """Whether the rounds that a loop with something new has behind it were those of the first of them.
+
+    Which is which does not matter before anything is seen, so that other ways to go on tell nothing new.
+    """
+    first = loop.new and copy_names(loop.new, 1 + MOST_ROUNDS - len(loop.items))[-1]
+    return not first or first in names_in(loop.items[0])
 
 
 def one_of(plural: str, course: Course) -> str:
@@ -42,26 +68,51 @@ def copy_names(name: str, count: int) -> tuple[str, ...]:
 
 def with_copies(declared: Sequence[Actor], stages: Sequence[Stage]) -> list[Actor]:
     """The declarations of actors, with one for each of several things instead of that of their kind."""
-    most: dict[str, int] = {}
-    said: dict[str, Span] = {}
-    for name, count, span in _copies(stages):
-        most[name] = max(count, most.get(name, 0))
-        said.setdefault(name, span)
+    courses = list(_copies(stages))
+    kinds = dict.fromkeys(name for name, _, _ in courses)
+    waited = {n: max((k for m, k, c in courses if m == n and not c.new), default=0) for n in kinds}
+    spare = {copy: n for n in kinds for copy in copy_names(n, MOST_ROUNDS)[waited[n] :]}
     known = {a.name: a for a in declared}
-    actors = [a for a in declared if a.name not in most]
-    for name, count in most.items():
-        kind = known.get(name, Actor(name, span=said[name]))
-        plain = kind.models or kind.criteria
-        first = kind if plain else replace(kind, models=(name,))
-        for k, copy in enumerate(copy_names(name, count)):
-            criteria = in_order((*first.criteria, Another())) if k else first.criteria
-            if copy not in known:
-                actors.append(replace(first, name=copy, criteria=criteria))
-    return actors
+    actors = [a for a in declared if a.name not in kinds]
+    for name in kinds:
+        span = next(c.span for m, _, c in courses if m == name)
+        kind = known.get(name, Actor(name, span=span))
+        count = max(k for m, k, _ in courses if m == name)
+        actors += [a for a in _of_kind(kind, count) if a.name not in known]
+    looped = {n for n, _, c in courses if c.new}
+    return [replace(a, spare=spare[a.name]) if spare.get(a.name) in looped else a for a in actors]
 
 
-def _copies(stages: Sequence[Stage]) -> Iterator[tuple[str, int, Span]]:
+def for_each_copy(
+    invariants: Sequence[Invariant], actors: Sequence[Actor]
+) -> tuple[Invariant, ...]:
+    """The invariants, with one for each of those of which a loop has another one in each round."""
+    found = list(invariants)
+    for kind in dict.fromkeys(a.spare for a in actors if a.spare):
+        copies = [a.name for a in actors if a.spare == kind]
+        each = (
+            [bound(i, {kind: c}) for c in copies] if kind in names_in(i) else [i] for i in found
+        )
+        found = [i for some in each for i in some]
+    return tuple(found)
+
+
+def _of_kind(kind: Actor, count: int) -> Iterator[Actor]:
+    """So many actors of a kind, each another one."""
+    first = kind if kind.models or kind.criteria else replace(kind, models=(kind.name,))
+    for k, copy in enumerate(copy_names(kind.name, count)):
+        criteria = in_order((*first.criteria, Another())) if k else first.criteria
+        yield replace(first, name=copy, criteria=criteria)
+
+
+def _copies(stages: Sequence[Stage]) -> Iterator[tuple[str, int, AnyOrder]]:
     """What several things are called, how many there are, and where that is said."""
     bodies = (s.body for s in stages if not isinstance(s.body, Actors))
     courses = (c for body in bodies for c in walk(body))
-    return ((*c.copies, c.span) for c in courses if isinstance(c, AnyOrder) and c.copies)
+    several = (c for c in courses if isinstance(c, AnyOrder))
+    return ((*c.copies, c) for c in several if c.copies and not (c.new and alike(c)))
+
+
+def alike(loop: AnyOrder) -> bool:
+    """Whether all rounds of a loop are the same, since they do not name what is new."""
+    return len({str(i) for i in loop.items[:2]}) == 1

@@ -127,6 +127,8 @@ class Actor:
         criteria: By what else it is told.
         bystander: Whether it has no part in the task and is let be; without a name, all that plays no
             actor is.
+        spare: Of a loop with something new each time round, what that is: nobody waits for this one, but
+            what is asked of it may not be left out. Empty for all others.
     """
 
     name: str
@@ -136,6 +138,7 @@ class Actor:
     span: Span = field(default=NOWHERE, compare=False, repr=False)
     criteria: tuple[Criterion, ...] = ()
     bystander: bool = False
+    spare: str = ""
 
     @property
     def machine(self) -> Name | None:

@@ -15,7 +15,15 @@ from visup.rules.formula.units import Span, Unit
 from visup.tasks.grammar.actor_builder import ActorBuilder, span_of
 from visup.tasks.grammar.ast_courses import ConditionKind
 from visup.tasks.grammar.conditions import EVERY, Condition, Lasted, PartName, Period, Range, lasted
-from visup.tasks.grammar.copies import MOST_COPIES, copy_names, one_of, with_copies
+from visup.tasks.grammar.copies import (
+    MOST_COPIES,
+    MOST_ROUNDS,
+    as_rounds,
+    copy_names,
+    for_each_copy,
+    one_of,
+    with_copies,
+)
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -109,6 +117,7 @@ def collect(statements: Several[object], file: str) -> Task:
     invariants = of(Invariant)
     stages = instantiated(recovered(of(Stage), of(Recovery)), invariants)
     actors = with_copies([a for a in of(Actor) if not a.bystander], stages)
+    invariants = for_each_copy(invariants, actors)
     return Task(
         stages=stages,
         actors=with_parts(actors, stages, invariants),
@@ -220,6 +229,13 @@ class _TaskBuilder(ActorBuilder):
         made = (bound(course, {name: copy}) for copy in copy_names(name, count))
         return AnyOrder(tuple(made), span_of(first).to(course.span), copies=(name, count))
 
+    def for_new(self, items: list[Any]) -> AnyOrder:
+        first, _, said, course = items
+        name = str(said)
+        made = tuple(bound(course, {name: copy}) for copy in copy_names(name, MOST_ROUNDS))
+        copies = (name, MOST_ROUNDS)
+        return AnyOrder(made, span_of(first).to(course.span), copies=copies, least=1, new=name)
+
     def already(self, items: list[Any]) -> Already:
         return Already(items[1], span_of(items[0]).to(items[1].span))
 
@@ -232,10 +248,11 @@ class _TaskBuilder(ActorBuilder):
     def timed(self, items: list[Any]) -> Timed:
         return Timed(items[0], cast("tuple[Clause, ...]", tuple(items[1:])), _all(items))
 
-    def counted(self, items: list[Any]) -> Counted:
+    def counted(self, items: list[Any]) -> Course:
         bounds = {word: number for word, number, _ in items[1:]}
         span = items[0].span.to(items[-1][2])
-        return Counted(items[0], bounds.get("least", 1), bounds.get("most"), span)
+        counted = Counted(items[0], bounds.get("least", 1), bounds.get("most"), span)
+        return as_rounds(counted) or counted
 
     def at_least(self, items: list[Token]) -> tuple[str, int, Span]:
         return "least", int(items[1]), span_of(items[1])
@@ -243,9 +260,10 @@ class _TaskBuilder(ActorBuilder):
     def at_most(self, items: list[Token]) -> tuple[str, int, Span]:
         return "most", int(items[1]), span_of(items[1])
 
-    def repeated(self, items: list[Any]) -> Repeated:
+    def repeated(self, items: list[Any]) -> Course:
         mark = cast('Literal["?", "*", "+"]', str(items[1]))
-        return Repeated(items[0], mark, items[0].span.to(span_of(items[1])))
+        repeated = Repeated(items[0], mark, items[0].span.to(span_of(items[1])))
+        return as_rounds(repeated) or repeated
 
     def hold(self, items: list[Any]) -> Hold:
         return Hold(items[1], span_of(items[0]).to(items[1].span))

@@ -94,6 +94,11 @@ def task_actors(task: Task) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*named, *(m for a in named for m in machines_of(task, a)))))
 
 
+def spare_kinds(task: Task) -> tuple[str, ...]:
+    """What is another one in each round of a loop of the task, as `part` of `for each new part`."""
+    return tuple(dict.fromkeys(a.spare for a in task.actors if a.spare))
+
+
 def machines_of(task: Task, actor: str) -> tuple[str, ...]:
     """The machine of which an actor is a part, the one of which that is a part, and so on."""
     found: dict[str, None] = {}

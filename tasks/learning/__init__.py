@@ -4,6 +4,7 @@ Actions become strings of symbols; from these a grammar is induced by minimum de
 Kim and Demiris, "Learning action symbols for hierarchical grammar induction", 2012), with the order
 that all runs share kept and every other order left free, as task graphs do.
 
-Read in this order: `traces.py` (a run as happenings), `order.py` (loops and order), `induction.py`
-(the task file), `judging.py` (a task on a run), `fitting.py`, `coverage.py`, `languages.py`.
+Read in this order: `traces.py` (a run as happenings), `order.py` (loops and order), `periods.py`
+(loops that keep a rhythm), `induction.py` (the task file), `judging.py` (a task on a run), `fitting.py`,
+`coverage.py`, `languages.py`.
 """

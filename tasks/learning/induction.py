@@ -32,6 +32,7 @@ from visup.tasks.learning.order import (
     with_loops,
     without,
 )
+from visup.tasks.learning.periods import Period, course_of, periods_of
 from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.traces import RunTrace, Symbol
 
@@ -85,6 +86,7 @@ class _Draft:
         declared: Actors as the runs' own tasks declare them.
         forbidden: Symbols that must never be.
         holding: Whether what runs end with must hold for a while.
+        periods: The loops that keep a rhythm.
     """
 
     name: str
@@ -95,6 +97,7 @@ class _Draft:
     declared: Mapping[str, Actor]
     forbidden: list[Symbol] = field(default_factory=list)
     holding: bool = True
+    periods: dict[Loop, Period] = field(default_factory=dict)
 
     def text(self) -> str:
         """The task file."""
@@ -112,6 +115,8 @@ class _Draft:
 
     def _stage(self, occurrence: Occurrence, name: str) -> str:
         item = occurrence[0]
+        if isinstance(item, Loop) and item in self.periods:
+            return f"<{name}> ::= {course_of(item, self.periods[item])}"
         if isinstance(item, Loop):
             least, most = self.times[item]
             body = " ".join(_action(s) for i in item.body for s in _symbols(i))
@@ -196,7 +201,8 @@ def learn_task(
     seen = {o for w in folded for o in shared([w], 1.0)}
     dropped = [f"{_said(o)}: in some runs only" for o in sorted(seen - set(core), key=repr)]
     plan = plan_of(folded, core, partial(_at_once, rows))
-    draft = _Draft(name, plan, times, good, rows, declared or {})
+    periods = periods_of(times, rows)
+    draft = _Draft(name, plan, times, good, rows, declared or {}, periods=periods)
     results = _tried(draft, dropped)
     told = {r.name: _judge(draft, r) for r in bad}
     for run in bad:
@@ -214,6 +220,9 @@ def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
         task = parse_task(draft.text())
         found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
         refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
+        if refused and draft.periods:
+            draft.periods = {}
+            continue
         if refused and draft.holding:
             draft.holding = False
             continue

@@ -55,6 +55,7 @@ class Advance:
         if all(self.observe(x.step).paused for x in leaves(hypothesis.state)):
             yield hypothesis, 1.0
             return
+        transitions = [t for t in transitions if not self._awaits(t)]
         barred = tuple(t.entered for t in transitions if self._is_paused(t))
         transitions = [t for t in transitions if not self._is_paused(t)]
         hypothesis = replace(hypothesis, met=self._met(hypothesis, transitions))
@@ -75,6 +76,10 @@ class Advance:
             considered = tuple((t.entered, support) for t, support in supported)
             considered += tuple(c for c in hypothesis.considered if c[0] in barred)
             yield replace(hypothesis, considered=considered), max(0.0, 1.0 - gone)
+
+    def _awaits(self, transition: OpenTransition) -> bool:
+        """Whether a transition begins a round of a loop with something new that is not there."""
+        return any(self.observe(s).absent for s in transition.entered)
 
     def _is_paused(self, transition: OpenTransition) -> bool:
         """Whether work is paused on any step that a transition leaves."""

@@ -19,6 +19,7 @@ from visup.agent import (
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.states import leaves
 from visup.tasks.grammar.structure import stage_names
+from visup.tasks.grammar.templates import called
 from visup.tasks.supervision.hypotheses import (
     NOT_BEGUN,
     WORST_FIRST,
@@ -89,7 +90,7 @@ def task_belief(
         _expected(model, snapshot, near),
         confidence=probability,
         evidence=interrupted or why,
-        prospects=() if told in LOST else _prospects(model, near),
+        prospects=() if told in LOST else _prospects(model, snapshot, near),
         success=0.0 if told in LOST else model.filter.success(near),
     )
 
@@ -285,15 +286,29 @@ def _near(posterior: TaskHypotheses) -> TaskHypotheses:
     return replace(posterior, hypotheses=shares)
 
 
-def _prospects(model: MonitoredPhases, near: TaskHypotheses) -> tuple[Prospect, ...]:
-    """What may come next, a stage or the end; what is hardly possible is left out."""
-    likely = (s for s in model.filter.next_stages(near) if s[1] >= NEAR)
+def _prospects(
+    model: MonitoredPhases, snapshot: TaskSnapshot, near: TaskHypotheses
+) -> tuple[Prospect, ...]:
+    """What may come next, a stage or the end; what is hardly possible is left out.
+
+    Rounds with something new that is not there yet are one prospect.
+    """
+    chances: dict[str, float] = {}
+    awaited: dict[str, str] = {}
+    for stage, chance in model.filter.next_stages(near):
+        absent = (model.spare[a] for a in called(stage)[1] if a in model.spare)
+        kind = "" if snapshot.found(called(stage)[1]) else next(absent, "")
+        told = awaited.setdefault(kind, stage) if kind else stage
+        chances[told] = chances.get(told, 0.0) + chance
+    likely = sorted((s for s in chances.items() if s[1] >= NEAR), key=lambda s: -s[1])
     return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
 
 
 def _missing(model: MonitoredPhases, snapshot: TaskSnapshot) -> str:
+    there = {model.spare.get(b.actor) for b in snapshot.bindings if b.object_id is not None}
     unbound = (b.actor for b in snapshot.bindings if b.object_id is None)
-    missing = [a for a in unbound if not model.task.actor(a).optional]
+    waited = (model.spare.get(a, a) for a in unbound if not model.task.actor(a).optional)
+    missing = [a for a in dict.fromkeys(waited) if a not in there]
     return f"not found yet: {', '.join(missing)}" if missing else "nothing of it has been seen yet"
 
 

@@ -89,6 +89,11 @@ class MonitoredPhases:
         return tuple(dict.fromkeys(pause_conditions(self.task)))
 
     @cached_property
+    def spare(self) -> Mapping[str, str]:
+        """The actors that nobody waits for, since each is one of many: with what they are called together."""
+        return {a.name: a.spare for a in self.task.actors if a.spare}
+
+    @cached_property
     def _open(self) -> OpenTransitions:
         return OpenTransitions(self.task, self.automaton)
 

@@ -35,6 +35,7 @@ class TaskSnapshot:
         self.bindings = bindings
         self._actions = model.actions
         self._objects = {b.actor: b.object_id for b in bindings}
+        self._spare = model.spare
         self._relations = RelationLookup(mind, model.looks, before, model.rhythms)
         self._conditions = ConditionEvaluator(model.task, self._holds, self._relations)
         self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
@@ -77,7 +78,11 @@ class TaskSnapshot:
         key = (action, actors)
         if key not in self._seen:
             objects = tuple(self._objects.get(a) for a in actors)
-            self._seen[key] = observe_action(self._actions[action], objects, self._relations)
+            seen = observe_action(self._actions[action], objects, self._relations)
+            absent = any(
+                o is None and a in self._spare for a, o in zip(actors, objects, strict=True)
+            )
+            self._seen[key] = replace(seen, absent=True) if absent else seen
         return self._seen[key]
 
     def _holds(self, action: str, actors: tuple[str, ...]) -> Truth:

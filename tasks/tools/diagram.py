@@ -153,6 +153,10 @@ class _Drawer:
                 return self.sequence([self.course(i, stage, said) for i in items])
             case Together(parts=items):
                 return self.fork("at the same time", items, stage, said)
+            case AnyOrder(items=(first, *_), new=str(new)) if new:
+                part = self.course(first, stage, said)
+                self.flow.link(part.last, part.first, f"another {new}")
+                return _Fragment(part.first, part.last, part.empty or course.least == 0)
             case AnyOrder(items=items):
                 return self.fork("each, in any order", items, stage, said)
             case Already(item=item):

@@ -93,6 +93,8 @@ def _course(task: Task, course: Course, stage: str, drawn: set[str]) -> Iterator
         case Sequence(items=items):
             for item in items:
                 yield from _course(task, item, stage, drawn)
+        case AnyOrder(items=(first, *_), new=str(new)) if new:
+            yield under(f"each new {new}", "way", first)
         case Choice(options=parts) | Together(parts=parts) | AnyOrder(items=parts):
             inside: list[Branch] = []
             for part in parts:

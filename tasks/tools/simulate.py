@@ -11,8 +11,15 @@ from dataclasses import dataclass
 from random import Random
 
 from visup.tasks.automaton.derivatives import begin, derivatives, enter
-from visup.tasks.automaton.states import State, leaves, structural_key
-from visup.tasks.grammar.nodes import Task
+from visup.tasks.automaton.states import (
+    ParallelState,
+    SequenceState,
+    State,
+    leaves,
+    structural_key,
+)
+from visup.tasks.grammar.copies import in_turn
+from visup.tasks.grammar.nodes import AnyOrder, Task
 from visup.tasks.grammar.structure import key_text
 
 LONGEST = 200  # moments after which a course drawn at random is cut off
@@ -41,7 +48,10 @@ class Position:
 
 
 def initial_positions(task: Task) -> tuple[Position, ...]:
-    """The places where a task can begin; one at the end when nothing need be seen."""
+    """The places where a task can begin; one at the end when nothing need be seen.
+
+    Of things of which each is a new one, here and in what follows the first comes first.
+    """
     return _distinct(enter(task, begin(task), None, 0.0))
 
 
@@ -90,8 +100,17 @@ def sample(task: Task, rng: Random) -> tuple[Trace, bool]:
 def _distinct(states: Iterator[State[None] | None]) -> tuple[Position, ...]:
     found: dict[object, Position] = {}
     for state in states:
-        found.setdefault(None if state is None else structural_key(state), Position(state))
+        if state is None or _in_turn(state):
+            found.setdefault(None if state is None else structural_key(state), Position(state))
     return tuple(found.values())
+
+
+def _in_turn(state: State[None]) -> bool:
+    """Whether what is another one each time round came in its order so far."""
+    if isinstance(state, SequenceState):
+        loop = state.rest.course
+        return (not isinstance(loop, AnyOrder) or in_turn(loop)) and _in_turn(state.head)
+    return not isinstance(state, ParallelState) or all(map(_in_turn, state.parts))
 
 
 def _moment(state: State[None]) -> Moment:

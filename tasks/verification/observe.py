@@ -50,6 +50,7 @@ class ActionObservation:
         round: Whether its entry is that two draw nearer or apart of which one goes round the other.
         paused: Whether the work on it is paused: then nothing is seen of it.
         pauses: All pauses of the task so far.
+        absent: Whether an actor of it is spare, and there is no object for it: then it is nobody's turn.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -63,6 +64,7 @@ class ActionObservation:
     round: bool = False
     paused: bool = False
     pauses: PauseRecord = NO_PAUSES
+    absent: bool = False
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:
         """Seconds from one time to another in which the work on a step was not paused."""

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
+from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
-from random import Random
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.archive.recordings import meeting, record
 from tests.cli import Call, caller
+from tests.clips import moving_disc, write_clip
 from visup.agent import Truth
-from visup.agent.model.errors import ErrorGroup, RuleError, SettingsError
+from visup.agent.model.errors import ErrorGroup, RuleError, SettingsError, SourceError, TaskError
 from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
 from visup.archive.adding import add_run
 from visup.archive.asking.database import LakeDatabase, QueryError, open_database
-from visup.archive.finding.judge import ConditionJudge
+from visup.archive.finding.beliefs import read_minds
+from visup.archive.finding.clips import cut_hits, spans
+from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import desugared, read_pattern
 from visup.archive.finding.search import (
     ConditionSearch,
@@ -25,20 +33,19 @@ from visup.archive.finding.search import (
     find,
     read_search,
 )
-from visup.archive.lake import Lake
+from visup.archive.lake import BELIEFS, Lake
+from visup.archive.parallel import each_run
+from visup.evaluation.archive.conditions import random_conditions
+from visup.percepts.video.open import open_source
 from visup.rules.language.parser import load_rules
 from visup.rules.safety.queries import verdicts
-from visup.runs.replay import replay
+from visup.runs.replay import changed_settings, replay
 from visup.runs.settings import WatchSettings
 
 pytest.importorskip("duckdb", reason="needs the extra `cluster`")
 pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
 
 DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
-RELATIONS = (
-    *("converging", "diverging", "keeping_distance", "touching", "coupled"),
-    *("north_of", "moving_towards", "close_to", "partially_overlapping"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -58,57 +65,7 @@ def database(lake: Lake) -> Iterator[LakeDatabase]:
         yield found
 
 
-def random_condition(rng: Random, depth: int) -> str:
-    """A condition about `a` and `b` with any of the operators."""
-    if depth == 0 or rng.random() < 0.15:
-        names = ("a, b", "b, a")
-        return rng.choice(
-            [f"{rng.choice(RELATIONS)}({rng.choice(names)})"] * 6
-            + ["gap(a, b) < 60 px", "(moving(a) and touching(a, b))"]
-        )
-
-    def part() -> str:
-        return f"({random_condition(rng, depth - 1)})"
-
-    span = f"{rng.choice((0.2, 0.7, 1.5))} s"
-    operators: list[Callable[[], str]] = [
-        lambda: f"{part()} and {part()}",
-        lambda: f"{part()} or {part()}",
-        lambda: f"not {part()}",
-        lambda: f"{part()} implies {part()}",
-        lambda: f"{part()} within {span}",
-        lambda: f"{part()} for {span}",
-        lambda: f"{part()} within 0.3 s to 1.1 s ago",
-        lambda: f"{part()} for 0.3 s to 1.1 s ago",
-        lambda: f"once {part()}",
-        lambda: f"always {part()}",
-        lambda: f"previous {part()}",
-        lambda: f"{part()} since {part()}",
-        lambda: f"{part()} since[{span}] {part()}",
-        lambda: f"{part()} until[{span}] {part()}",
-        lambda: f"{part()} release[{span}] {part()}",
-        lambda: f"eventually[{span}] {part()}",
-        lambda: f"henceforth[{span}] {part()}",
-        lambda: f"{part()} in 60 % of {span}",
-        lambda: f"{part()} in 2 of 4 samples",
-        lambda: f"last({part()}, {span})",
-        lambda: f"(exists c: (touching(b, c) and converging(a, c))) or {part()}",
-        lambda: f"(exists c: converging(a, c)) and {part()}",
-        lambda: f"{part()} and (forall c: not touching(a, c))",
-    ]
-    return rng.choice(operators)()
-
-
-def conditions(count: int) -> list[str]:
-    rng, found = Random(23), dict[str, None]()
-    while len(found) < count:
-        text = random_condition(rng, rng.randint(0, 3))
-        if "a" in text and "b" in text:
-            found[text] = None
-    return list(found)
-
-
-CONDITIONS = conditions(24)
+CONDITIONS = random_conditions(24, 23)
 
 
 def test_what_is_found_is_what_the_agent_says(
@@ -118,7 +75,7 @@ def test_what_is_found_is_what_the_agent_says(
     rules.write_text(
         "\n".join(f'rule f{n}(a, b): info when {text} say "."' for n, text in enumerate(CONDITIONS))
     )
-    compared, pruned = 0, 0
+    compared, pruned, quick = 0, 0, 0
     searches = [ConditionSearch(read_pattern(text)) for text in CONDITIONS]
     possible = [set(search.possible_runs(database)) for search in searches]
     for run in lake.runs():
@@ -139,10 +96,14 @@ def test_what_is_found_is_what_the_agent_says(
 
         replay(recording, replace(settings, rules=(rules,)), tell=look)
         for n, judge in enumerate(judges):
-            is_hit = any(h.truth == Truth.TRUE for h in judge.hits())
-            assert not is_hit or run in possible[n], CONDITIONS[n]
+            hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
+            assert not hits or run in possible[n], CONDITIONS[n]
+            if searches[n].quick:
+                assert searches[n].hits(recording, settings) == hits, CONDITIONS[n]
+                quick += bool(hits)
             pruned += run not in possible[n]
     assert compared > 5_000
+    assert quick > 10
     assert pruned > 0.1 * len(CONDITIONS) * len(lake.runs())
 
 
@@ -183,6 +144,41 @@ def test_names_are_those_whom_the_agent_meant(lake: Lake, database: LakeDatabase
     assert all(0 < (h.confidence or 0) <= 1 for hits in found for h in hits)
     with pytest.raises(QueryError, match="nobody in this lake was ever taken for 'satelite'"):
         ConditionSearch(read_pattern("touching(arm, satelite)")).possible_runs(database)
+
+
+@pytest.mark.parametrize("change", ["gone", "cut", "other"])
+def test_a_run_without_notes_is_reasoned_about_again(
+    lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    search = read_search("converging(arm, satellite) and then diverging(arm, b) within 1 s")
+    run = lake.runs()[0]
+    copy = Path(shutil.copytree(lake.folder_of(run), tmp_path / run))
+    notes, settings = copy / BELIEFS, lake.recorded(run)[1]
+    assert read_minds(copy) is not None
+    hits = search.hits(Recording.open(copy), settings)
+    if change == "gone":
+        notes.unlink()
+    if change == "cut":
+        notes.write_bytes(notes.read_bytes()[:-200])
+    if change == "other":
+        monkeypatch.setattr("visup.archive.finding.beliefs.__version__", "0.0")
+    assert read_minds(copy) is None
+    assert search.hits(Recording.open(copy), settings) == hits
+
+
+@pytest.mark.parametrize(
+    ("text", "quick"),
+    [
+        ("touching(a, b) and not (exists c: (converging(a, c) and diverging(b, c)))", True),
+        ("touching(arm, 2) since[1 s] north_of(arm, 2)", True),
+        ("coupled(a, b)", False),  # judged of what is hidden, too
+        ("gap(a, b) < 60 px", False),
+        ("touching(a, b) and moving(a)", False),
+        ("stale(region)", False),
+    ],
+)
+def test_conditions_about_relations_alone_need_no_reasoning(text: str, quick: bool) -> None:
+    assert read_search(text).quick is quick
 
 
 def test_unknown_is_kept_apart_and_looked_for_everywhere(
@@ -260,6 +256,56 @@ def test_a_sequence_is_true_once_it_is_complete(tmp_path: Path) -> None:
         assert both == (second and spoke), time
 
 
+def test_a_task_is_found_where_a_replay_carries_it_out(
+    lake: Lake, database: LakeDatabase, tmp_path: Path
+) -> None:
+    file = tmp_path / "near.task"
+    file.write_text("<near> ::= converging(arm, satellite)\n")
+    search = read_search(str(file))
+    found = {f.run: f.hits for f in find(lake, search, search.possible_runs(database))}
+    ends = []
+    for run in lake.runs():
+        recording, settings = lake.recorded(run)
+        told = replay(recording, changed_settings(settings, tasks=(str(file),)))
+        ends.append(told.verdict)
+        assert bool(found[run]) == (told.verdict == "succeeded")
+        for hit in found[run]:
+            assert (hit.rule, hit.names) == ("near", ("arm", "spartan"))
+            assert 0 < hit.begin <= hit.end
+    assert "succeeded" in ends
+    assert set(ends) != {"succeeded"}
+    with pytest.raises((RuleError, ErrorGroup, SettingsError, TaskError)):
+        read_search(str(tmp_path / "none.task"))
+
+
+def test_what_is_looked_for_can_be_sent_to_other_processes() -> None:
+    search = read_search("converging(arm, satellite) and then touching(arm, 2) within 1 s")
+    assert ForkingPickler.loads(ForkingPickler.dumps(search)) == search
+    assert list(each_run(abs, [-3, 1, -2], workers=2)) == [3, 1, 2]
+
+
+times = st.floats(0, 60, allow_nan=False)
+
+
+@given(st.lists(st.tuples(times, times), max_size=8))
+def test_what_is_cut_out_covers_all_hits_once(of: list[tuple[float, float]]) -> None:
+    hits = tuple(Hit((), (), "true", min(p), max(p), False) for p in of)
+    found = spans(hits)
+    assert all(any(b <= h.begin and h.end <= e for b, e in found) for h in hits)
+    assert all(one[1] < other[0] for one, other in pairwise(found))
+
+
+def test_hits_are_cut_out_of_the_footage(tmp_path: Path) -> None:
+    clip = write_clip(tmp_path / "disc.avi", moving_disc(50), fps=5.0)
+    hits = (Hit((), (), "true", 3.0, 3.5, False), Hit((), (), "true", 8.0, 8.2, False))
+    videos = cut_hits(str(clip), "ab" * 16, hits, tmp_path / "cut")
+    with open_source(str(videos[0])) as source:
+        assert 12 <= sum(1 for _ in source) <= 14
+    assert [v.name for v in videos] == ["disc-abababab-2.0s.webm", "disc-abababab-7.0s.webm"]
+    with pytest.raises(SourceError, match="not there any more"):
+        cut_hits(str(tmp_path / "gone.mp4"), "ab" * 16, hits, tmp_path / "cut")
+
+
 def test_the_command(
     lake: Lake, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -275,6 +321,10 @@ def test_the_command(
     assert f"Hits: {len(hits)}, in " in told.out
     assert {tuple(h["names"]) for h in hits} == {("arm", "spartan")}
     assert all(Path(h["folder"], "journal.sqlite").is_file() for h in hits)
+    first = visup("find", lake.path, "converging(a, b)", "--first", 1, "--clips", lake.path / "cut")
+    assert "Hits: " in first.out
+    assert "; looked into: 1 (25 %); not looked into: 3." in first.out
+    assert "the footage is not there any more" in first.err
     none = visup("find", lake.path, "coupled(arm, spartan) and south_of(arm, spartan)")
     assert (none.code, none.out.splitlines()[-1]) == (
         1,

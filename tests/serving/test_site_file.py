@@ -8,19 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 from tests.docs.blocks import blocks
 from tests.paths import ROOT
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.runs.settings import WatchSettings
-from visup.serving.site.form import (
-    CameraTable,
-    LimitsTable,
-    RecordingTable,
-    SiteTable,
-    WebhooksTable,
-    schema_text,
-)
+from visup.serving.site.form import CameraTable, SiteTable, schema_text
 from visup.serving.site.reading import read_site
 from visup.serving.site.records import SiteCamera
 
@@ -67,6 +61,7 @@ behaviours = ["lamp.py", "package.module:Lamp"]
 preset = "cell"
 pace = 5.0
 fov = 40.0
+rest_s = 2.0
 sinks = ["webhook:https://example.org/hook", "file:alerts.jsonl"]
 """
     one = camera(tmp_path, text)
@@ -83,6 +78,7 @@ sinks = ["webhook:https://example.org/hook", "file:alerts.jsonl"]
         preset="cell",
         pace=5.0,
         fov_vertical_deg=40.0,
+        rest_s=2.0,
     )
     assert one.options.sinks == (
         f"file:{tmp_path / 'alerts.jsonl'}",
@@ -115,6 +111,11 @@ def test_a_source_is_what_it_says(tmp_path: Path, written_as: str, read_as: str)
     ("text", "line", "told"),
     [
         (ONE + 'taks = ["dock"]', 4, "did you mean 'tasks'?"),
+        ("[retention]\ndayz = 3\n" + ONE, 2, "did you mean 'days'?"),
+        ('[monitoring]\nlisten = "9464"\n' + ONE, 2, "ADDRESS:PORT"),
+        ('[evidence]\nlink = "ftp://cell"\n' + ONE, 2, "an http or https address"),
+        (ONE + 'quiet = ["10-12"]', 1, "22:00-06:00"),
+        ('timezone = "Mars/Olympus"\n' + ONE, 2, "such as Europe/Berlin"),
         (ONE + 'preset = "cel"', 4, "one of: traffic, cell, orbit, bench"),
         (ONE + "pace = 0", 4, "camera.pace cannot be 0"),
         (ONE + 'tasks = "dock"', 4, "a list of texts"),
@@ -191,7 +192,11 @@ def test_the_schema_knows_every_key_of_a_camera() -> None:
 def test_the_page_has_every_key_and_its_example_is_a_site(tmp_path: Path) -> None:
     page = ROOT / "docs" / "serving.md"
     text = page.read_text(encoding="utf-8")
-    for table in (SiteTable, CameraTable, RecordingTable, LimitsTable, WebhooksTable):
+    tables = [kind.annotation for kind in SiteTable.model_fields.values()]
+    own = [t for t in tables if isinstance(t, type) and issubclass(t, BaseModel)]
+    assert len(own) >= 6
+    every: list[type[BaseModel]] = [SiteTable, CameraTable, *own]
+    for table in every:
         assert [key for key in table.model_fields if not re.search(rf"[`\[]{key}[`\]]", text)] == []
     block, *_ = (b for b in blocks() if b.page == page and b.kind == "toml")
     example = block.text.replace("/run/secrets/cell", "secret.txt")

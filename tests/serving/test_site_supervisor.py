@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
+import time
 from pathlib import Path
 
 import pytest
 
-from tests.serving.fakes import Bench, site_camera
+from tests.clips import moving_disc, write_clip
+from tests.serving.fakes import Bench, ThreadChild, site_camera
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.file_lock import acquire_lock
 from visup.percepts.video.waiting_clock import WaitingClock
@@ -16,6 +19,7 @@ from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
 from visup.serving.reports import ReportKind
 from visup.serving.site.records import Site, SiteCamera
+from visup.serving.site_log import SiteLog
 from visup.serving.site_supervisor import SiteSupervisor, serve_site
 
 
@@ -65,6 +69,28 @@ class Script:
     @property
     def clock(self) -> WaitingClock:
         return WaitingClock(lambda: self.now, self.wait)
+
+
+def test_files_are_seen_to_their_end_and_the_log_can_be_json(tmp_path: Path) -> None:
+    clip = write_clip(tmp_path / "one.avi", moving_disc(40), fps=20.0)
+    lines: list[str] = []
+    one = site_camera("one", source=str(clip))
+    code = serve_site(
+        site(tmp_path, one),
+        SiteLog(lines.append, as_json=True),
+        StopRequest(),
+        ThreadChild,
+        WaitingClock(wait=lambda seconds: time.sleep(0.02)),
+    )
+    assert code is ExitCode.GOOD
+    told = [json.loads(line) for line in lines]
+    assert [(t["camera"], t["kind"], t["level"]) for t in told] == [
+        ("one", "begun", "info"),
+        ("one", "ended", "info"),
+    ]
+    assert told[1]["text"].startswith("verdict none after 40 frames")
+    assert told[0]["time"].endswith("Z")
+    assert told[0]["run"] == next((tmp_path / "one").glob("2*")).name
 
 
 def test_a_stop_ends_all_and_is_told_the_service_manager(
@@ -146,7 +172,7 @@ def test_a_store_has_one_service(tmp_path: Path) -> None:
     lock = acquire_lock(tmp_path / "visup-serve", "the runs of this store")
     try:
         with pytest.raises(OutputError, match="another visup"):
-            serve_site(site(tmp_path, site_camera()), print, StopRequest())
+            serve_site(site(tmp_path, site_camera()), Bench().tell, StopRequest())
     finally:
         lock.release()
 
@@ -154,5 +180,5 @@ def test_a_store_has_one_service(tmp_path: Path) -> None:
 def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="store cannot be written"):
-        serve_site(site(tmp_path / "file" / "x", site_camera()), print, StopRequest())
+        serve_site(site(tmp_path / "file" / "x", site_camera()), Bench().tell, StopRequest())
     assert os.listdir(tmp_path) == ["file"]  # noqa: PTH208

@@ -47,7 +47,8 @@ def played(trace: Trace) -> Verdict:
     rows = [LINE.fullmatch(line) for line in trace.lines.splitlines()]
     assert all(rows), trace
     said = [(float(m[1]), float(m[2] or inf), m[3], tuple(m[4].split(", "))) for m in rows if m]
-    names = dict.fromkeys((*task_actors(task), *(w for *_, who in said for w in who)))
+    waited = (a for a in task_actors(task) if not task.actor(a).spare)
+    names = dict.fromkeys((*waited, *(w for *_, who in said for w in who)))
     number = {n: k for k, n in enumerate(names, 1)}
     spells, leaves = [], dict.fromkeys(number, 1e9)
     for begin, end, action, who in said:
@@ -62,7 +63,7 @@ def played(trace: Trace) -> Verdict:
     script = Script(
         tuple(spells),
         objects={number[n]: (0.0, leaves[n]) for n in number},
-        identities={k: {n: 0.9} for n, k in number.items()},
+        identities={k: {next(iter(task.models(n)), n): 0.9} for n, k in number.items()},
     )
     return finish(task_of(play(task_reasoner([task]), script, last + 14.0, fps=5.0)))
 

@@ -8,6 +8,7 @@ from itertools import chain
 from pathlib import Path
 
 from visup.agent.storage.journal_reader import Recording, event_text
+from visup.archive.finding.beliefs import BeliefNotes
 from visup.archive.identity import run_key, settings_hash
 from visup.archive.inputs import run_inputs
 from visup.archive.lake import Lake
@@ -41,7 +42,9 @@ def add_run(lake: Lake, run: Path, labels: Mapping[str, str] | None = None) -> t
         return key, False
     taken = source.stat().st_mtime if source.exists() else None
     given = Provenance(key, recorded, by, taken, labels or {})
-    return key, lake.commit(run_tables(recording, settings, given), recording, run_inputs(settings))
+    notes = BeliefNotes()
+    tables = run_tables(recording, settings, given, notes)
+    return key, lake.commit(tables, recording, run_inputs(settings), notes.content())
 
 
 def recording_hash(recording: Recording) -> str:

@@ -8,9 +8,10 @@ wherever a writer stops.
 
 from __future__ import annotations
 
+import heapq
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from visup.agent.storage.journal import segments
 from visup.agent.storage.journal_reader import JOURNAL, Recording, opened_readonly
 from visup.archive.extra import imported
 from visup.archive.inputs import RunInputs, with_inputs
+from visup.archive.joining.manifest import FOLDER, MOST_RUNS, Partition, read_manifest
 from visup.archive.run_tables import RunTables
 from visup.archive.schema import SCHEMA_VERSION, TABLES
 from visup.runs.resume import recorded_settings
@@ -30,8 +32,37 @@ from visup.runs.settings import WatchSettings
 MARK = "lake.json"
 TABLES_FOLDER = "tables"
 RECORDINGS = "recordings"
+BELIEFS = "beliefs.npz"
+"""Beside the journal of a run: what conditions about relations depend on, so that they are judged at once."""
 SCHEMA_FILE = "schema.parquet"
 """Beside the runs' files of a table: one without rows, so that a table is there before its first row."""
+
+
+@dataclass(frozen=True, slots=True)
+class LakeSnapshot:
+    """Which runs a lake has at a time, and in which files.
+
+    Attributes:
+        path: Folder of the lake.
+        partitions: Those whose runs are joined.
+        loose: Keys of runs with files of their own, sorted.
+        files: Table -> all its files; there is at least one, perhaps without rows.
+    """
+
+    path: Path
+    partitions: tuple[Partition, ...]
+    loose: tuple[str, ...]
+    files: Mapping[str, Sequence[Path]]
+
+    def index_files(self, name: str) -> list[Path]:
+        """The files of the index of that name, one for each partition."""
+        return [self.path / FOLDER / part.name / f"{name}.parquet" for part in self.partitions]
+
+    def numbered(self) -> Iterator[tuple[tuple[str, ...], int, bool]]:
+        """Runs whose numbers in the index follow each other, from which, and whether their files are own."""
+        yield from ((part.runs, part.run_number(0), False) for part in self.partitions)
+        first = max((part.run_number(MOST_RUNS) for part in self.partitions), default=0)
+        yield self.loose, first, True
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,20 +130,42 @@ class Lake:
 
     def has(self, run: str) -> bool:
         """Whether a run is committed."""
-        return self._table_file("runs", run).is_file()
+        return self.table_file("runs", run).is_file() or run in read_manifest(self.path).runs
 
     def runs(self) -> list[str]:
         """The keys of all committed runs, sorted."""
-        folder = self._table_folder("runs")
-        return sorted(f.stem for f in folder.glob("??/*.parquet"))
+        own = {f.stem for f in self._own_files("runs")}
+        return sorted(own | read_manifest(self.path).runs)
 
-    def commit(self, tables: RunTables, recording: Recording, inputs: RunInputs) -> bool:
+    def snapshot(self) -> LakeSnapshot:
+        """Which runs there are now, and in which files; what comes later is not in it."""
+        own = {f.stem for f in self._own_files("runs")}  # before the manifest: none falls between
+        manifest = read_manifest(self.path)
+        loose = own - manifest.runs
+        return LakeSnapshot(
+            self.path,
+            manifest.partitions,
+            tuple(sorted(loose)),
+            {
+                table: [
+                    self._table_folder(table) / SCHEMA_FILE,
+                    *(self._joined_file(part, table) for part in manifest.partitions),
+                    *(f for f in (self._own_files(table) if loose else ()) if f.stem in loose),
+                ]
+                for table in TABLES
+            },
+        )
+
+    def commit(
+        self, tables: RunTables, recording: Recording, inputs: RunInputs, beliefs: bytes = b""
+    ) -> bool:
         """Add a run whole, or nothing of it.
 
         Args:
             tables: Its rows, as of `run_tables`.
             recording: Its journal.
             inputs: The files that it was reasoned with.
+            beliefs: What `BeliefNotes` gives of it, or nothing.
 
         Returns:
             Whether it was added; False when it was there already.
@@ -125,9 +178,11 @@ class Lake:
             return False
         try:
             self._keep(self.folder_of(run), recording, inputs)
+            if beliefs:
+                write_whole(self.folder_of(run) / BELIEFS, beliefs)
             for table in sorted(TABLES, key=lambda name: name == "runs"):  # it commits the others
                 if tables[table]:
-                    self._write_table(self._table_file(table, run), table, tables[table])
+                    self._write_table(self.table_file(table, run), table, tables[table])
         except (OSError, sqlite3.Error) as fault:
             raise _unwritable(self.path, fault) from fault
         return True
@@ -152,27 +207,42 @@ class Lake:
         return sorted(self._table_folder(table).rglob("*.parquet"))
 
     def rows(self, table: str) -> Iterator[Mapping[str, Any]]:
-        """All rows of a table, run by run.
+        """All rows of a table, run by run, by their keys.
 
         Raises:
             OutputError: A file is damaged.
             ExtraMissingError: pyarrow is not installed.
         """
-        parquet = imported("pyarrow.parquet")
-        for run in self.runs():
-            file = self._table_file(table, run)
-            if file.is_file():
-                try:
-                    yield from parquet.read_table(file, partitioning=None).to_pylist()
-                except (OSError, imported("pyarrow").ArrowInvalid) as fault:
-                    what = f"the table cannot be read ({fault})"
-                    raise OutputError(what, where=str(file)) from fault
+        found = self.snapshot()
+        joined = (self._read(self._joined_file(part, table)) for part in found.partitions)
+        files = (self.table_file(table, run) for run in found.loose)
+        own = (row for file in files if file.is_file() for row in self._read(file))
+        # Sorting keeps the order of the rows of a run.
+        parts = (iter(sorted(rows, key=lambda row: str(row["run"]))) for rows in joined)
+        yield from heapq.merge(*parts, own, key=lambda row: str(row["run"]))
+
+    def table_file(self, table: str, run: str) -> Path:
+        """The file of a run's own in a table, where there is one."""
+        return self._table_folder(table) / run[:2] / f"{run}.parquet"
+
+    def _joined_file(self, part: Partition, table: str) -> Path:
+        return self.path / FOLDER / part.name / f"{table}.parquet"
+
+    def _own_files(self, table: str) -> Iterator[Path]:
+        return self._table_folder(table).glob("??/*.parquet")
+
+    def _read(self, file: Path) -> list[dict[str, Any]]:
+        try:
+            rows: list[dict[str, Any]] = (
+                imported("pyarrow.parquet").read_table(file, partitioning=None).to_pylist()
+            )
+            return rows
+        except (OSError, imported("pyarrow").ArrowInvalid) as fault:
+            what = f"the table cannot be read ({fault})"
+            raise OutputError(what, where=str(file)) from fault
 
     def _table_folder(self, table: str) -> Path:
         return self.path / TABLES_FOLDER / table
-
-    def _table_file(self, table: str, run: str) -> Path:
-        return self._table_folder(table) / run[:2] / f"{run}.parquet"
 
     def _write_table(self, file: Path, table: str, rows: list[tuple[Any, ...]]) -> None:
         arrow, parquet = imported("pyarrow"), imported("pyarrow.parquet")

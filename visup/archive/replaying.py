@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from visup.archive.lake import Lake
+from visup.archive.parallel import each_run
 from visup.runs.replay import (
     TranscriptDiff,
     changed_settings,
@@ -83,12 +85,15 @@ class ChangeSummary:
             yield f"  verdict {before} -> {after}: {count}"
 
 
-def changes(lake: Lake, runs: Iterable[str], **changed: Any) -> Iterator[RunChanges]:
+def changes(
+    lake: Lake, runs: Iterable[str], workers: int | None = 0, **changed: Any
+) -> Iterator[RunChanges]:
     """Reason again about runs of a lake, with other settings.
 
     Args:
         lake: The lake.
         runs: Their keys.
+        workers: Processes that share them; None for one for each core.
         changed: Tasks, rules, actors or zones, as of `changed_settings`.
 
     Yields:
@@ -97,11 +102,14 @@ def changes(lake: Lake, runs: Iterable[str], **changed: Any) -> Iterator[RunChan
     Raises:
         VisupError: A run is damaged, or a file is not as it should be.
     """
-    for run in runs:
-        recording, settings = lake.recorded(run)
-        told = replay(recording, changed_settings(settings, **changed))
-        diff = transcript_diff(recorded_transcript(recording), told)
-        yield RunChanges(run, settings.source, lake.folder_of(run), diff)
+    yield from each_run(partial(_run_changes, lake, changed), list(runs), workers)
+
+
+def _run_changes(lake: Lake, changed: Mapping[str, Any], run: str) -> RunChanges:
+    recording, settings = lake.recorded(run)
+    told = replay(recording, changed_settings(settings, **changed))
+    diff = transcript_diff(recorded_transcript(recording), told)
+    return RunChanges(run, settings.source, lake.folder_of(run), diff)
 
 
 def _alerts(events: Iterable[Mapping[str, Any]]) -> Counter[tuple[str, float, str]]:

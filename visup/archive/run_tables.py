@@ -7,7 +7,7 @@ are not in a journal: the run is reasoned about again, which gives exactly what 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,13 +48,19 @@ class Provenance:
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
-def run_tables(recording: Recording, settings: WatchSettings, given: Provenance) -> RunTables:
+def run_tables(
+    recording: Recording,
+    settings: WatchSettings,
+    given: Provenance,
+    also: Callable[[Step], None] | None = None,
+) -> RunTables:
     """The rows of a run.
 
     Args:
         recording: Its journal; the run has ended.
         settings: Those of the run; see `with_inputs` for one whose files have moved.
         given: Where it comes from.
+        also: Told of each step, too.
 
     Returns:
         The rows of every table of `TABLES`, in an order that depends on nothing but the run.
@@ -71,7 +77,13 @@ def run_tables(recording: Recording, settings: WatchSettings, given: Provenance)
             hint="wait, or go on with it: visup watch --resume",
         )
     steps = StepTables()
-    replay(recording, settings, tell=steps.add)
+
+    def tell(step: Step) -> None:
+        steps.add(step)
+        if also:
+            also(step)
+
+    replay(recording, settings, tell=tell)
     tables = {
         "runs": [_run_row(facts, settings, steps, given)],
         "events": list(_event_rows(recording.events())),

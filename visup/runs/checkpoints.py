@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from visup.version import __version__
 
 CHECKPOINT = "state.bin"
 LARGEST_STATE_BYTES = 2**30
+HELD_IN = ("visup.runs.wiring", "visup.report.collector")
+"""Classes of these, and of all that they use, may be in a state; reading one makes only what is loaded."""
 PACKED = b"VISUPSTZ"
 """Before a state that is compressed."""
 BYTES_AN_HOUR = 160e6
@@ -91,16 +94,37 @@ class CheckpointWriter:
         if not self._every_s or self.note or busy or early:
             return
         self._last = step.time
+        data = self._data(agent, step, kept())
+        if data is not None:
+            with suppress(RuntimeError):  # no room for a thread
+                self._writing = self._disk.submit(self._write, data)
+
+    def keep(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> None:
+        """Keep the state after a step at once, and wait until it is on the disk.
+
+        Args:
+            agent: After the step.
+            step: The step, which the journal holds already.
+            kept: What the recorder remembers.
+        """
+        if not self._every_s or self.note:
+            return
+        self._last = step.time
+        data = self._data(agent, step, kept)
+        if data is not None:
+            self._disk.submit(self._write, data).result()
+
+    def _data(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> bytes | None:
+        """The state as it is written, or None where there can be none."""
         try:
-            data = self._frozen(agent, step, kept())
+            data = self._frozen(agent, step, kept)
         except StateError as fault:
             self.note = _none_kept(fault)
-            return
+            return None
         except MemoryError:
-            return  # no room for a copy: the older state stays, supervision goes on
+            return None  # no room for a copy: the older state stays, supervision goes on
         self.largest = max(self.largest, len(data))
-        with suppress(RuntimeError):  # no room for a thread
-            self._writing = self._disk.submit(self._write, data)
+        return data
 
     def _write(self, data: bytes) -> None:
         packed = seal(PACKED + zlib.compress(data, 1), self._key)
@@ -147,6 +171,8 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
     Returns:
         It, or None when there is none that can be used, and then why, when there is one.
     """
+    for name in HELD_IN:
+        import_module(name)
     try:
         packed = unsealed(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES))
         told = load_state(_unpacked(packed))

@@ -25,7 +25,7 @@ from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict, reasoning_agent
 from visup.tasks import load_tasks
-from visup.tasks.grammar.structure import task_actors
+from visup.tasks.grammar.structure import spare_kinds, task_actors
 from visup.version import __version__
 
 Line = Mapping[str, Any]
@@ -109,7 +109,7 @@ def changed_settings(settings: WatchSettings, **changed: Any) -> WatchSettings:
     wanted = {k: v for k, v in changed.items() if v}
     if "tasks" in wanted and "actors" not in wanted:
         tasks = [t for name in wanted["tasks"] for t in load_tasks(name)]
-        known = {actor for task in tasks for actor in task_actors(task)}
+        known = {a for task in tasks for a in (*task_actors(task), *spare_kinds(task))}
         wanted["actors"] = {a: m for a, m in settings.actors.items() if a in known}
     return replace(settings, **wanted)
 

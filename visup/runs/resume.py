@@ -11,9 +11,10 @@ import shlex
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from visup.agent import Frame, Observation, Severity, Verdict
 from visup.agent.cycle.agent import Agent
@@ -28,6 +29,9 @@ from visup.redaction import redacted
 from visup.runs.checkpoints import Checkpoint, read_checkpoint
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import SOURCE_REDACTED, WatchSettings
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +96,12 @@ def interrupted_run(
     facts = recording.facts()
     if "settings" not in facts:
         raise OutputError("nothing was recorded of this run", where=str(run), hint="begin it anew")
+    if facts.get("ended") == "rolled":
+        raise OutputError(
+            "this run is over: it goes on in another one",
+            where=str(run),
+            hint=f"that is {run.parent / str(facts.get('next_run'))}",
+        )
     if facts.get("ended") == "complete":
         raise OutputError(
             "this run is over: its source was seen to the end",
@@ -100,9 +110,10 @@ def interrupted_run(
         )
     state, why_none = read_checkpoint(recording.path.parent)
     ends = recording.first_and_last()
-    if state is not None and (ends is None or not ends[0] - 1 <= state.frame_index <= ends[1]):
+    continues = facts.get("continues") is not None
+    if state is not None and not _belongs(state, ends, continues=continues):
         state, why_none = None, "its checkpoint does not belong to this journal"
-    if state is None and facts.get("steps_dropped"):
+    if state is None and (facts.get("steps_dropped") or continues):
         raise OutputError(
             "neither the first steps of this run nor a later checkpoint is kept",
             where=str(run),
@@ -113,6 +124,15 @@ def interrupted_run(
     settings = _with_secret(settings, run, source, needed=bool(facts.get(SOURCE_REDACTED)))
     answers = _answers(facts, str(run))
     return InterruptedRun(recording, settings, state, why_none, recording.count(), verdict, answers)
+
+
+def _belongs(state: Checkpoint, ends: tuple[int, int] | None, *, continues: bool) -> bool:
+    """Whether a state is that of one of the steps that are kept, or of the run that this one continues."""
+    if ends is None:
+        return continues
+    return ends[0] - 1 <= state.frame_index <= ends[1] or (
+        continues and state.frame_index < ends[0]
+    )
 
 
 def _with_named_code(
@@ -181,16 +201,24 @@ def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
         raise OutputError("the run's answers cannot be read", where=where) from fault
 
 
+@cache
+def _settings_form() -> TypeAdapter[WatchSettings]:
+    """Made once: that takes longer than to read the settings of a run."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(WatchSettings)
+
+
 def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
     """The settings of a recorded run.
 
     Raises:
         OutputError: They are not there, or not as they should be.
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     try:
-        return TypeAdapter(WatchSettings).validate_python(facts.get("settings"))
+        return _settings_form().validate_python(facts.get("settings"))
     except ValidationError as fault:
         said = fault.errors()[0]["msg"]
         raise OutputError(f"the run's settings cannot be read ({said})", where=where) from fault
@@ -201,6 +229,7 @@ def catch_up(
     source: VideoSource,
     past: InterruptedRun,
     tell: Callable[[Step, Frame], None],
+    late: Callable[[Step], None],
     *,
     whole: bool,
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
@@ -211,6 +240,7 @@ def catch_up(
         source: Just opened.
         past: The run.
         tell: Told of the recorded steps whose frames there are.
+        late: Told of all recorded steps since the state.
         whole: Whether its behaviours are as the state left them, too.
 
     Returns:
@@ -221,7 +251,7 @@ def catch_up(
     """
     after = past.state.frame_index if past.state else -1
     if source.live:
-        return _live(agent, source, past, after), ("Nothing was seen in between.",)
+        return _live(agent, source, past, late, after), ("Nothing was seen in between.",)
     answers = past.recording.answers()
     differing = 0
     frames: Iterator[Frame] = iter(source)
@@ -231,7 +261,9 @@ def catch_up(
         differing += pack_observation(_without_troubles(again)) != pack_observation(
             _without_troubles(seen)
         )
-        tell(agent.reason(seen, answers.get(seen.frame_index, {})), frame)
+        step = agent.reason(seen, answers.get(seen.frame_index, {}))
+        tell(step, frame)
+        late(step)
     notes = []
     if not whole and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
@@ -268,11 +300,17 @@ def _without_troubles(observation: Observation) -> Observation:
     )
 
 
-def _live(agent: Agent, source: VideoSource, past: InterruptedRun, after: int) -> Iterator[Frame]:
+def _live(
+    agent: Agent,
+    source: VideoSource,
+    past: InterruptedRun,
+    late: Callable[[Step], None],
+    after: int,
+) -> Iterator[Frame]:
     """Frames of a camera, counted and timed on from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):
-        agent.reason(last, answers.get(last.frame_index, {}))
+        late(agent.reason(last, answers.get(last.frame_index, {})))
         for behaviour in agent.behaviours:
             if missed := getattr(behaviour, "missed", None):
                 missed(last)

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, cast
 
-from visup.agent import Frame, Verdict
-from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
+from visup.agent import Frame
 from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
-from visup.agent.storage.atomic import sync
-from visup.agent.storage.file_lock import acquire_lock
-from visup.agent.storage.journal_reader import JOURNAL
 from visup.agent.storage.wall_clock import RecordStamp, WallClock
 from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
-from visup.redaction import redacted
 from visup.rules.safety.ending import open_rules
 from visup.runs.checkpoints import CheckpointWriter
-from visup.runs.inputs.preflight import check_cast
+from visup.runs.evidence.keeper import EvidenceKeeper
+from visup.runs.inputs.audience import Audience, RunFigures, RunProgress
+from visup.runs.inputs.preflight import check_cast, told_of_actors
+from visup.runs.inputs.run_folder import fresh_folder
 from visup.runs.inputs.run_sinks import sinks_of
 from visup.runs.inputs.stop_signals import stop_signals
 from visup.runs.monotonic_clock import MonotonicFrames
@@ -32,90 +30,19 @@ from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.runs.wiring import build_agent, final_verdict, open_video
+from visup.runs.unattended.next_run import RollOver, RunPlaces
+from visup.runs.unattended.phase_meter import PhaseMeter
+from visup.runs.wiring import VerdictMonitor, build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 from visup.version import __version__
 
 if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
 
+BOOKS_S = 2.0
+"""For the books of runs that were followed by others, when the last one ends, seconds."""
 
-class RunProgress(Protocol):
-    """Told after each step how far a run has come."""
-
-    def __call__(self, done: int, total: int | None, lag_s: float | None = None, /) -> None:
-        """Take it down.
-
-        Args:
-            done: Frames that were looked at.
-            total: Frames that there are, or None where nobody knows.
-            lag_s: How long ago it was what is told now, seconds; None of what is not watched in real time.
-        """
-
-
-def fresh_folder(out: Path | None, source: str) -> Path:
-    """The folder of a run, made new; by default `runs/<source>`, numbered when that exists.
-
-    Raises:
-        OutputError: It cannot be made, or holds a run already (what was recorded is never lost), which
-            may still go on.
-    """
-    out = out or _numbered_folder(source)
-    if (out / JOURNAL).exists():
-        # Nobody is told to delete a run that goes on.
-        acquire_lock(out / JOURNAL, "this run").release()
-        raise OutputError(
-            "the folder holds a run already",
-            where=str(out),
-            hint="choose another folder, or delete this one",
-        )
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        probe = out / ".writable"
-        probe.touch()
-        probe.unlink()
-        sync(out.parent)  # that there is a folder is to be known after the power was lost, too
-    except OSError as fault:
-        raise OutputError(
-            f"the output folder cannot be written: {fault.strerror}",
-            where=str(out),
-            hint="choose a folder that you may write to with --out",
-        ) from fault
-    return out
-
-
-def _numbered_folder(source: str) -> Path:
-    """`runs/<source>`, made new; numbered where that exists, so that no two runs are given the same."""
-    source = redacted(source)
-    stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
-    stem = stem or Path(source).resolve().parent.name or "run"
-    for n in range(1, 10**6):
-        folder = Path("runs") / (stem if n == 1 else f"{stem}-{n}")
-        try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        except OSError:
-            break  # it is told when it is tried once more
-        return folder
-    return folder
-
-
-@dataclass(frozen=True, slots=True)
-class Audience:
-    """Who follows a run while it goes on.
-
-    Attributes:
-        observers: Given each step and its frame, after it is recorded.
-        progress: Given how far the run has come.
-        operator: Who answers questions; nobody by default.
-        notice: Given what cannot wait for a step, such as that a camera dropped: one sentence.
-    """
-
-    observers: Sequence[Observer] = ()
-    progress: RunProgress | None = None
-    operator: HumanOperator | None = None
-    notice: Callable[[str], None] | None = None
+__all__ = ["Audience", "RunProgress", "fresh_folder", "notify", "supervise", "supervised"]
 
 
 def supervise(
@@ -184,11 +111,12 @@ def _supervised(
     with ExitStack() as stack:
         answered = audience.operator is not None and bool(audience.operator.answers)
         run = _Run(settings, folder, options, past, stack, answered=answered)
+        run.keep_evidence()
         frames = run.catch_up(past) if past else run.source
         run.connect(audience, past)
         timed = run.timed(frames, past)
         yield None
-        yield from run.watch(timed, audience.progress)
+        yield from run.watch(timed, audience)
         return run.result()
 
 
@@ -206,41 +134,52 @@ class _Run:
         answered: bool,
     ) -> None:
         self._faults = RuntimeFaults()
+        self._meter, self._roll_over = PhaseMeter(), RollOver(options)
         self.source = stack.enter_context(open_video(settings))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
         self._warnings = () if past else check_cast(settings, self._agent, answered=answered)
         # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
         actors = self._agent.mind.actors
-        self._notes = _told_of_actors(settings.actors, actors)
+        self._notes = told_of_actors(settings.actors, actors)
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
         # Before the journal: what is refused leaves no run behind.
         told = past.recording.facts().get("clock") if past else None
         self._stamp = RecordStamp(options.camera, WallClock.read(told), live=self.source.live)
-        self._sinks = sinks_of(options, settings.source, self._stamp)
+        written = past.recording.written() if past else None
+        self._sinks = sinks_of(options, settings.source, self._stamp, written)
         stack.callback(self._sinks.close)
-        self._recorder = (
-            Recorder(settings, self.source, folder, options, resume=past is not None)
-            if folder
-            else None
-        )
-        if self._recorder:
-            self._stamp.changed = self._recorder.keep_clock
-            stack.callback(self._recorder.close)
+        self._recorder = self._recorder_in(folder, options, resume=past is not None)
+        stack.callback(self._close_journals)
         if past:
             past.check_unchanged()  # now that nobody else may write it
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
-        self._alarms = _VerdictMonitor(past.verdict if past else None)
+        self._alarms = VerdictMonitor(past.verdict if past else None)
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
+        self._options = options
+        self._last: Step | None = None  # while none is under way
         self._stopped = False
+
+    def _recorder_in(
+        self, folder: Path | None, options: RunOptions, *, resume: bool
+    ) -> Recorder | None:
+        if folder is None:
+            return None
+        return Recorder(self._settings, self.source, folder, options, resume=resume)
+
+    def _close_journals(self) -> None:
+        self._roll_over.wait(BOOKS_S)
+        if self._recorder:
+            self._recorder.close()
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
         """Make the agent what it was, and give the frames that are left."""
         past, whole = self._take_up(past)
         tell = self._recorder.catch_up if self._recorder else lambda step, frame: None
-        frames, notes = catch_up(self._agent, self.source, past, tell, whole=whole)
+        late = self._sinks.alerts.late
+        frames, notes = catch_up(self._agent, self.source, past, tell, late, whole=whole)
         self._notes = (*self._notes, *notes)
         return frames
 
@@ -267,20 +206,40 @@ class _Run:
 
     def connect(self, audience: Audience, past: InterruptedRun | None) -> None:
         """Let everyone follow the agent, and its surroundings report their faults."""
+        if self._recorder:
+            self._stamp.changed = self._recorder.keep_clock
+            if self._stamp.clock.anchors:
+                self._recorder.keep_clock(self._stamp.clock)
         # The journal comes first: what is told was recorded before.
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
-        others = (*audience.observers, self._sinks, *answering)
+        # Evidence comes before who is told where it is.
+        kept = (self._evidence,) if self._evidence else ()
+        others = (*audience.observers, *kept, self._sinks, *answering)
         clocked = (self._stamp,) if self.source.live else ()
         self._agent.observers = (self._alarms, *clocked, *recording, *others)
         for warning in self._warnings:
             self._warn(warning, audience.notice)
         if self._recorder:
-            self._faults.add_source(self._recorder.runtime_faults)
+            self._faults.add_source(
+                lambda: self._recorder.runtime_faults() if self._recorder else ()
+            )
         self._faults.add_source(self._sinks.runtime_faults)
         if isinstance(self.source, LiveSource):
             self.source.notify = notify(self._sinks, audience.notice)
             self._faults.add_source(self.source.runtime_faults)
+
+    def keep_evidence(self) -> None:
+        """Keep evidence of alerts, where that is wanted."""
+        self._evidence: EvidenceKeeper | None = None
+        wanted = self._options.evidence
+        if wanted is None or self._folder is None:
+            return
+        fps = self.source.fps / self.source.every
+        keeper = self._evidence = EvidenceKeeper(self._folder, wanted, fps, self._stamp)
+        self._stack.callback(keeper.close, self._options.closing_s)
+        self._faults.add_source(keeper.runtime_faults)
+        self._sinks.alerts.links = keeper.links
 
     def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
         """Say something before the first frame; who is told nothing then finds it among the notes."""
@@ -297,32 +256,90 @@ class _Run:
             self._stamp.lag = self._pace.lag
             self._stack.callback(self._pace.close)
             self._faults.add_source(self._pace.runtime_faults)
-        begin = self._agent.mind.time if past and past.steps else None
+        begin = self._agent.mind.time if past and (past.steps or past.state) else None
         monotonic = MonotonicFrames(self._pace or frames, self.source.fps, begin)
         self._faults.add_source(monotonic.runtime_faults)
         return monotonic
 
-    def watch(self, frames: Iterable[Frame], progress: RunProgress | None) -> Iterator[Step]:
+    def watch(self, frames: Iterable[Frame], audience: Audience) -> Iterator[Step]:
         """Step through frames until they end or the user stops."""
-        count = self.source.frame_count
-        total = None if count is None else -(-count // self.source.every)
         try:
-            for step in self._agent.steps(frames):
-                self._steps += 1
+            for frame in frames:
+                self._last = None
+                step = self._meter.step(self._agent, frame)
+                self._steps, self._last = self._steps + 1, step
                 if self._checkpoints:
                     self._checkpoints.offer(
                         self._agent, step, lambda: recorder_state(self._recorder)
                     )
-                if progress:
-                    lag = self._pace.lag(step.time) if self._pace else None
-                    progress(self._steps, total, lag)
+                self._tell_figures(step, audience)
+                if audience.places and self._recorder and self.source.live:
+                    self._roll(step, self._recorder, audience)
                 yield step
         except KeyboardInterrupt:
             self._stopped = True
 
+    def _roll(self, step: Step, old: Recorder, audience: Audience) -> None:
+        """Begin the next run when it is time to: the agent goes on, its books are new."""
+        if not (audience.places and self._roll_over.due(step.time, old.journal.size)):
+            return
+        try:
+            new, checkpoints = self._next_books(step, old, audience.places)
+        except OutputError as fault:
+            self._roll_over.failed(step.time)
+            if audience.notice:
+                audience.notice(f"the next run cannot be begun: {fault}")
+            return
+        mind, before = self._agent.mind, self._checkpoints
+        verdict = final_verdict(mind) if mind.tasks else self._alarms.verdict
+        said = RunResult(verdict, self._steps, has_task=bool(mind.tasks), seconds=step.time)
+        self._agent.observers = [new if o is old else o for o in self._agent.observers]
+        self._recorder, self._checkpoints, self._folder = new, checkpoints, new.folder
+        self._stamp.changed = new.keep_clock
+        if self._evidence:
+            self._evidence.move_to(new.folder)
+        self._steps, self._alarms.verdict = 0, None
+        self._roll_over.begun(step.time)
+        assert before
+        self._roll_over.close_books(old, before, said, mind.tasks)
+
+    def _next_books(
+        self, step: Step, old: Recorder, places: RunPlaces
+    ) -> tuple[Recorder, CheckpointWriter]:
+        """The journal and the checkpoint of the next run, from which it could already go on.
+
+        Raises:
+            OutputError: They cannot be written.
+        """
+        folder = fresh_folder(places.place(), self._settings.source)
+        new = Recorder(self._settings, self.source, folder, self._options)
+        try:
+            new.journal.note(continues=old.folder.name, clock=self._stamp.clock.anchors)
+            checkpoints = CheckpointWriter(folder, self._options.state_every_s)
+            checkpoints.keep(self._agent, step, recorder_state(new))
+            places.go_on_with(folder)
+        except OutputError:
+            new.close()
+            raise
+        with suppress(OutputError):
+            old.journal.note(next_run=folder.name)
+        return new, checkpoints
+
+    def _tell_figures(self, step: Step, audience: Audience) -> None:
+        lag = self._pace.lag(step.time) if self._pace else None
+        if audience.progress:
+            count = self.source.frame_count
+            total = None if count is None else -(-count // self.source.every)
+            audience.progress(self._steps, total, lag)
+        if audience.figures:
+            dropped = self._pace.dropped if self._pace else 0
+            audience.figures(RunFigures(self._steps, dropped, lag, self._meter.ms))
+
     def result(self) -> RunResult:
         """Close the books."""
         if self._checkpoints:
+            if self._stopped and self._last:
+                self._checkpoints.keep(self._agent, self._last, recorder_state(self._recorder))
             self._checkpoints.close()
         mind = self._agent.mind
         verdict = final_verdict(mind) if mind.tasks else self._alarms.verdict
@@ -377,23 +394,3 @@ def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str]
             notice(text)
 
     return tell
-
-
-def _told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
-    """A sentence on each actor that is what was taught, other than its task declares."""
-    return tuple(
-        f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
-        "models that its task names."
-        for actor in actors
-        if actor not in given
-    )
-
-
-class _VerdictMonitor:
-    """What comes of the events of a run without a task."""
-
-    def __init__(self, verdict: Verdict | None) -> None:
-        self.verdict = verdict
-
-    def __call__(self, step: Step, frame: Frame) -> None:
-        self.verdict = verdict_without_task(grave_kinds(step.events), self.verdict)

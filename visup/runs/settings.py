@@ -192,6 +192,8 @@ class WatchSettings:
     ] = ()
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
+    rest_s: float | None = None
+    """Seconds between two looks for motion while nothing changes; None to look at each frame."""
     detections: Annotated[
         Path | None,
         Option(
@@ -239,6 +241,25 @@ class WatchSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class EvidenceOptions:
+    """What is kept of each alert.
+
+    Attributes:
+        before_s: Seconds of its clip before it.
+        after_s: Seconds of its clip after it.
+        memory_mb: Memory that frames before an alert may take, megabytes.
+        link: Address of the folder of all runs of the camera, for links; None for names of files.
+        least_free_bytes: It is told when less is free on the disk.
+    """
+
+    before_s: float = 8.0
+    after_s: float = 8.0
+    memory_mb: float = 32.0
+    link: str | None = None
+    least_free_bytes: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class RunOptions:
     """How a run is recorded, and where its alerts go."""
 
@@ -269,3 +290,15 @@ class RunOptions:
     """Key by which what webhooks send is signed."""
     closing_s: float = 5.0
     """How long each sink may take to deliver what is left when the run ends, seconds."""
+    evidence: EvidenceOptions | None = None
+    """What is kept of each alert; None for nothing."""
+    run_s: float | None = None
+    """A run that goes on is followed by the next after so many seconds of the source."""
+    run_bytes: int | None = None
+    """So is one whose journal has become larger."""
+    deliveries: Path | None = None
+    """File in which alerts wait until sinks take them, also over a kill; None to drop what they do not."""
+    quiet: tuple[str, ...] = ()
+    """Hours in which only critical alerts go to sinks, such as '22:00-06:00'."""
+    timezone: str | None = None
+    """That of quiet hours; None for that of the machine."""

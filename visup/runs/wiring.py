@@ -6,12 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from visup.agent import Behaviour, Contract, Mind, Verdict, Zone
+from visup.agent import Behaviour, Contract, Frame, Mind, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.step import Observer
+from visup.agent.model.step import Observer, Step
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
@@ -24,6 +24,7 @@ from visup.percepts.detections import (
 )
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
+from visup.percepts.motion.resting import RestingMotion
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.video import VideoSource, open_source
@@ -44,6 +45,7 @@ from visup.tasks.grammar.criteria import Place
 from visup.tasks.grammar.structure import (
     declared_sizes,
     needs_ground,
+    spare_kinds,
     task_actors,
     undrawn_zones,
     with_bystanders,
@@ -218,6 +220,24 @@ _GRAVITY = (
 )
 
 
+class VerdictMonitor:
+    """What comes of the events of a run without a task: an observer.
+
+    Args:
+        verdict: What came of it before.
+
+    Attributes:
+        verdict: What has come of it.
+    """
+
+    def __init__(self, verdict: Verdict | None) -> None:
+        self.verdict = verdict
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Take note of a step."""
+        self.verdict = verdict_without_task(grave_kinds(step.events), self.verdict)
+
+
 def _limits(settings: WatchSettings, live: bool) -> Limits:
     usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
     return replace(usual, hang_s=LIVE_HANG_S, patient=False) if live else usual
@@ -231,7 +251,8 @@ def _behaviours(
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
     taught = database.taught if database is not None else ()
-    moving: Behaviour = AppearanceBehaviour(taught) if taught else MotionBehaviour()
+    eyes = RestingMotion(settings.rest_s) if settings.rest_s else MotionBehaviour()
+    moving: Behaviour = AppearanceBehaviour(taught) if taught else eyes
     if places:
         moving = PlacedBehaviour(places, taught)
     if boxes:
@@ -305,7 +326,7 @@ def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
 def _check_actors(
     settings: WatchSettings, tasks: Sequence[Task], database: ModelDatabase | None
 ) -> None:
-    known = {actor for task in tasks for actor in task_actors(task)}
+    known = {actor for task in tasks for actor in (*task_actors(task), *spare_kinds(task))}
     for actor, models in settings.actors.items():
         if tasks and actor not in known:
             raise SettingsError(

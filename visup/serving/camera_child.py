@@ -29,14 +29,14 @@ class CameraChild:
     It is of a session of its own: Ctrl-C in the supervisor's terminal is the supervisor's alone to hear.
 
     Args:
-        job: What it is to do.
+        job: What it is to do; None of one that stands ready, and is given its job later.
         command: What is run.
 
     Raises:
         OSError: No process can be begun.
     """
 
-    def __init__(self, job: CameraJob, command: Command = camera_command) -> None:
+    def __init__(self, job: CameraJob | None, command: Command = camera_command) -> None:
         self._reports, theirs = os.pipe()
         os.set_blocking(self._reports, False)
         try:
@@ -50,6 +50,11 @@ class CameraChild:
             os.close(theirs)
         self.pid = self._process.pid
         self._rest = b""
+        if job:
+            self.give(job)
+
+    def give(self, job: CameraJob) -> None:
+        """Give it its job."""
         self._send(job_line(job))
 
     def reports(self) -> list[CameraReport]:
@@ -81,6 +86,14 @@ class CameraChild:
             return None
         return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
+    def cpu_s(self) -> float | None:
+        """Processor time that it has used, seconds; None where the system does not say."""
+        try:
+            told = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+            return sum(map(int, told[11:15])) / os.sysconf("SC_CLK_TCK")
+        except (OSError, ValueError):
+            return None
+
     def ask_to_end(self) -> None:
         """Let it finish its step and close its books."""
         self._signal(signal.SIGTERM)
@@ -89,6 +102,13 @@ class CameraChild:
         """End it at once, with all that it began; `exit_code` tells when it has."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, signal.SIGKILL)
+
+    def end(self, wait_s: float = 5.0) -> None:
+        """End it at once, wait until it has, and free what is held of it."""
+        self.kill()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(wait_s)
+        self.close()
 
     def let_go(self) -> None:
         """Supervise it no more: it closes its books, as when its supervisor has died."""

@@ -1,7 +1,8 @@
 """The process of one camera: a run as any other, which tells its supervisor that it is alive.
 
 `python -m visup.serving.camera_process PIPE` reads its job from standard input, which stays open as long as
-the supervisor lives: without one it closes its books and ends, so that no camera is watched twice.
+the supervisor lives: without one it closes its books and ends, so that no camera is watched twice. As long
+as there is no job it makes itself ready for one.
 """
 
 from __future__ import annotations
@@ -11,28 +12,50 @@ import signal
 import sys
 import threading
 import time
+from collections import Counter
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
+from visup.agent import Frame
 from visup.agent.model.errors import SourceError, VisupError
+from visup.agent.model.step import Step
 from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.redaction import has_secret
+from visup.runs.inputs.audience import Audience, RunFigures
 from visup.runs.result import ExitCode, RunResult
 from visup.runs.resume import InterruptedRun, interrupted_run
-from visup.runs.runner import Audience, fresh_folder, supervise
+from visup.runs.runner import fresh_folder, supervise
+from visup.serving.monitoring.camera_figures import PHASE
 from visup.serving.reports import CameraJob, ReportKind, ReportPipe, parse_job
+from visup.serving.run_store import RunStore
+from visup.serving.warm_up import has_job, warm_up
 
 CLOSING_S = 10.0
 """How long a run's last process is waited for, seconds."""
+
+DELIVERIES = "deliveries.sqlite"
+"""In the folder of a camera: alerts that its sinks have not taken yet."""
 
 BEAT_S = 0.5
 """Seconds between two signs of life."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Places(RunStore):
+    """Where further runs go; the supervisor is told when one begins."""
+
+    pipe: ReportPipe
+
+    def go_on_with(self, run: Path) -> None:
+        RunStore.go_on_with(self, run)
+        self.pipe.send(ReportKind.ROLLED, run=run.name)
+
+
 class Heartbeat:
-    """Tells now and then how far a run has come.
+    """Tells now and then how a run does: an observer of its steps, given its figures after each.
 
     Args:
         pipe: To the supervisor.
@@ -41,13 +64,37 @@ class Heartbeat:
     def __init__(self, pipe: ReportPipe) -> None:
         self._pipe = pipe
         self._last = -BEAT_S
+        self._frames = 0
+        self._opened: Counter[str] = Counter()
+        self._beliefs: dict[str, int] = {}
 
-    def __call__(self, done: int, total: int | None, lag_s: float | None = None, /) -> None:
-        """Take note of a step."""
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Count what a step tells."""
+        self._frames += 1
+        opened = (a.severity.name.lower() for a in step.alerts if a.closed is None)
+        self._opened.update(f"alerts_{severity}" for severity in opened)
+        self._beliefs = {
+            "objects": len(step.mind.present()),
+            "alerts_open": len(step.mind.alerts),
+        }
+
+    def beat(self, figures: RunFigures) -> None:
+        """Tell all that was counted, when it is time to."""
         now = time.monotonic()
-        if now - self._last >= BEAT_S:
-            self._last = now
-            self._pipe.send(ReportKind.STEP, steps=done, lag_s=lag_s)
+        if now - self._last < BEAT_S:
+            return
+        self._last = now
+        phases = {PHASE + name: round(ms, 1) for name, ms in figures.phase_ms.items()}
+        self._pipe.send(
+            ReportKind.STEP,
+            steps=figures.steps,
+            lag_s=figures.lag_s,
+            frames=self._frames,
+            dropped=figures.dropped,
+            **self._beliefs,
+            **self._opened,
+            **phases,
+        )
 
 
 def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
@@ -57,8 +104,12 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
         job: What to do.
         pipe: To the supervisor.
     """
+    heart = Heartbeat(pipe)
     audience = Audience(
-        progress=Heartbeat(pipe), notice=lambda text: pipe.send(ReportKind.NOTICE, text=text)
+        observers=(heart,),
+        figures=heart.beat,
+        places=_Places(job.folder.parent, job.fingerprint, pipe),
+        notice=lambda text: pipe.send(ReportKind.NOTICE, text=text),
     )
     try:
         if job.resume:
@@ -71,7 +122,7 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
             past.settings if past else job.settings,
             folder,
             audience=audience,
-            options=job.options,
+            options=replace(job.options, deliveries=job.folder.parent / DELIVERIES),
             past=past,
             at_once=False,
         )
@@ -80,7 +131,7 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
             job.folder.rmdir()  # what is refused before its first frame leaves no folder behind
         pipe.send(ReportKind.REFUSED, text=str(fault), source=isinstance(fault, SourceError))
         return ExitCode.BAD_INPUT
-    _tell(result, folder, pipe)
+    _tell(result, result.folder or folder, pipe)
     return result.exit_code
 
 
@@ -112,7 +163,12 @@ def _end_with(supervisor: BinaryIO) -> None:
 def main() -> None:
     """Read the job, and do it."""
     pipe = ReportPipe(int(sys.argv[1]))
-    job = parse_job(sys.stdin.buffer.readline())
+    if not has_job():
+        warm_up()
+    line = sys.stdin.buffer.readline()
+    if not line:
+        return  # the supervisor has gone, and there was nothing to do
+    job = parse_job(line)
     reader = threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True)
     reader.start()
     code = watch_camera(job, pipe)

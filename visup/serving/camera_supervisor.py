@@ -11,9 +11,12 @@ from typing import Any, Protocol
 from visup.agent.model.errors import VisupError
 from visup.serving.backoff import Backoff
 from visup.serving.camera_child import CameraChild
+from visup.serving.monitoring.camera_figures import CameraFigures
+from visup.serving.monitoring.status import CameraStatus
 from visup.serving.reports import CameraJob, CameraReport, ReportKind
 from visup.serving.run_store import begin_run, run_under_way
 from visup.serving.site.records import SiteCamera
+from visup.serving.site_log import SiteEvent, Tell
 
 ASK_AGAIN_S = 2.5
 CLOSE_S = 5.0
@@ -54,6 +57,10 @@ class Child(Protocol):
         """Memory in use, megabytes, or None."""
         ...
 
+    def cpu_s(self) -> float | None:
+        """Processor time used, seconds, or None."""
+        ...
+
     def ask_to_end(self) -> None:
         """Let it close its books."""
         ...
@@ -67,10 +74,6 @@ class Child(Protocol):
         ...
 
 
-Tell = Callable[[str, str], None]
-"""Told what happened to a camera: its name, one sentence."""
-
-
 @dataclass(slots=True)
 class _Life:
     """One process, from its beginning to its end."""
@@ -80,6 +83,7 @@ class _Life:
     begun: float
     heard: float
     first_step: float | None = None
+    last_step: float | None = None
     away: bool = False
     asked: float | None = None
     asked_again: bool = False
@@ -101,6 +105,8 @@ class CameraSupervisor:
         state: What is done with it now.
         restarts: How often its process was begun again.
         killed_at_close: Whether a process that was asked to end had to be killed.
+        figures: What is counted of it.
+        run: Folder of the run that was begun or taken up last, or None.
     """
 
     def __init__(
@@ -114,6 +120,8 @@ class CameraSupervisor:
         self.state = CameraState.WAITING
         self.restarts = 0
         self.killed_at_close = False
+        self.figures = CameraFigures()
+        self.run: Path | None = None
         self._folder = store / camera.name
         self._say = tell
         self._start = start
@@ -154,8 +162,23 @@ class CameraSupervisor:
         else:
             self.state = CameraState.OVER
 
-    def _tell(self, text: str) -> None:
-        self._say(self.camera.name, text)
+    def status(self, now: float) -> CameraStatus:
+        """What is told of it to those who ask from outside."""
+        life = self._life
+        self.figures.take({"cpu_s": life.child.cpu_s()} if life else {})
+        stepped = None if life is None or life.last_step is None else now - life.last_step
+        return CameraStatus(
+            self.camera.name,
+            self.state.value,
+            self.restarts,
+            life.child.memory_mb() if life else None,
+            stepped,
+            self.figures.totals,
+            dict(self.figures.latest),
+        )
+
+    def _tell(self, text: str, kind: SiteEvent, **facts: Any) -> None:
+        self._say(self.camera.name, text, kind, **facts)
 
     def _begin(self, now: float) -> None:
         camera = self.camera
@@ -164,32 +187,45 @@ class CameraSupervisor:
                 run_under_way(self._folder, camera.fingerprint) if self._vain < MOST_VAIN else None
             )
             folder = run or begin_run(self._folder, camera.fingerprint)
-            job = CameraJob(camera.settings, camera.options, folder, resume=run is not None)
+            job = CameraJob(
+                camera.settings,
+                camera.options,
+                folder,
+                resume=run is not None,
+                fingerprint=camera.fingerprint,
+            )
             child = self._start(job)
         except (VisupError, OSError) as fault:
             self._backoff = self._backoff.after(0.0)
             self._due = now + self._backoff.wait_s
             self._tell(
-                f"it cannot be begun: {fault}; it is tried again in {self._backoff.wait_s:g} s"
+                f"it cannot be begun: {fault}; it is tried again in {self._backoff.wait_s:g} s",
+                SiteEvent.NOT_BEGUN,
             )
             return
+        self.run = folder
         self._life = _Life(child, run is not None, now, now)
         self.state = CameraState.STARTING
-        verb = "goes on with" if run else "begins"
-        self._tell(f"{verb} run {folder.name}")
+        verb, kind = ("goes on with", SiteEvent.RESUMED) if run else ("begins", SiteEvent.BEGUN)
+        self._tell(f"{verb} run {folder.name}", kind, run=folder.name)
 
     def _listen(self, life: _Life, now: float) -> None:
         for report in life.child.reports():
             life.heard = now
             if report.kind is ReportKind.STEP:
-                life.away = False
+                life.away, life.last_step = False, now
+                self.figures.take(report.data)
                 if life.first_step is None:
                     life.first_step, self._vain = now, 0
                     if self.state is CameraState.STARTING:
                         self.state = CameraState.WATCHING
             elif report.kind is ReportKind.NOTICE:
                 life.away = True
-                self._tell(_text(report.data.get("text")))
+                self._tell(_text(report.data.get("text")), SiteEvent.NOTICE)
+            elif report.kind is ReportKind.ROLLED:
+                run = Path(_text(report.data.get("run"))).name
+                self.run = self._folder / run
+                self._tell(f"goes on in run {run}", SiteEvent.ROLLED, run=run)
             elif report.kind in (ReportKind.ENDED, ReportKind.REFUSED):
                 life.end = report
 
@@ -203,19 +239,26 @@ class CameraSupervisor:
         most = limits.start_s if life.first_step is None else limits.silent_s + patience
         memory = life.child.memory_mb()
         if now - life.heard > most:
-            self._tell(f"no sign of life for {now - life.heard:.0f} s: its process is ended")
+            self._tell(
+                f"no sign of life for {now - life.heard:.0f} s: its process is ended",
+                SiteEvent.HUNG,
+            )
             life.child.kill()
             life.heard, life.killed = now, True
         elif memory is not None and memory > limits.memory_mb:
             self._tell(
-                f"{memory:.0f} MB in use, {limits.memory_mb:.0f} allowed: its process is begun anew"
+                f"{memory:.0f} MB in use, {limits.memory_mb:.0f} allowed: its process is begun anew",
+                SiteEvent.TOO_LARGE,
+                memory_mb=round(memory),
             )
             self._ask(life, now)
 
     def _close(self, life: _Life, waited: float) -> None:
         if waited > CLOSE_S and not life.killed:
             life.killed = self.killed_at_close = True
-            self._tell(f"its process did not close in {CLOSE_S:g} s and is ended")
+            self._tell(
+                f"its process did not close in {CLOSE_S:g} s and is ended", SiteEvent.NOT_CLOSED
+            )
             life.child.kill()
         elif waited > ASK_AGAIN_S and not life.asked_again:
             life.asked_again = True
@@ -230,21 +273,24 @@ class CameraSupervisor:
     def _ended(self, life: _Life, code: int, now: float) -> None:
         self._listen(life, now)  # its last words
         life.child.close()
+        self.figures.process_ended()
         self._life = None
         asked = life.asked is not None
         if self._then is None or (not asked and self._seen_whole(life)):
             self.state = CameraState.OVER
-            self._tell(_last_words(life, "it is watched no more" if self._then is None else ""))
+            words = _last_words(life, "it is watched no more" if self._then is None else "")
+            self._tell(words, SiteEvent.ENDED)
             return
         self.state = CameraState.WAITING
         if asked:
-            self._tell(_last_words(life, "it is begun again"))
+            self._tell(_last_words(life, "it is begun again"), SiteEvent.ENDED)
             return
         self._count(life, now)
         self._due = now + self._backoff.wait_s
         self.restarts += 1
         why = _last_words(life, "") if life.end else _how(code, killed=life.killed)
-        self._tell(f"{why}; it is begun again in {self._backoff.wait_s:g} s")
+        again = f"{why}; it is begun again in {self._backoff.wait_s:g} s"
+        self._tell(again, SiteEvent.DIED, exit_code=code, wait_s=self._backoff.wait_s)
 
     def _count(self, life: _Life, now: float) -> None:
         """What an end says of the next beginning."""

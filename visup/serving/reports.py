@@ -28,12 +28,14 @@ class CameraJob:
         options: How it is recorded, and where alerts go.
         folder: Of the run.
         resume: Whether the folder holds the run, and it goes on; else a new one is begun.
+        fingerprint: As the camera is now; runs that follow go on under the same.
     """
 
     settings: WatchSettings
     options: RunOptions
     folder: Path
     resume: bool
+    fingerprint: str = ""
 
 
 class ReportKind(StrEnum):
@@ -42,9 +44,11 @@ class ReportKind(StrEnum):
     OPENED = "opened"
     """What is needed is there, and the source is opened next; `resumed` says whether the run goes on."""
     STEP = "step"
-    """It is alive: `steps`, `lag_s`."""
+    """It is alive: `steps`, `lag_s`, and what is counted of it (`monitoring/camera_figures.py`)."""
     NOTICE = "notice"
     """`text`: what cannot wait for a step, such as that the camera dropped."""
+    ROLLED = "rolled"
+    """The run is followed by another: `run`, its name."""
     ENDED = "ended"
     """The run is over: `verdict`, `steps`, `problem`, `notes`, `stopped`; `live` of a camera."""
     REFUSED = "refused"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,9 +13,33 @@ from visup.agent.storage.atomic import write_whole
 from visup.agent.storage.journal_reader import Recording
 from visup.agent.storage.text_file import read_text_file
 from visup.percepts.video import Ending
+from visup.runs.unattended.next_run import ROLLED
 
 CURRENT = "current.json"
 STAMP = "%Y%m%dT%H%M%SZ"
+_RUN = re.compile(r"\d{8}T\d{6}Z(-\d+)?")
+_OVER = (Ending.COMPLETE.value, ROLLED)
+
+
+@dataclass(frozen=True, slots=True)
+class RunStore:
+    """Where the runs of one camera go.
+
+    Attributes:
+        folder: Of the camera.
+        fingerprint: As the camera is now.
+    """
+
+    folder: Path
+    fingerprint: str
+
+    def place(self) -> Path:
+        """The folder of a further run."""
+        return free_place(self.folder)
+
+    def go_on_with(self, run: Path) -> None:
+        """Have the next process go on with this run."""
+        note_run(run, self.fingerprint)
 
 
 def run_under_way(folder: Path, fingerprint: str) -> Path | None:
@@ -32,7 +58,7 @@ def run_under_way(folder: Path, fingerprint: str) -> Path | None:
     if begun_as != fingerprint or Path(name).name != name:
         return None
     try:
-        return None if Recording.open(run).facts().get("ended") == Ending.COMPLETE else run
+        return None if Recording.open(run).facts().get("ended") in _OVER else run
     except OutputError:
         return None
 
@@ -48,17 +74,55 @@ def begin_run(folder: Path, fingerprint: str, now: datetime | None = None) -> Pa
     Raises:
         OutputError: The folder cannot be written.
     """
+    run = free_place(folder, now)
+    note_run(run, fingerprint)
+    return run
+
+
+def is_run_name(name: str) -> bool:
+    """Whether a folder of this name is a run's.
+
+    >>> is_run_name("20261123T173355Z-2"), is_run_name("notes")
+    (True, False)
+    """
+    return bool(_RUN.fullmatch(name))
+
+
+def free_place(folder: Path, now: datetime | None = None) -> Path:
+    """A folder for a new run, named for the time in UTC; it is not made yet.
+
+    Args:
+        folder: Of the camera; made if it is not there.
+        now: The time.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
     stamp = (now or datetime.now(UTC)).astimezone(UTC).strftime(STAMP)
     names = (stamp if n == 1 else f"{stamp}-{n}" for n in range(1, 10**6))
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        run = next(p for name in names if not (p := folder / name).exists())
-        note = json.dumps({"run": run.name, "fingerprint": fingerprint}, indent=1)
-        write_whole(folder / CURRENT, note.encode() + b"\n")
+        return next(p for name in names if not (p := folder / name).exists())
     except OSError as fault:
-        raise OutputError(
-            f"the folder of a camera cannot be written: {fault.strerror}",
-            where=str(folder),
-            hint="check that the store exists, is writable and has room",
-        ) from fault
-    return run
+        raise _unwritable(folder, fault) from fault
+
+
+def note_run(run: Path, fingerprint: str) -> None:
+    """Note that it is this run that goes on.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    note = json.dumps({"run": run.name, "fingerprint": fingerprint}, indent=1)
+    try:
+        write_whole(run.parent / CURRENT, note.encode() + b"\n")
+    except OSError as fault:
+        raise _unwritable(run.parent, fault) from fault
+
+
+def _unwritable(folder: Path, fault: OSError) -> OutputError:
+    return OutputError(
+        f"the folder of a camera cannot be written: {fault.strerror}",
+        where=str(folder),
+        hint="check that the store exists, is writable and has room",
+    )

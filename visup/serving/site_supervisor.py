@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,17 +12,16 @@ from visup.percepts.video.waiting_clock import WaitingClock
 from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
 from visup.serving.camera_child import CameraChild
-from visup.serving.camera_supervisor import CameraState, CameraSupervisor, Child, Tell
+from visup.serving.camera_supervisor import CameraState, CameraSupervisor, Child
+from visup.serving.monitoring.status import SiteStatus
 from visup.serving.reports import CameraJob
 from visup.serving.service_manager import notify_manager
 from visup.serving.site.reading import read_site
-from visup.serving.site.records import Site
+from visup.serving.site.records import RetentionLimits, Site
+from visup.serving.site_log import SITE, SiteEvent, Tell
 
 TURN_S = 0.1
 """Seconds between two looks at all cameras."""
-
-SITE = "site"
-"""What messages that are about no camera are about."""
 
 
 class SiteSupervisor:
@@ -58,7 +57,8 @@ class SiteSupervisor:
         A camera whose name was given to other settings ends in good order and begins with these.
         """
         if site.store != self._site.store:
-            self._tell(SITE, "another store is used once the service is begun anew")
+            told = "another store is used once the service is begun anew"
+            self._tell(SITE, told, SiteEvent.NOT_RELOADED)
         wanted = {c.name: c for c in site.cameras}
         for name in [n for n in self.cameras if n not in wanted]:
             gone = self.cameras.pop(name)
@@ -75,6 +75,26 @@ class SiteSupervisor:
         """Watch nothing any more."""
         for one in self.cameras.values():
             one.stop(now)
+
+    def status(self, now: float) -> SiteStatus:
+        """What is told of it to those who ask from outside."""
+        return SiteStatus(now, tuple(one.status(now) for one in self.cameras.values()))
+
+    @property
+    def going_on(self) -> tuple[Path, ...]:
+        """Folders of the runs that are under way, or will be taken up."""
+        every = (*self.cameras.values(), *self._left)
+        return tuple(one.run for one in every if one.run)
+
+    @property
+    def limits(self) -> RetentionLimits:
+        """What is kept of the store, as the site file says now."""
+        return self._site.retention
+
+    @property
+    def calm(self) -> bool:
+        """Whether no camera is just being begun or ended."""
+        return all(one.state in _CALM for one in self.cameras.values())
 
     @property
     def over(self) -> bool:
@@ -93,12 +113,19 @@ class SiteSupervisor:
         return CameraSupervisor(camera, store, self._tell, self._start)
 
 
+_CALM = (CameraState.WATCHING, CameraState.OVER)
+
+Beside = Callable[[SiteSupervisor, float], None]
+"""What is done besides at every turn, given the time; it must not wait, and sees to how often is right."""
+
+
 def serve_site(
     site: Site,
     tell: Tell,
     stop: StopRequest,
     start: Callable[[CameraJob], Child] = CameraChild,
     clock: WaitingClock | None = None,
+    beside: Sequence[Beside] = (),
 ) -> ExitCode:
     """Watch a site until a stop is asked for, or every source was seen to its end.
 
@@ -108,6 +135,7 @@ def serve_site(
         stop: What signals ask for; a reload reads the site file again.
         start: Begins a process.
         clock: By what it goes.
+        beside: What is done besides.
 
     Returns:
         `GOOD`, or `NOT_RECORDED` when a process had to be killed as it did not close in time.
@@ -130,6 +158,8 @@ def serve_site(
                 stop.reload = False
                 _reload(supervisor, site.path, tell, clock.now())
             supervisor.turn(clock.now())
+            for act in beside:
+                act(supervisor, clock.now())
             notify_manager("WATCHDOG=1")
             clock.wait(TURN_S)
     return ExitCode.GOOD if supervisor.closed_well else ExitCode.NOT_RECORDED
@@ -139,9 +169,10 @@ def _reload(supervisor: SiteSupervisor, path: Path, tell: Tell, now: float) -> N
     try:
         site = read_site(path)
     except VisupError as fault:
-        tell(SITE, f"the file has mistakes, so that all stays as it was: {fault}")
+        told = f"the file has mistakes, so that all stays as it was: {fault}"
+        tell(SITE, told, SiteEvent.NOT_RELOADED)
         return
-    tell(SITE, "the file was read again")
+    tell(SITE, "the file was read again", SiteEvent.RELOADED)
     supervisor.reload(site, now)
 
 

@@ -22,6 +22,8 @@ from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.checkpoint import MAGIC, StateError, dump_state, load_state
 from visup.agent.storage.codec import pack_observation
+from visup.rules.formula.units import Span
+from visup.tasks.grammar.conditions import Name, PartName
 
 
 @settings(max_examples=40)
@@ -45,6 +47,13 @@ def test_containers_keep_their_kind_and_order_in_memory() -> None:
     assert told[1][1, 2] == {3}
     assert told[2].flags.f_contiguous
     assert (told[2] == columns).all()
+
+
+def test_names_of_tasks_are_kept_with_where_they_stand() -> None:
+    name = PartName("gripper", Name("arm", Span(1, 9, 1, 12)), Span(1, 1, 1, 12))
+    told = load_state(dump_state([name]))[0]
+    assert (told, type(told), told.machine, told.span) == (name, PartName, "arm", name.span)
+    assert told.machine.span == name.machine.span
 
 
 @dataclass
@@ -83,6 +92,7 @@ def forged(table: Any, root: Any = (0,)) -> bytes:
         [["enum", "visup.agent.model.records:Severity", 99]],
         [["array", 0]],
         [["named", "visup.agent.model.records:Health", []]],
+        [["text", "visup.agent.model.records:Severity", "x", []]],
         [["strange"]],
         [["tuple", [[7]]]],
         [["dict", [[[0], 1]]]],

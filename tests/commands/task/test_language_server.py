@@ -260,3 +260,23 @@ def test_rule_files_are_served_as_well(editor: Editor, tmp_path: Path) -> None:
     editor.change(uri, noted)
     assert editor.told[uri] == []
     assert "last known to be true" in editor.at("hover", uri, 1, 10)["contents"]["value"]
+
+
+RULES = """rule taken(a, b): info
+    when exists c: touching(b, c) and let x be speed(a) at touching(a, b): speed(b) > x  # x
+    say "{a} and {b}"
+rule other(a): info
+    when seen(a)
+    say "{a}"
+"""
+
+
+def test_names_of_a_rule_are_renamed_within_it(editor: Editor, tmp_path: Path) -> None:
+    uri = editor.write(tmp_path / "my.rules", RULES)
+    value = editor.at("rename", uri, 1, 42, newName="then")["changes"][uri]
+    assert [e["range"]["start"]["character"] for e in value] == [42, 86]
+    variable = editor.at("rename", uri, 0, 11, newName="arm")["changes"][uri]
+    assert [e["range"]["start"]["line"] for e in variable] == [0, 1, 1, 2]
+    assert editor.at("rename", uri, 1, 42, newName="a") is None
+    assert editor.at("rename", uri, 1, 42, newName="since") is None
+    assert editor.at("rename", uri, 1, 21, newName="near") is None  # a word of the language

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from itertools import islice
+
 import pytest
 
 from visup.tasks import parse_task
+from visup.tasks.grammar.nodes import Actors, AnyOrder, Course, Task, walk
 from visup.tasks.grammar.parser import read
+from visup.tasks.tools.simulate import traces
 
 MOUNT = "<mount(leg)> ::= converging(leg, top) touching(leg, top)\n"
 LONG = """actor leg_1 is leg
@@ -32,3 +37,53 @@ def test_what_is_said_of_the_kind_is_said_of_each() -> None:
     assert list(map(str, task.actors)) == ["actor leg_1 is red", "actor leg_2 is another red"]
     again = "actor leg_2 is green\n<t> ::= for each of 2 legs touching(leg, top)"
     assert {str(a) for a in read(again).actors} == {"actor leg_2 is green", "actor leg_1 is leg"}
+
+
+TAKE = "<take(part)> ::= coupled(arm, part) decoupled(arm, part)\n"
+
+
+@pytest.mark.parametrize(
+    ("loop", "least", "most"),
+    [
+        ("for each new part <take(part)>", 1, None),
+        ("(for each new part <take(part)>)*", 0, None),
+        ("for each new part <take(part)> at least 2 times", 2, None),
+        ("for each new part <take(part)> at least 2 times at most 5 times", 2, 5),
+        ("for each new part <take(part)> at most 5 times", 1, 5),
+    ],
+)
+def test_a_loop_with_something_new_says_how_many_rounds_it_has(
+    loop: str, least: int, most: int | None
+) -> None:
+    task = parse_task(f"<empty> ::= {loop} gone(arm)\n{TAKE}never touching(part, floor)")
+    (course,) = (c for c in walk(body_of(task)) if isinstance(c, AnyOrder))
+    assert (course.least, course.count, course.new) == (least, most, "part")
+    assert parse_task(str(task)) == task
+    assert {a.spare for a in task.actors} == {"part"}
+    assert {str(i) for i in task.invariants} == {
+        f"never touching(part_{k}, floor)" for k in range(1, 13)
+    }
+
+
+def test_the_rounds_of_a_loop_are_those_of_any_so_many_of_them() -> None:
+    loop = read(f"<t> ::= for each new part <take(part)> at most 2 times gone(arm)\n{TAKE}")
+    some = ", ".join(f"<take(part_{k})>" for k in range(1, 13))
+    twin = read(f"<t> ::= (any 1 of ({some}) | any 2 of ({some})) gone(arm)\n{TAKE}")
+    assert ordered(loop) == ordered(twin)
+
+
+def body_of(task: Task) -> Course:
+    body = task.stages[0].body
+    assert not isinstance(body, Actors)
+    return body
+
+
+def ordered(task: Task) -> set[str]:
+    """The first courses of a task, its parts numbered as they come."""
+    found = set()
+    for trace in islice(traces(task), 40):
+        text = " | ".join(step for moment in trace for step in moment)
+        for k, name in enumerate(dict.fromkeys(re.findall(r"part_\d+", text)), 1):
+            text = re.sub(rf"\b{name}\b", f"part {k}", text)
+        found.add(text)
+    return found

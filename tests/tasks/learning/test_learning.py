@@ -108,6 +108,32 @@ def test_what_was_learned_differs_little_from_what_one_writes() -> None:
     assert all(len(c) >= 4 for c in courses)
 
 
+def wiped(name: str, times: int, every_s: float = 3.0, seed: int = 0) -> RunTrace:
+    """The arm touches the tray again and again, then holds the part."""
+    rng, at, spells = Random(seed + times), 2.0, []
+    for _ in range(times):
+        spells.append(Spell("touching", at, at + 1.0, (ARM, TRAY)))
+        at += every_s * rng.uniform(0.9, 1.2)
+    spells += [Spell(n, at, 1e9, (ARM, PART)) for n in ("touching", "coupled")]
+    return run_of(name, spells, at + 8.0)
+
+
+def test_what_keeps_a_rhythm_however_often_is_learned_as_a_period() -> None:
+    learned = learn_task("wipe", [wiped(f"good{n}", n) for n in (5, 7, 6)])
+    assert "touching(arm, tray) every 1.5 s to 5.5 s  # every 2." in learned.text
+    assert set(learned.good.values()) == {Verdict.SUCCEEDED}
+    task = parse_task(learned.text)
+    assert judged(task, wiped("often", 9).minds).verdict is Verdict.SUCCEEDED
+    assert judged(task, wiped("slow", 5, 8.0).minds).verdict is not Verdict.SUCCEEDED
+
+
+def test_what_is_done_so_often_each_time_or_out_of_time_is_no_period() -> None:
+    always_five = learn_task("wipe", [wiped(f"good{n}", 5, seed=n) for n in range(3)])
+    uneven = learn_task("wipe", [wiped(f"good{n}", n, 2.5 * n - 9) for n in (5, 7, 6)])
+    assert " every " not in always_five.text.replace("# every", "")
+    assert " every " not in uneven.text
+
+
 def test_runs_with_nothing_in_common_teach_nothing() -> None:
     with pytest.raises(TaskError, match="nothing in common"):
         learn_task("t", [run_of("idle", ())])

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from visup.agent.model.errors import VisupError
 from visup.archive.asking.views import definitions, escaped, quoted
 from visup.archive.extra import imported
-from visup.archive.lake import TABLES_FOLDER, Lake
+from visup.archive.joining.manifest import FOLDER
+from visup.archive.lake import TABLES_FOLDER, Lake, LakeSnapshot
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -74,25 +75,49 @@ def open_database(lake: Lake, memory_gb: float = MEMORY_GB) -> Iterator[LakeData
         ExtraMissingError: DuckDB is not installed.
     """
     duckdb = imported("duckdb")
-    tables = (lake.path / TABLES_FOLDER).absolute()
+    folders = [(lake.path / name).absolute() for name in (TABLES_FOLDER, FOLDER)]
+    allowed = ", ".join(quoted(f"{each}/") for f in folders for each in (f, escaped(f)))
     offline = {"autoinstall_known_extensions": "false", "autoload_known_extensions": "false"}
     with duckdb.connect(":memory:", config=offline) as connection:
         try:
-            for statement in definitions(tables):
+            found = lake.snapshot()
+            _number_runs(connection, found)
+            for statement in definitions(found):
                 connection.execute(statement)
             for setting in (
                 "TimeZone = 'UTC'",
                 "enable_progress_bar = false",
                 f"memory_limit = '{memory_gb:g}GB'",
                 "temp_directory = ''",
-                f"allowed_directories = [{quoted(f'{tables}/')}, {quoted(f'{escaped(tables)}/')}]",
+                f"allowed_directories = [{allowed}]",
                 "enable_external_access = false",
                 "lock_configuration = true",
             ):
                 connection.execute(f"SET {setting}")
         except duckdb.Error as fault:
-            raise QueryError(f"the tables cannot be read ({fault})", where=str(tables)) from fault
+            raise QueryError(
+                f"the tables cannot be read ({fault})", where=str(lake.path)
+            ) from fault
         yield LakeDatabase(connection)
+
+
+def _number_runs(connection: Any, found: LakeSnapshot) -> None:
+    """Make the table of runs with their numbers in the index."""
+    arrow = imported("pyarrow")
+    parts = [
+        arrow.table(
+            {
+                "run": arrow.array(runs, arrow.string()),
+                "number": arrow.array(range(first, first + len(runs)), arrow.uint32()),
+                "own": arrow.array([own] * len(runs), arrow.bool_()),
+            }
+        )
+        for runs, first, own in found.numbered()
+    ]
+    connection.execute("CREATE SCHEMA lake_index")
+    connection.register("numbered", arrow.concat_tables(parts))
+    connection.execute("CREATE TABLE lake_index.runs AS SELECT * FROM numbered")
+    connection.unregister("numbered")
 
 
 def _told(fault: Exception) -> QueryError:

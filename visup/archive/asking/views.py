@@ -1,19 +1,25 @@
 """The tables of a lake as people ask for them: with the clip's name, the objects' names and durations.
 
 The tables as they stand in the files are in the schema `lake` (`lake.stages`, ...); these views are what a
-plain name means. Only rows of committed runs are in either.
+plain name means. Only rows of committed runs are in either. The schema `lake_index` is for visup itself: what
+the partitions hold beside the tables, and the same of runs that are not joined yet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
+from visup.archive.asking.stage_times import CLIP as _CLIP
+from visup.archive.asking.stage_times import stage_times
 from visup.archive.schema import TABLES
 from visup.rules.predicates.snapshot import RELATION_NAMES
 
-_CLIP = "regexp_replace(rtrim(r.source, '/\\'), '.*[/\\\\]', '') AS clip"
+if TYPE_CHECKING:
+    from visup.archive.lake import LakeSnapshot
+
 _STRETCH = 't."begin", t."end", t."end" - t."begin" AS seconds, t.open'
 _WHO = "list_transform(t.objects, lambda i: coalesce(n.names[i], 'object ' || i)) AS who"
 _NAMES = (
@@ -52,21 +58,7 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "stages": (
             "a time in which a stage had one status: stretches of several probabilities are joined, and"
             " `confidence` is their mean over time",
-            f"""
-            SELECT s.run, {_CLIP}, s.task, s.stage, s.status,
-                   min(s."begin") AS "begin", max(s."end") AS "end",
-                   max(s."end") - min(s."begin") AS seconds, bool_or(s.open) AS open,
-                   coalesce(sum(s.confidence * s.steps) / sum(s.steps), 0) AS confidence
-            FROM (
-                SELECT *, sum(turned) OVER (PARTITION BY run, task, stage ORDER BY "begin") AS part
-                FROM (
-                    SELECT *, (status IS DISTINCT FROM lag(status) OVER (
-                        PARTITION BY run, task, stage ORDER BY "begin"))::INT AS turned
-                    FROM lake.stages
-                )
-            ) s JOIN lake.runs r USING (run)
-            GROUP BY s.run, r.source, s.task, s.stage, s.status, s.part
-            """,
+            "SELECT * FROM lake_index.stage_times",
         ),
         "relations": (
             "a time in which a relation held (`truth` true) or was unknown, with the names `first` and"
@@ -94,17 +86,40 @@ RELATIONS = tuple(sorted({*RELATION_NAMES, "distance"} - {*VIEWS}))
 """Each relation is a view of its own: the times in which it held."""
 
 
-def definitions(tables: Path) -> Iterator[str]:
-    """The statements that make all views.
+_OWN = "SELECT * FROM read_parquet({files}) SEMI JOIN lake_index.own USING (run)"
+"""The rows of runs that are not joined."""
+_HELD = (
+    'SELECT o.number, t.relation, t.a, t.b, t."begin", t."end" FROM lake_index.own_relations t'
+    " JOIN lake_index.own o USING (run) WHERE t.truth = 'true'"
+)
+_MEANT = """
+    SELECT unnest(list_distinct(t.names || t.actors ||
+               list_filter(map_keys(r.cast_of), lambda k: list_has_any(t.names, r.cast_of[k])))) AS name,
+           o.number, t.object
+    FROM lake_index.own_objects t JOIN lake_index.own o USING (run)
+    JOIN (SELECT run, from_json(coalesce(actors, '{}'), '"MAP(VARCHAR, VARCHAR[])"') AS cast_of
+          FROM lake_index.own_runs) r USING (run)
+"""
+
+
+def definitions(found: LakeSnapshot) -> Iterator[str]:
+    """The statements that make all views; the table `lake_index.runs` (run, number, own) is there.
 
     Args:
-        tables: Folder of the tables of a lake.
+        found: What the lake holds.
     """
     yield "CREATE SCHEMA lake"
+    yield "CREATE VIEW lake_index.own AS SELECT run, number FROM lake_index.runs WHERE own"
     for name in TABLES:
-        rows = f"SELECT * FROM read_parquet({quoted(pattern(tables / name))})"
-        committed = "" if name == "runs" else " t SEMI JOIN lake.runs USING (run)"
-        yield f"CREATE VIEW lake.{name} AS SELECT * FROM ({rows}){committed}"
+        yield f"CREATE VIEW lake.{name} AS SELECT * FROM read_parquet({_files(found.files[name])})"
+        own = [f for f in found.files[name] if f.parent.parent.name == name]
+        rows = _OWN.format(files=_files([*own, found.files[name][0]]))
+        yield f"CREATE VIEW lake_index.own_{name} AS {rows}"
+    own_stages = f"({stage_times('lake_index.own_runs', 'lake_index.own_stages')})"
+    for name, rows in (("held", _HELD), ("meant", _MEANT), ("stage_times", own_stages)):
+        joined = found.index_files(name)
+        both = f"SELECT * FROM read_parquet({_files(joined)}) UNION ALL ({rows})"
+        yield f"CREATE VIEW lake_index.{name} AS {both if joined else rows}"
     for name, (_, select) in VIEWS.items():
         yield f"CREATE VIEW main.{name} AS {select}"
     for name in RELATIONS:
@@ -119,9 +134,9 @@ def quoted(text: str) -> str:
     return "'" + text.replace("'", "''") + "'"
 
 
-def pattern(folder: Path) -> str:
-    """All Parquet files below a folder, whatever it is called."""
-    return f"{escaped(folder.absolute())}/**/*.parquet"
+def _files(paths: Sequence[Path]) -> str:
+    """Files as DuckDB reads them, whatever they are called."""
+    return f"[{', '.join(quoted(escaped(path.absolute())) for path in paths)}]"
 
 
 def escaped(path: Path) -> str:

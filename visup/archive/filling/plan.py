@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from visup.agent.model.errors import VisupError
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.clips import Clip
+from visup.archive.filling.stores import StoredFile
 from visup.archive.identity import content_hash, run_key, settings_hash
 from visup.archive.lake import Lake
 from visup.archive.run_tables import Provenance
@@ -84,6 +86,7 @@ def make_plan(lake: Lake | None, clips: Iterable[Clip], settings: WatchSettings)
     Raises:
         VisupError: A file that the settings name cannot be read.
     """
+    there = frozenset(lake.runs() if lake else ())
     hashes: dict[str, str] = {}
     jobs: dict[str, Job] = {}
     present, same, failed = 0, 0, list[FailedClip]()
@@ -100,7 +103,7 @@ def make_plan(lake: Lake | None, clips: Iterable[Clip], settings: WatchSettings)
             continue
         if job.run in jobs:
             same += 1
-        elif lake is not None and lake.has(job.run):
+        elif job.run in there:
             present += 1
         elif lake is not None and Attempts(lake.path, job.run).exhausted:
             failed.append(put_aside(job))
@@ -147,12 +150,17 @@ def check_settings(jobs: Sequence[Job]) -> Iterator[str]:
 
 
 def _job(clip: Clip, settings: WatchSettings, by: str) -> Job:
-    content = content_hash(clip.source)
-    taken = clip.source.stat().st_mtime if clip.taken is None else clip.taken
+    content, made, size = _facts(clip.source)
+    taken = made if clip.taken is None else clip.taken
     key = run_key(content, by)
-    return Job(settings, Provenance(key, content, by, taken, clip.labels), _size(clip))
+    return Job(settings, Provenance(key, content, by, taken, clip.labels), size)
 
 
-def _size(clip: Clip) -> int:
-    files = clip.source.rglob("*") if clip.source.is_dir() else (clip.source,)
-    return sum(f.stat().st_size for f in files if f.is_file())
+def _facts(source: Path | StoredFile) -> tuple[str, float | None, int]:
+    """What tells the content of a clip apart, when it was made, and its size in bytes."""
+    if isinstance(source, StoredFile):
+        return source.content_hash, source.modified, source.bytes
+    content = content_hash(source)
+    files = source.rglob("*") if source.is_dir() else (source,)
+    size = sum(f.stat().st_size for f in files if f.is_file())
+    return content, source.stat().st_mtime, size

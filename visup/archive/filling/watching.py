@@ -14,6 +14,8 @@ from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.storage.journal_reader import Recording
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.plan import FailedClip, Job, put_aside
+from visup.archive.filling.stores import fetched, note_source
+from visup.archive.finding.beliefs import BeliefNotes
 from visup.archive.inputs import run_inputs
 from visup.archive.lake import Lake
 from visup.archive.run_tables import run_tables
@@ -83,7 +85,10 @@ def watch_job(lake: Lake, job: Job, watch: Watch = watch_into) -> ClipOutcome:
             return ClipOutcome(job.run, source, failure=put_aside(job))
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        watch(job.settings, folder)
+        settings = fetched(job.settings, folder)
+        watch(settings, folder)
+        if settings is not job.settings:
+            note_source(folder, job.settings)
         verdict, seconds = _committed(lake, job, folder)
     except Exception as fault:
         attempts.clear()
@@ -98,8 +103,9 @@ def _committed(lake: Lake, job: Job, folder: Path) -> tuple[str | None, float]:
     """Put a recorded run into the lake; its verdict and its seconds of video."""
     recording = Recording.open(folder)
     settings = recorded_settings(recording.facts(), str(recording.path))
-    tables = run_tables(recording, settings, job.provenance)
-    lake.commit(tables, recording, run_inputs(settings))
+    notes = BeliefNotes()
+    tables = run_tables(recording, settings, job.provenance, notes)
+    lake.commit(tables, recording, run_inputs(settings), notes.content())
     row = dict(zip(TABLES["runs"].names, tables["runs"][0], strict=True))
     return row["verdict"], row["seconds"]
 

@@ -52,9 +52,12 @@ class ConditionJudge:
 
     def __call__(self, step: Step) -> None:
         """Judge it after one step."""
+        self.judge(as_rules_see(step.mind))
+
+    def judge(self, mind: Mind) -> None:
+        """Judge it in a mind as rules see it, the next one of a run."""
         number = self.last.number + 1 if self.last else 0
-        self.last = StepTime(number, step.frame_index, step.time)
-        mind = as_rules_see(step.mind)
+        self.last = StepTime(number, mind.frame_index, mind.time)
         self.before = self.pattern.judge(mind, self.before)
         self.stretches.add(self.last, self._values(mind, self.before))
 

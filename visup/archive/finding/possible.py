@@ -38,10 +38,11 @@ HELD_S = SAMPLE_HOLD / TICKS + 0.1
 """By how much intervals are widened: a sample speaks for so much of what follows; and for rounding."""
 EVER = 1e12
 HELD = (
-    'held AS MATERIALIZED (SELECT run, relation, a, b, "begin", "end" FROM lake.relations'
-    " WHERE truth = 'true' AND relation IN ({names}))"
+    'held AS MATERIALIZED (SELECT number AS run, relation, a, b, "begin", "end" FROM lake_index.held'
+    " WHERE relation IN ({names}){known})"
 )
-"""Relations that held, those that a formula names: many small files are so read once."""
+"""Relations that held, those that a formula names, in the runs with somebody for every name: read once. Runs
+are numbers."""
 SYMMETRIC = frozenset(
     name for column in COLUMNS.each if column.rows[0] == column.rows[1] for name in column.names
 ) | {"coupled"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -15,16 +16,22 @@ from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
 from visup.archive.asking.database import LakeDatabase, QueryError
 from visup.archive.asking.views import quoted
+from visup.archive.finding.beliefs import read_minds, told_by_relations
 from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import read_pattern
 from visup.archive.finding.possible import HELD, PossibleTimes, possible_times
+from visup.archive.finding.task_search import TaskSearch
 from visup.archive.lake import Lake
+from visup.archive.parallel import each_run
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import load_rules
 from visup.rules.safety.expression import Expression
 from visup.runs.replay import replay
 from visup.runs.settings import WatchSettings
+from visup.tasks import load_tasks
 
+MANY_QUICK = 200
+"""Fewer runs that are looked into in a moment are done before other processes have begun."""
 _BY_ID = re.compile(r"object_(\d+)")
 
 
@@ -47,6 +54,10 @@ class FoundRun:
 
 class Search(Protocol):
     """What is looked for."""
+
+    @property
+    def quick(self) -> bool:
+        """Whether a run is looked into in a moment, without reasoning about it again."""
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """The runs in which it may be; in all others it is not.
@@ -71,6 +82,11 @@ class ConditionSearch:
     pattern: Expression
     unknown: bool = False
 
+    @property
+    def quick(self) -> bool:
+        """See `Search`."""
+        return told_by_relations(self.pattern)
+
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """See `Search`."""
         variables = self.pattern.rule.variables
@@ -85,7 +101,11 @@ class ConditionSearch:
     def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
         """See `Search`."""
         judge = ConditionJudge(self.pattern)
-        replay(recording, settings, tell=judge)
+        minds = read_minds(recording.path.parent) if self.quick else None
+        if minds is None:
+            replay(recording, settings, tell=judge)
+        for mind in minds or ():
+            judge.judge(mind)
         return tuple(h for h in judge.hits() if self.unknown or h.truth == Truth.TRUE)
 
 
@@ -100,6 +120,7 @@ class RulesSearch:
 
     file: Path
     rules: tuple[Rule, ...]
+    quick: bool = False
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """See `Search`."""
@@ -136,28 +157,35 @@ class RulesSearch:
 
 
 def read_search(text: str, *, unknown: bool = False) -> Search:
-    """What is looked for, from a condition or the name of a rules file.
+    """What is looked for, from a condition or the name of a rules file or a task file.
 
     Raises:
-        RuleError: It is neither.
+        RuleError: It is none of them.
         ManyErrors: It has several faults.
     """
-    if text.endswith(".rules"):
+    if text.endswith((".rules", ".task")):
         if unknown:
             raise SettingsError(
-                "alerts are raised or not", hint="leave out --unknown, or look for a condition"
+                "alerts are raised or not, and tasks carried out or not",
+                hint="leave out --unknown, or look for a condition",
             )
-        return RulesSearch(Path(text), load_rules(text))
+        if text.endswith(".rules"):
+            return RulesSearch(Path(text), load_rules(text))
+        load_tasks(text)  # what is wrong with it is told before the first run
+        return TaskSearch(Path(text))
     return ConditionSearch(read_pattern(text), unknown)
 
 
-def find(lake: Lake, search: Search, runs: Iterable[str]) -> Iterator[FoundRun]:
+def find(
+    lake: Lake, search: Search, runs: Iterable[str], workers: int | None = 0
+) -> Iterator[FoundRun]:
     """Look into runs.
 
     Args:
         lake: The lake.
         search: What is looked for.
         runs: Which runs; those that are possible are enough.
+        workers: Processes that share them; None for one for each core.
 
     Yields:
         Each run, also one without hits.
@@ -165,10 +193,16 @@ def find(lake: Lake, search: Search, runs: Iterable[str]) -> Iterator[FoundRun]:
     Raises:
         OutputError: A run is damaged.
     """
-    for run in runs:
-        recording, settings = lake.recorded(run)
-        hits = search.hits(recording, settings)
-        yield FoundRun(run, settings.source, lake.folder_of(run), hits)
+    wanted = list(runs)
+    if workers is None and search.quick and len(wanted) < MANY_QUICK:
+        workers = 0
+    yield from each_run(partial(_looked_into, lake, search), wanted, workers)
+
+
+def _looked_into(lake: Lake, search: Search, run: str) -> FoundRun:
+    recording, settings = lake.recorded(run)
+    hits = search.hits(recording, settings)
+    return FoundRun(run, settings.source, lake.folder_of(run), hits)
 
 
 def runs_of(
@@ -179,19 +213,22 @@ def runs_of(
     Args:
         database: The lake.
         times: When it may be; None for always.
-        who: Variable -> SELECT of `run` and `object`.
+        who: Variable -> SELECT of `run`, as a number, and `object`.
     """
     named = {v: f'"who_{v}"' for v in who}
     parts = [f"{named[v]} AS MATERIALIZED ({select})" for v, select in who.items()]
     if times:
-        parts.append(HELD.format(names=", ".join(map(quoted, times.relations))))
+        known = "".join(f" AND number IN (SELECT run FROM {table})" for table in named.values())
+        parts.append(HELD.format(names=", ".join(map(quoted, times.relations)), known=known))
     for variable, table in named.items():
         times = times and times.meant(variable, f"FROM {table}")
-    sql = f"SELECT run FROM ({times.sql if times else 'SELECT run FROM lake.runs'})"
+    sql = f"SELECT run FROM ({times.sql if times else 'SELECT number AS run FROM lake_index.runs'})"
     for table in named.values():
         sql = f"SELECT run FROM ({sql}) SEMI JOIN {table} USING (run)"
     first = f"WITH {', '.join(parts)} " if parts else ""
-    answer = database.ask(f"{first}SELECT DISTINCT run FROM ({sql}) ORDER BY run")
+    answer = database.ask(
+        f"{first}SELECT k.run FROM lake_index.runs k SEMI JOIN ({sql}) f ON f.run = k.number ORDER BY run"
+    )
     found: list[str] = answer["run"].to_pylist()
     return found
 
@@ -199,22 +236,17 @@ def runs_of(
 def objects_meant(variable: str) -> str | None:
     """The objects that a name may ever have stood for, as a SELECT; None for a name that is anybody's."""
     if by_id := _BY_ID.fullmatch(variable):
-        return f"SELECT run, object FROM lake.objects WHERE object = {by_id[1]}"
+        return (
+            "SELECT n.number AS run, o.object FROM lake.objects o JOIN lake_index.runs n USING (run)"
+            f" WHERE o.object = {by_id[1]}"
+        )
     if len(variable) == 1:
         return None
-    name, path = quoted(variable), quoted(f'$."{variable}"[*]')
-    return (
-        "SELECT o.run, o.object FROM lake.objects o JOIN lake.runs r USING (run)"
-        f" WHERE list_contains(o.names, {name}) OR list_contains(o.actors, {name})"
-        f" OR list_has_any(o.names, json_extract_string(r.actors, {path}))"
-    )
+    return f"SELECT number AS run, object FROM lake_index.meant WHERE name = {quoted(variable)}"
 
 
 def _nobody(database: LakeDatabase, name: str) -> QueryError:
-    known = database.ask(
-        "SELECT DISTINCT name FROM (SELECT unnest(names) AS name FROM lake.objects"
-        " UNION ALL SELECT unnest(actors) FROM lake.objects) ORDER BY name"
-    )
+    known = database.ask("SELECT DISTINCT name FROM lake_index.meant ORDER BY name")
     names = [n for n in known.column("name").to_pylist() if " " not in n]
     return QueryError(
         f"nobody in this lake was ever taken for '{name}'",

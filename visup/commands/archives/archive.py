@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from visup.archive.filling.pool_settings import PoolSettings
+from visup.archive.parallel import Workers
 from visup.commands.options import REPLAYED, Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import Option, WatchSettings
@@ -55,6 +56,13 @@ app = typer.Typer(no_args_is_help=True)
 
 
 @dataclass(frozen=True, slots=True)
+class ManyRuns:
+    """How many runs are looked into."""
+
+    workers: Workers = None
+
+
+@dataclass(frozen=True, slots=True)
 class FillOptions:
     """What else may be wanted of filling a lake."""
 
@@ -71,7 +79,8 @@ def run(
     sources: Annotated[
         list[str],
         typer.Argument(
-            metavar="SOURCE...", help="Clips, folders, patterns ('*.mp4'), or manifests (.csv)."
+            metavar="SOURCE...",
+            help="Clips, folders, patterns ('*.mp4'), URLs, manifests (.csv, .parquet).",
         ),
     ],
     into: Into,
@@ -86,6 +95,7 @@ def run(
     from visup.archive.filling.clips import clips_of
     from visup.archive.filling.filling import begin_anew, only_filler
     from visup.archive.filling.plan import make_plan
+    from visup.archive.joining.compacting import compact_if_worth_it
     from visup.archive.lake import MARK, Lake
     from visup.terminal.console import make_console
 
@@ -102,6 +112,7 @@ def run(
         todo = make_plan(lake, clips, settings)
         _print_plan(console, into, todo, pool.processes)
         result = _filled(console, lake, todo, pool)
+        compact_if_worth_it(lake)
     for text in _closing(result):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if result.failed else 0)
@@ -135,10 +146,59 @@ def add(
     raise typer.Exit(1 if failed else 0)
 
 
+@app.command("compact")
+def compact(
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    now: Annotated[
+        bool,
+        typer.Option("--now", help="Remove what is replaced at once; when nobody asks the lake."),
+    ] = False,
+) -> None:
+    """Join the files of many runs, so that questions to large lakes are answered in seconds.
+
+    What is replaced is removed by the next call, ten minutes later at the earliest: others may be reading it.
+    """
+    from visup.archive.filling.filling import only_filler
+    from visup.archive.joining import compacting
+    from visup.archive.lake import Lake
+    from visup.terminal.console import echo
+
+    found = Lake.open(lake)
+    with only_filler(found):
+        done = compacting.compact(found, grace_s=0.0 if now else compacting.GRACE_S)
+    ending = "" if done.partitions == 1 else "s"
+    said = f"Joined: {done.joined} runs; the lake has {done.partitions} partition{ending}."
+    gone = f" Files that were replaced went, of {done.tidied} runs." if done.tidied else ""
+    echo(f"{said}{gone}")
+
+
+@app.command("report")
+def report(
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The page (default: report.html in the lake)."),
+    ] = None,
+) -> None:
+    """Write a page about all runs: durations of stages by week and actor, drifts, how runs fail."""
+    from visup.archive.asking.database import open_database
+    from visup.archive.lake import Lake
+    from visup.archive.reporting.page import write_lake_page
+    from visup.archive.reporting.statistics import lake_statistics
+    from visup.terminal.console import echo
+
+    path = out or lake / "report.html"
+    with open_database(Lake.open(lake)) as database:
+        found = lake_statistics(database)
+    write_lake_page(found, lake, path)
+    echo(f"{path}: {found.runs} runs")
+
+
 @app.command("replay")
-@takes(WatchSettings, only=REPLAYED)
+@takes(WatchSettings, ManyRuns, only=(*REPLAYED, "workers"))
 def replay(
     setting: Given,
+    wanted: Given,
     lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
 ) -> None:
     """Reason again about all runs of a lake, with other rules, tasks or actors, and say what changes.
@@ -150,7 +210,7 @@ def replay(
     from visup.terminal.console import make_console
 
     console, summary, found = make_console(), ChangeSummary(), Lake.open(lake)
-    for one in changes(found, found.runs(), **setting):
+    for one in changes(found, found.runs(), **wanted, **setting):
         summary.take(one)
         if one.diff:
             console.print(_changed(one), soft_wrap=True, markup=False)

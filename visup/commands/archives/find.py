@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.archive.parallel import Workers
+from visup.commands.options import Given, takes
+from visup.runs.settings import Option
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from rich.console import Console
 
@@ -16,24 +21,37 @@ if TYPE_CHECKING:
     from visup.archive.finding.search import FoundRun
 
 
+@dataclass(frozen=True, slots=True)
+class FindOptions:
+    """Where is looked, and what becomes of what is found."""
+
+    unknown: Annotated[
+        bool, Option("Also when it was unknown; no run is left out then.", "--unknown")
+    ] = False
+    as_json: Annotated[bool, Option("Print hits as JSON, one per line.", "--json")] = False
+    scan_all: Annotated[
+        bool, Option("Look into every run, also where it cannot be.", "--scan-all")
+    ] = False
+    first: Annotated[
+        int | None, Option("Stop after so many runs with hits.", metavar="N", at_least=1)
+    ] = None
+    clips: Annotated[
+        Path | None, Option("Cut what is found out of the footage, as videos.", metavar="DIR")
+    ] = None
+    workers: Workers = None
+
+
+@takes(FindOptions)
 def find(
+    wanted: Given,
     lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
     what: Annotated[
         str,
         typer.Argument(
             metavar="CONDITION",
-            help="A condition of the rule language, several with `and then`, or a rules file.",
+            help="A condition of the rule language, several with `and then`, a rules or a task file.",
         ),
     ],
-    unknown: Annotated[
-        bool, typer.Option("--unknown", help="Also when it was unknown; no run is left out then.")
-    ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print hits as JSON, one per line.")
-    ] = False,
-    scan_all: Annotated[
-        bool, typer.Option("--scan-all", help="Look into every run, also where it cannot be.")
-    ] = False,
 ) -> None:
     """Find where in all runs of a lake a condition was true, judged as an agent would have.
 
@@ -46,21 +64,58 @@ def find(
     from visup.archive.lake import Lake
     from visup.terminal.console import make_console
 
-    found, console = Lake.open(lake), make_console()
-    search, runs = read_search(what, unknown=unknown), found.runs()
+    options, found, console = FindOptions(**wanted), Lake.open(lake), make_console()
+    search, runs = read_search(what, unknown=options.unknown), found.runs()
     with open_database(found) as database:
-        possible = search.possible_runs(database)
-    hits = hit_runs = 0
-    for each in look(found, search, runs if scan_all else possible):
-        _tell(console, each, as_json)
-        hits, hit_runs = hits + len(each.hits), hit_runs + bool(each.hits)
-    if not as_json:
-        count = len(runs) if scan_all else len(possible)
-        share = f" ({100 * count / len(runs):.0f} %)" if runs else ""
-        console.print(
-            f"Hits: {hits}, in {hit_runs} of {len(runs)} runs; looked into: {count}{share}."
+        possible = runs if options.scan_all else search.possible_runs(database)
+    told = _told(console, look(found, search, possible, options.workers), options)
+    if not options.as_json:
+        share = f" ({100 * told.runs / len(runs):.0f} %)" if runs else ""
+        left = (
+            "" if told.runs == len(possible) else f"; not looked into: {len(possible) - told.runs}"
         )
-    raise typer.Exit(0 if hits else 1)
+        console.print(
+            f"Hits: {told.hits}, in {told.hit_runs} of {len(runs)} runs;"
+            f" looked into: {told.runs}{share}{left}."
+        )
+    raise typer.Exit(0 if told.hits else 1)
+
+
+@dataclass(slots=True)
+class _Told:
+    """What was told so far."""
+
+    runs: int = 0
+    hit_runs: int = 0
+    hits: int = 0
+
+
+def _told(console: Console, found: Iterable[FoundRun], options: FindOptions) -> _Told:
+    """Tell each run, until there are enough."""
+    told = _Told()
+    for each in found:
+        _tell(console, each, options.as_json)
+        told.runs, told.hits = told.runs + 1, told.hits + len(each.hits)
+        told.hit_runs += bool(each.hits)
+        if each.hits and options.clips:
+            _cut(None if options.as_json else console, each, options.clips)
+        if told.hit_runs == options.first:
+            break
+    return told
+
+
+def _cut(console: Console | None, found: FoundRun, folder: Path) -> None:
+    """Cut the hits of a run out; footage that is gone is told, and does not stop the others."""
+    from visup.agent.model.errors import SourceError
+    from visup.archive.finding.clips import cut_hits
+    from visup.terminal.console import complain
+
+    try:
+        for path in cut_hits(found.clip, found.run, found.hits, folder):
+            if console:
+                console.print(f"  video: {path}", soft_wrap=True, markup=False, style="dim")
+    except SourceError as fault:
+        complain(str(fault))
 
 
 def _tell(console: Console, found: FoundRun, as_json: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +11,8 @@ from typer.core import TyperGroup
 from visup.runs.result import ExitCode
 
 if TYPE_CHECKING:
-    from visup.serving.camera_supervisor import Tell
     from visup.serving.site.checking import CameraCheck
+    from visup.serving.site_log import SiteLog
 
 SiteFile = Annotated[Path, typer.Argument(metavar="SITE.toml", help="The site file.")]
 
@@ -52,29 +51,22 @@ def run(
     process did not close in time.
     """
     from visup.runs.inputs.stop_signals import stop_signals
+    from visup.serving.service import serve
     from visup.serving.site.reading import read_site
-    from visup.serving.site_supervisor import serve_site
 
     site = read_site(site_file)
     with stop_signals(at_once=False, reload=True) as stop:
-        code = serve_site(site, _teller(as_json=as_json), stop)
+        code = serve(site, _log(as_json=as_json), stop)
     raise typer.Exit(code)
 
 
-def _teller(*, as_json: bool) -> Tell:
+def _log(*, as_json: bool) -> SiteLog:
     """What writes each message to standard error with the time, in UTC."""
-    from visup.agent.storage.wall_clock import utc_text
+    from visup.serving.site_log import SiteLog
     from visup.terminal.console import make_console
-    from visup.wording import escaped_json
 
     console = make_console(stderr=True, soft_wrap=True, markup=False)
-
-    def tell(camera: str, text: str) -> None:
-        now = utc_text(time.time())
-        record = {"time": now, "camera": camera, "text": text}
-        console.print(escaped_json(record) if as_json else f"{now} {camera}: {text}")
-
-    return tell
+    return SiteLog(console.print, as_json=as_json)
 
 
 @app.command()

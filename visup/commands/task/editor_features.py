@@ -15,6 +15,7 @@ from pygls.uris import to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
 from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
+from visup.commands.task.rule_names import rule_references, rule_rename_refused
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import TextFix, fix_of
@@ -100,10 +101,10 @@ def symbols(ls: LanguageServer, params: lsp.DocumentSymbolParams) -> list[lsp.Do
 
 
 def uses(ls: LanguageServer, params: lsp.ReferenceParams) -> list[lsp.Location]:
-    """All places of a file that mean the same stage, actor, zone or parameter."""
+    """All places of a file that mean the same stage, actor, zone or parameter, or variable of a rule."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     word = _word(document, params.position)
-    found = [] if word is None or holds_rules(document) else references(document.source, word)
+    found = [] if word is None else alike(document, word)
     return [lsp.Location(document.uri, span_range(document, w.span)) for w in found]
 
 
@@ -111,13 +112,22 @@ def prepare_rename(ls: LanguageServer, params: lsp.PrepareRenameParams) -> lsp.R
     """Where a name stands that can be renamed; None refuses."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     word = _word(document, params.position)
-    if word is None or holds_rules(document) or not references(document.source, word):
+    if word is None or not alike(document, word):
         return None
     return span_range(document, word.span)
 
 
-def rename_refused(text: str, word: NameUse, new: str) -> str | None:
+def alike(document: TextDocument, word: NameUse) -> list[NameUse]:
+    """All places of a document that mean the same as one of its words."""
+    find = rule_references if holds_rules(document) else references
+    return find(document.source, word)
+
+
+def rename_refused(document: TextDocument, word: NameUse, new: str) -> str | None:
     """Why a name cannot become another one, or None when it can."""
+    text = document.source
+    if holds_rules(document):
+        return rule_rename_refused(text, word, new)
     if not new.isidentifier():
         return f"`{new}` is no name: letters, digits and `_`, beginning with a letter"
     if any(w.name == new and w.kind == word.kind for w in names(text)):

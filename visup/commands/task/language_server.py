@@ -15,6 +15,7 @@ from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 from visup.agent.model.errors import SourceError, SourceLocation, VisupError
 from visup.commands.task.editor_features import (
     FEATURES,
+    alike,
     faults_of,
     holds_rules,
     rename_refused,
@@ -27,7 +28,7 @@ from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
 from visup.tasks.diagnostics.explain import explain
-from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at, references
+from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at
 from visup.version import __version__
 
 KINDS = {
@@ -160,13 +161,13 @@ def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[ls
 def _rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
     document, word = _word(ls, params)
     new = params.new_name.strip("<> ")
-    if word is None or holds_rules(document):
+    if word is None:
         return None
-    refused = rename_refused(document.source, word, new)
+    refused = rename_refused(document, word, new)
     if refused is not None:
         ls.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, refused))
         return None
-    places = references(document.source, word)
+    places = alike(document, word)
     edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
     return lsp.WorkspaceEdit({document.uri: edits}) if edits else None
 

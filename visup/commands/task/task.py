@@ -133,6 +133,21 @@ def textmate() -> None:
 
 
 @app.command()
+def syntax(
+    editor: Annotated[
+        Literal["vim", "emacs", "highlightjs"], typer.Argument(help="For which editor.")
+    ],
+    language: Annotated[
+        Literal["task", "rules"], typer.Option(help="Which of the two languages.")
+    ] = "task",
+) -> None:
+    """Write a syntax file for an editor; its words are those of the grammar."""
+    from visup.tasks.tools.syntaxes import EDITORS, SYNTAXES
+
+    echo(EDITORS[editor](SYNTAXES[language]), nl=False)
+
+
+@app.command()
 def lsp() -> None:
     """Serve editors over stdin and stdout by the Language Server Protocol (extra `lsp`)."""
     from visup.agent.model.errors import ExtraMissingError

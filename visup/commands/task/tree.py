@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from rich.markup import escape
 from rich.tree import Tree
 
-from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.nodes import Actor, Task
 from visup.tasks.tools.outline import Branch, Kind, outline
 
 STYLES: dict[Kind, str] = {
@@ -32,7 +35,7 @@ def task_tree(task: Task) -> Tree:
     tree = Tree(_text(whole))
     _grow(tree, whole)
     declared = (
-        ("actors", task.actors),
+        ("actors", _told(task.actors)),
         ("zones", task.zones),
         ("parameters", task.parameters),
         ("invariants", task.invariants),
@@ -43,6 +46,12 @@ def task_tree(task: Task) -> Tree:
             for node in nodes:
                 branch.add(escape(str(node)))
     return tree
+
+
+def _told(actors: Sequence[Actor]) -> tuple[Actor, ...]:
+    """Actors with one for all of whom a loop has another one in each round."""
+    kinds = (replace(a, name=a.spare) if a.spare else a for a in actors)
+    return tuple({a.name: a for a in reversed(tuple(kinds))}.values())[::-1]
 
 
 def _grow(tree: Tree, branch: Branch) -> None:

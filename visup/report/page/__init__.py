@@ -2,5 +2,5 @@
 
 Read in this order: `summary` (the run in sentences), `figures` and `distance_figures` (what Plotly
 draws), `task_trees`, `sections` (the parts of the page), `html` (the page itself, with `report.html`,
-`report.css` and `report.js` beside it). Public name: `html.write_report`.
+`report.css`, `figures.js` and `report.js` beside it). Public name: `html.write_report`.
 """

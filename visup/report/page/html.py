@@ -20,6 +20,8 @@ from visup.report.page.task_trees import courses
 from visup.report.records import RunData
 from visup.wording import printable, prose
 
+SCRIPTS = ("figures.js", "report.js")
+
 
 def write_report(run: RunData, path: Path) -> None:
     """Write the report of a run.
@@ -61,7 +63,7 @@ def report_page(run: RunData) -> str:
     drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
     own = files("visup.report.page")
     plotly = plotly_source() if drawn else ""
-    script = (own / "report.js").read_text(encoding="utf-8")
+    script = "".join((own / name).read_text(encoding="utf-8") for name in SCRIPTS)
     page = Template((own / "report.html").read_text(encoding="utf-8"))
     text = {
         "title": escape(title_of(run)),

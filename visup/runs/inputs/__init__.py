@@ -2,5 +2,6 @@
 
 Read `zones.py` and `plugins.py` (what is loaded), `presets.py` (what suits a kind of scene),
 `preflight.py` (what is known before the first frame) and `speed.py` (what a run takes of this machine);
-`run_sinks.py` is where alerts go, `stop_signals.py` how one stops it.
+`run_folder.py` is where it is recorded, `run_sinks.py` where alerts go, `audience.py` who follows it,
+`stop_signals.py` how one stops it.
 """

@@ -64,7 +64,8 @@ def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False)
     lost = unrecognisable(tasks, agent.mind.actors, agent.models)
     if not lost or answered or settings.behaviours or settings.plugins:
         return ()
-    needed = {a for t in tasks for a in task_actors(t) if not t.actor(a).optional}
+    cast = ((t.actor(a), a) for t in tasks for a in task_actors(t))
+    needed = {actor.spare or name for actor, name in cast if not actor.optional}
     if needed and needed <= set(lost):
         raise _refusal(settings, tasks, lost)
     return tuple(
@@ -90,9 +91,10 @@ def unrecognisable(
     lost: dict[str, tuple[str, ...]] = {}
     for task in tasks:
         for actor in task_actors(task):
-            models = actors.get(actor) or task.models(actor)
+            kind = task.actor(actor).spare or actor
+            models = actors.get(actor) or actors.get(kind) or task.models(actor)
             if models and not set(models) & set(known):
-                lost[actor] = models
+                lost[kind] = models
     return lost
 
 
@@ -131,4 +133,14 @@ def _refusal(
         if not settings.models
         else f"visup models list {settings.models}; then --actor {actor}=MODEL in place of "
         f"{' or '.join(models)}",
+    )
+
+
+def told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
+    """A sentence on each actor that is what was taught, other than its task declares."""
+    return tuple(
+        f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
+        "models that its task names."
+        for actor in actors
+        if actor not in given
     )

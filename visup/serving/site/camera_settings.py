@@ -13,7 +13,8 @@ from visup.percepts.video.looped import LOOP
 from visup.percepts.video.open import URL
 from visup.redaction import redacted
 from visup.runs.inputs.signals import BROKER
-from visup.runs.settings import RunOptions, WatchSettings
+from visup.runs.settings import EvidenceOptions, RunOptions, WatchSettings
+from visup.runs.unattended.quiet_hours import QuietHours
 from visup.serving.site.form import CameraTable, SiteTable
 from visup.serving.site.placeholders import filled
 from visup.serving.site.records import ProcessLimits, SiteCamera
@@ -62,7 +63,9 @@ def camera_of(
         realtime=one.realtime,
         patience_s=one.patience_s,
         attention=one.attention,
+        rest_s=one.rest_s or None,
     )
+    QuietHours.read(one.quiet, site.timezone)  # mistakes are told now
     options = _options(site, one, folder, environment)
     limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
     return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
@@ -84,7 +87,21 @@ def _options(
         webhook_headers=access.headers,
         webhook_key=access.key,
         closing_s=CLOSING_S,
+        evidence=_evidence(site, one),
+        run_s=3600.0 * site.recording.run_hours,
+        run_bytes=int(1e9 * site.recording.run_gb),
+        quiet=one.quiet,
+        timezone=site.timezone,
     )
+
+
+def _evidence(site: SiteTable, one: CameraTable) -> EvidenceOptions | None:
+    given = site.evidence
+    if not given.wanted:
+        return None
+    link = None if given.link is None else f"{given.link.rstrip('/')}/{one.name}"
+    free = 1e9 * site.retention.free_gb
+    return EvidenceOptions(given.before_s, given.after_s, given.memory_mb, link, free)
 
 
 def _access(site: SiteTable, folder: Path, environment: Mapping[str, str]) -> WebhookAccess:

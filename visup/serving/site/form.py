@@ -30,6 +30,57 @@ class RecordingTable(_Table):
         ge=1,
         description="Seconds between two checkpoints from which a camera goes on.",
     )
+    run_hours: float = Field(
+        default=24.0, gt=0, description="A run is followed by the next after so many hours."
+    )
+    run_gb: float = Field(
+        default=5.0, gt=0, description="So is one whose journal is larger, gigabytes."
+    )
+
+
+class EvidenceTable(_Table):
+    """Pictures and clips of alerts."""
+
+    wanted: bool = Field(default=True, description="Whether alerts have pictures and clips.")
+    before_s: float = Field(
+        default=8.0, ge=0, le=120, description="Seconds of a clip before its alert."
+    )
+    after_s: float = Field(default=8.0, ge=0, le=120, description="Seconds of a clip after it.")
+    memory_mb: float = Field(
+        default=32.0, ge=1, le=1000, description="Memory for frames before an alert, megabytes."
+    )
+    link: str | None = Field(
+        default=None,
+        pattern=r"^https?://",
+        description="Address under which the store can be read, for links; else they are names of files.",
+    )
+
+
+class RetentionTable(_Table):
+    """What is kept for how long; of a run that goes on nothing is deleted but evidence."""
+
+    days: float = Field(default=30.0, gt=0, description="Days that runs are kept.")
+    evidence_days: float = Field(
+        default=180.0, gt=0, description="Days that pictures and clips of alerts are kept."
+    )
+    store_gb: float | None = Field(
+        default=None, gt=0, description="Room that the store may take, gigabytes."
+    )
+    free_gb: float = Field(
+        default=1.0,
+        ge=0,
+        description="Room to be left on the disk, gigabytes: else the oldest evidence is deleted.",
+    )
+
+
+class MonitoringTable(_Table):
+    """Where /healthz, /readyz and /metrics are answered."""
+
+    listen: str = Field(
+        default="127.0.0.1:9464",
+        pattern=r"^$|^([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\]):[0-9]{1,5}$",
+        description="ADDRESS:PORT, this machine alone by default; empty for nowhere.",
+    )
 
 
 class WebhooksTable(_Table):
@@ -49,6 +100,10 @@ class LimitsTable(_Table):
         default=90.0, ge=1, description="Seconds without a step or a word of life."
     )
     start_s: float = Field(default=180.0, ge=5, description="Seconds until the first step.")
+    spare: bool = Field(
+        default=True,
+        description="Whether a process stands ready for whichever camera ends next (some 300 MB).",
+    )
 
 
 class CameraTable(_Table):
@@ -104,7 +159,17 @@ class CameraTable(_Table):
         ge=0,
         description="How long a stream that drops is tried again within a process.",
     )
+    rest_s: float = Field(
+        default=4.0,
+        ge=0,
+        le=60,
+        description="Seconds between two looks for motion while nothing in the picture changes; 0 for none.",
+    )
     attention: bool = Field(default=False, description="Match well-known objects less often.")
+    quiet: Names = Field(
+        default=(),
+        description="Hours in which only critical alerts go to sinks: 22:00-06:00, or Sat-Sun 00:00-24:00.",
+    )
     sinks: Names = Field(
         default=(), description="Where its alerts go besides the sinks of the site."
     )
@@ -127,6 +192,12 @@ class SiteTable(_Table):
     )
     sinks: Names = Field(default=(), description="Where alerts of all cameras go, as of `--sink`.")
     recording: RecordingTable = RecordingTable()
+    evidence: EvidenceTable = EvidenceTable()
+    retention: RetentionTable = RetentionTable()
+    monitoring: MonitoringTable = MonitoringTable()
+    timezone: str | None = Field(
+        default=None, description="Of quiet hours, such as Europe/Berlin; that of the machine."
+    )
     limits: LimitsTable = LimitsTable()
     webhooks: WebhooksTable = WebhooksTable()
     camera: tuple[CameraTable, ...] = Field(

@@ -15,15 +15,8 @@ from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.agent.storage.text_file import read_text_file
 from visup.serving.site.camera_settings import camera_of
-from visup.serving.site.form import (
-    MOST_CAMERAS,
-    CameraTable,
-    LimitsTable,
-    RecordingTable,
-    SiteTable,
-    WebhooksTable,
-)
-from visup.serving.site.records import Site
+from visup.serving.site.form import MOST_CAMERAS, CameraTable, RetentionTable, SiteTable
+from visup.serving.site.records import RetentionLimits, Site
 from visup.serving.site.toml_lines import locate, syntax_location
 
 LONGEST_VALUE = 80
@@ -54,7 +47,24 @@ def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
                 SettingsError(fault.what, where=where, expected=fault.expected, hint=fault.hint)
             )
     _refuse([*faults, *_miscounted(table, path), *_twins(table, text, path)])
-    return Site(path, path.resolve().parent / Path(table.store).expanduser(), tuple(cameras))
+    return Site(
+        path,
+        path.resolve().parent / Path(table.store).expanduser(),
+        tuple(cameras),
+        _retention(table.retention),
+        _listen(table.monitoring.listen),
+        table.limits.spare,
+    )
+
+
+def _retention(table: RetentionTable) -> RetentionLimits:
+    store = None if table.store_gb is None else table.store_gb * 1e9
+    return RetentionLimits(table.days, table.evidence_days, store, table.free_gb * 1e9)
+
+
+def _listen(address: str) -> tuple[str, int] | None:
+    host, colon, port = address.rpartition(":")
+    return (host.strip("[]"), int(port)) if colon else None
 
 
 def _text(path: Path) -> str:
@@ -128,11 +138,16 @@ _ALTERNATIVES = ("str", "tuple[str, ...]")
 
 def _wanted(fault: Mapping[str, Any]) -> str:
     if fault["type"] == "string_pattern_mismatch":
-        return "letters, digits, dot, hyphen and _, the first a letter or digit, at most 63"
+        return _PATTERNS[str(fault["loc"][-1])]
     said = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
     return _PLAIN.get(said, said.replace("a valid ", "a "))
 
 
+_PATTERNS = {
+    "name": "letters, digits, dot, hyphen and _, the first a letter or digit, at most 63",
+    "listen": "ADDRESS:PORT such as 127.0.0.1:9464, or nothing",
+    "link": "an http or https address",
+}
 _PLAIN = {
     "a valid string": "a text",
     "a valid array": "a list of texts",
@@ -147,17 +162,13 @@ def _quoted(value: object) -> str:
 
 
 def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
-    kinds: dict[str | int, type[BaseModel]] = {
-        "recording": RecordingTable,
-        "limits": LimitsTable,
-        "webhooks": WebhooksTable,
-        "camera": CameraTable,
-    }
-    return (
-        tuple(kinds.get(table[0], SiteTable).model_fields)
-        if table
-        else tuple(SiteTable.model_fields)
-    )
+    if not table:
+        return tuple(SiteTable.model_fields)
+    if table[0] == "camera":
+        return tuple(CameraTable.model_fields)
+    kind = SiteTable.model_fields[str(table[0])].annotation
+    known = isinstance(kind, type) and issubclass(kind, BaseModel)
+    return tuple(kind.model_fields if known else SiteTable.model_fields)  # type: ignore[union-attr]
 
 
 def _miscounted(table: SiteTable, path: Path) -> Iterator[VisupError]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from visup.runs.settings import RunOptions, WatchSettings
@@ -21,6 +21,23 @@ class ProcessLimits:
     memory_mb: float
     silent_s: float
     start_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class RetentionLimits:
+    """What is kept, and for how long.
+
+    Attributes:
+        days: That runs are kept.
+        evidence_days: That pictures and clips of alerts are kept, and what is needed to read them.
+        store_bytes: Room that the store may take, or None.
+        free_bytes: Room to be left on its disk.
+    """
+
+    days: float = 30.0
+    evidence_days: float = 180.0
+    store_bytes: float | None = None
+    free_bytes: float = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +68,14 @@ class Site:
         path: The site file.
         store: Folder of all runs; each camera has a folder of its name in it.
         cameras: In the order of the file.
+        retention: What is kept of the store.
+        listen: Address and port where is told how the service does, or None.
+        spare: Whether a process stands ready.
     """
 
     path: Path
     store: Path
     cameras: tuple[SiteCamera, ...]
+    retention: RetentionLimits = field(default_factory=RetentionLimits)
+    listen: tuple[str, int] | None = None
+    spare: bool = True

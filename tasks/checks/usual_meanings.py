@@ -1,0 +1,246 @@
+"""What mistakes of task files usually mean: one table, by their codes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from visup.agent.model.did_you_mean import closest
+from visup.rules.language.edits import NUMBERS
+from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
+
+New = str | Callable[[re.Match[str]], str]
+
+
+@dataclass(frozen=True, slots=True)
+class UsualMeaning:
+    """What a mistake usually means.
+
+    Attributes:
+        codes: Of the mistakes.
+        pattern: What it looks like, looked for on its line, at the caret first.
+        new: What is meant.
+    """
+
+    codes: tuple[str, ...]
+    pattern: re.Pattern[str]
+    new: New
+
+
+def _usual(codes: str, pattern: str, new: New) -> UsualMeaning:
+    return UsualMeaning(tuple(codes.split()), re.compile(pattern), new)
+
+
+SYNONYMS = {
+    "near": "converging", "approach": "converging", "approaching": "converging",
+    "attached": "coupled", "grasp": "coupled", "grasped": "held_by", "holding": "coupled",
+    "hold": "coupled", "above": "on", "upon": "on", "atop": "on", "connected": "coupled",
+    "released": "decoupled", "release": "decoupled",
+    "leaving": "diverging", "retreating": "diverging", "contact": "touching", "visible": "present",
+    "take": "coupled", "grab": "coupled", "pick": "coupled", "lift": "coupled", "carry": "coupled",
+    "bring": "converging", "move": "moving", "goto": "converging", "reach": "converging",
+    "put": "decoupled", "place": "decoupled", "drop": "decoupled", "leave": "diverging",
+    "touch": "touching", "wait": "present", "push": "touching", "insert": "touching",
+    "left": "gone", "away": "gone", "in": "inside", "separate": "apart", "moving_apart": "diverging",
+}  # fmt: skip
+OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
+             "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
+KEYWORD = (
+    r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|pauses|when|any|order|already|each"
+    r"|of)"
+)
+SIGN = r"begins|ends|fails|progresses|pauses"
+MEANT = "|".join(SIGNS_MEANT)
+NAME = r"[^\W\d]\w*"
+CALL = rf"{NAME}\s*\([^()]*\)"
+PARTS = rf"(?:{CALL}|<[^<>]*>)"
+TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"
+
+OFTEN = {"once": "1 time", "twice": "2 times", "thrice": "3 times"}
+PREFIXES = ("already", "task", "never", "always")
+
+
+def _listed(word: str, stages: str) -> str:
+    """Stages in a list behind a word: `any order (<a>, <b>)`."""
+    return f"{word} ({', '.join(stages.split())})"
+
+
+def _action_meant(name: str) -> str:
+    """What everyday speech says, by the whole of a name or a part of it; else the name."""
+    return next((SYNONYMS[p] for p in (name, *name.split("_")) if p in SYNONYMS), name)
+
+
+USUAL = (
+    _usual(
+        "E101 E103 E107 E115 E116 E119 E132 E134",
+        rf"\b(?:{'|'.join(NUMBERS)})\b",
+        lambda m: NUMBERS[m[0]],
+    ),
+    _usual("E101 E103 E119", rf"\b({KEYWORD})\b", lambda m: m[1].lower()),
+    _usual("E101 E103 E119", rf"(?i)\b({KEYWORD})\b", lambda m: m[1].lower()),
+    _usual("E101 E219 E103", rf"\(\s*({NAME})\s*;\s*({NAME})\s*\)", r"(\1, \2)"),
+    _usual("E238", rf"\bevery\s+({TIME})\s+to\s+({TIME})", r"every \2 to \1"),
+    _usual("E238", r"between\s+([\d.]+\s*\S+)\s+and\s+([\d.]+\s*\S+)", r"between \2 and \1"),
+    _usual("E103", rf"\bnot\s+({NAME})(?=\s*\()", lambda m: OPPOSITES.get(m[1], m[1])),
+    _usual("E103 E127", rf"\b(?:historically|always|once|eventually|globally|finally|next)\s+(?={CALL})", ""),
+    _usual("E103", rf"\b({NAME})(?=\s+(?:{CALL}|<))", lambda m: closest(m[1], PREFIXES) or m[1]),
+    _usual("E103", rf"^\s*({NAME})(?=\s*::=)", r"<\1>"),
+    _usual("E103", rf"(?<![<\w])({NAME})(?![\w>(])", r"<\1>"),
+    _usual("E102 E202", r"(?<=>)\s*(?:::\s*=|: :=|:=|=|->|→|::|:|=>|:==|<-)\s*", " ::= "),
+    _usual("E101", rf"<({NAME})>\s*\(([^()]*)\)", r"<\1(\2)>"),
+    _usual("E101 E134", r"\b(any\s+\d+\s+of)\s+((?:<[^>]*>\s*){2,})", lambda m: _listed(m[1], m[2])),
+    _usual("E101", r"(between\s+[\d.]+\s*\S*?)\s*(?:,|to|-|\.\.)\s*([\d.]+)", r"\1 and \2"),
+    _usual("E101", r"\bon\s+(?:failure|error)\s+(?!of)", "on failure of "),
+    _usual("E101 E103 E219", r"\bon\s+(?:fail(?:ing|s|ed)?|errors?)\s+of\b", "on failure of"),
+    _usual("E219", rf"\b({NAME})\s+({NAME})\s+(?:with|and|to)\s+({NAME})\b", r"\1(\2, \3)"),
+    _usual("E103", r"\b(?:each|all)\s+of\s*(?=\()", ""),
+    _usual("E101", r"\b(on\s+failure\s+of\s+<[^>]*>)\s*(?!:)", r"\1: "),
+    _usual("E101", rf"\b(?:exists|forall|some|all)\s+{NAME}\s*:\s*", ""),
+    _usual("E101", r"\b(?:rising|falling|once|previous)\s*\((.*)\)", r"\1"),
+    _usual("E101 E103", rf"({CALL})\s+(for\s+{TIME})(?=\s+(?:and|or)\b)", r"(\1 \2)"),
+    _usual("E101", rf"(\s+when\s+.*?)\s+(for\s+{TIME})\s+((?:and|or)\s+[^\n]*)", r"\1 \3 \2"),
+    _usual("E101 E228", rf"({CALL})\s*={{1,3}}\s*(\d)", r"\1 <= \2"),
+    _usual("E101", rf"({CALL})\s*!=\s*(\d)", r"\1 > \2"),
+    _usual("E101", r"<=>|<->|->|=>", " "),
+    _usual("E101 E103 E117 E119 E135", r",\s*,", ","),
+    _usual("E101 E119 E103", r"\b(any\s+\d+)\s*(?=\()", r"\1 of "),
+    _usual("E101 E115", rf"\b(for\s+each\s+{NAME}\s+(?:of|in))\s+({NAME}(?:\s*,\s*{NAME})+)\s+", r"\1 (\2) "),
+    _usual("E101 E119", r"\bany\s+of\s*(?=\()", "any 1 of "),
+    _usual("E101 E103",
+           r"\b(?:from|in|within)\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|\.\.)\s*([\d.]+\s*[a-z%/]+)",
+           r"between \1 and \2"),
+    _usual("E127 E134", rf"\brepeat\s+({PARTS})\s+until\s+({PARTS})", r"\1+ \2"),
+    _usual("E101 E103 E134", r"\b(?:maximum|max|up\s+to|no\s+more\s+than)\s+(\d+)\s+times?\b",
+           r"at most \1 times"),
+    _usual("E101 E103 E134", r"\b(?:minimum|min|no\s+(?:less|fewer)\s+than)\s+(\d+)\s+times?\b",
+           r"at least \1 times"),
+    _usual("E119", r"\s*,(?=\s)", ""),
+    _usual("E119", r"\band\b", "&"),
+    _usual("E119", r"\bor\b", "|"),
+    _usual("E119", r"\b(?:then|next|before|after|and then)\b\s*", ""),
+    _usual("E110", r"$", ")"),
+    _usual("E110", rf"({NAME}\s*\([^()&|<>]*)$", r"\1)"),
+    _usual("E111", r"\)(?=[^)]*$)", ""),
+    _usual("E112", r"\[([^\[\]]*)\]", r"(\1)?"),
+    _usual("E112", r"\{([^{}]*)\}", r"(\1)*"),
+    _usual("E114", r"\s*[|&]\s*$", ""),
+    _usual("E114", r"([|&])\s*[|&]", r"\1"),
+    _usual("E114", r"(::=)\s*[|&]", r"\1"),
+    _usual("E116", r"\b((?:for|within|after|every)\s+[\d.]+)\b(?!\s*\w)", r"\1 s"),
+    _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 px"),
+    _usual("E116", r"([<>]=?\s*[\d.]+)(?!\s*[\w%.])", r"\1 s"),
+    _usual("E116", r"\bsignal\(\s*(\w+)\s*,[^()]*\)", r"signal(\1)"),
+    _usual("E228 E223", rf"<\s*({NAME})\s*$", r"<\1>"),
+    _usual("E116", r"(\d)(?!\s*[\w%.])", r"\1 px"),
+    _usual("E115", r"\b(for|within|after|every)\s+-\s*([\d.]+)", r"\1 \2"),
+    _usual("E218 E226", r"(\d)\s*m\b", r"\1 min"),
+    _usual("E115", r"\bfor\s+(?:each|all|every)\s+of\s*(\([^()]*\))", r"for each one of \1"),
+    _usual("E115", r"\bfor\s+(?:all|every)\s+(?=\w+\s+(?:of|in)\b)", "for each "),
+    _usual("E115 E101", r"\b(for\s+each\s+\w+)\s+in\b", r"\1 of"),
+    _usual("E115", r"\b(every)\s*$", r"\1 5 s"),
+    _usual("E115", r"\s*\b(?:for|within|after)\s*$", ""),
+    _usual("E115", r"\b(for|within|after)\b", r"\1 5 s"),
+    _usual("E120", r"\s*[.;]\s*$", ""),
+    _usual("E121", r"//|--|%|/\*", "#"),
+    _usual("E122", r"&&|\|\|", lambda m: m[0][0]),
+    _usual("E124", rf"\bactor\s+({NAME})\s+(?=\w)(?!is\b)", r"actor \1 is "),
+    _usual("E124", rf"\bactor\s+({NAME})\s*=\s*", r"actor \1 is "),
+    _usual("E124", rf"\bactor\s+({NAME})\s+is\s*$", r"actor \1 is \1"),
+    _usual("E130", r"\binclude\s+([\w./-]+)", r'include "\1"'),
+    _usual("E131", rf"\bzone\s+({NAME})\b.*$", r"zone \1 is (100, 50) (300, 50) (300, 200)"),
+    _usual("E132", rf"\bparameter\s+({NAME})\s*(?:=|:|:=)?\s*(?=\d)", r"parameter \1 is "),
+    _usual("E201", rf"\bclosed\(\s*({NAME})\s*\)", r"openness(\1) < 10 %"),
+    _usual("E201", rf"\b(?:open|opened)\(\s*({NAME})\s*\)", r"openness(\1) > 20 %"),
+    _usual("E127", rf"\bperiodic\(\s*({CALL})\s*,\s*({TIME}(?:\s+to\s+{TIME})?)\s*\)", r"\1 every \2"),
+    _usual("E127", r"\s*\bperiodically\b", " every 5 s"),
+    _usual("E101", rf"\bevery\s+({TIME}(?:\s+to\s+{TIME})?)\s+({CALL})", r"\2 every \1"),
+    _usual("E101", r"\beach(?=\s+\d)", "every"),
+    _usual("E101 E119 E116", r"(every [\d.]+)\s*\w*\s*(?:and|or|,|-|\.\.)\s*([\d.]+)\s*(\w+)",
+           r"\1 \3 to \2 \3"),
+    _usual("E208", r"\s*\bpauses\s+when\b.*$", ""),
+    _usual("E133", rf"\b({SIGN})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
+    _usual("E133", rf"\b({SIGN})\s+(?={NAME}\()", r"\1 when "),
+    _usual("E133", rf"\b({MEANT})\s+(?:when|if|while|on)\b", lambda m: f"{SIGNS_MEANT[m[1]]} when"),
+    _usual("E133", rf"\b({MEANT})\s+(?={NAME}\()", lambda m: f"{SIGNS_MEANT[m[1]]} when "),
+    _usual("E134", r"\b(at\s+(?:least|most)\s+\d+)\b(?!\s*times?)", r"\1 times"),
+    _usual("E134", r"\b(at\s+(?:least|most))\s+(once|twice|thrice)\b",
+           lambda m: f"{m[1]} {OFTEN[m[2]]}"),
+    _usual("E134", r"\btwice\b", "at least 2 times at most 2 times"),
+    _usual("E134", r"\b(?:thrice|three times)\b", "at least 3 times at most 3 times"),
+    _usual(
+        "E134",
+        rf"\brepeat\s+(\d+)\s*(?:times|x)?\s*(?:of\s+)?({CALL}|<[^>]*>)",
+        r"\2 at least \1 times at most \1 times",
+    ),
+    _usual(
+        "E134", r"\brepeat(?:ed)?\s+(\d+)(?:\s*(?:times|x))?", r"at least \1 times at most \1 times"
+    ),
+    _usual("E134", rf"\brepeat(?:edly)?\s+({CALL}|<[^>]*>)", r"\1+"),
+    _usual("E134", r"\b(\d+)\s*(?:times|x)\b", r"at least \1 times at most \1 times"),
+    _usual("E135", r"\bin\s+(?=any\s+order)", ""),
+    _usual("E135 E101", rf"\b(any\s+order|any\s+\d+\s+of)\s+({PARTS}(?:\s*(?:,|and|or)\s*{PARTS})+)",
+           lambda m: f"{m[1]} ({', '.join(re.findall(PARTS, m[2]))})"),
+    _usual("E135", rf"\b(any\s+order|any\s+\d+\s+of)\s*\(\s*({PARTS}(?:\s+{PARTS})+)\s*\)",
+           lambda m: f"{m[1]} ({', '.join(re.findall(PARTS, m[2]))})"),
+    _usual("E101 E103 E115", r"\bfor\s+(?:each|every|any)\s+(?:other|next|another)\s+", "for each new "),
+    _usual("E101 E115", rf"\bfor\s+each\s+new\s+(?={NAME}\s*\(([^()]*,)?\s*({NAME})\s*\))",
+           r"for each new \2 "),
+    _usual("E101 E115", rf"\bfor\s+each\s+(?:of\s+)?({NAME}(?:\s*,\s*{NAME})+)\s+", r"for each one of (\1) "),
+    _usual("E101 E119", r"\b(every|between|after)\s+([\d.]+)\s*(to|and)\s*([\d.]+)\s*([a-z%][\w/]*)",
+           r"\1 \2 \5 \3 \4 \5"),
+    _usual("E101 E116", r"\bfor\s+([\d.]+)\s*(?:[a-z]+\s*)?(?:to|-)\s*([\d.]+)\s*([a-z]+)",
+           r"for \1 \3 within \2 \3"),
+    _usual("E101 E103", rf"\b(?:wait|pause|delay)(?:\s+for)?\s+({TIME})\s*({PARTS})", r"\2 after \1"),
+    _usual("E101 E103 E119", rf"({PARTS})\s+optional(?:ly)?\b", r"\1?"),
+    _usual("E101 E103 E119", rf"\boptional(?:ly)?\s+({PARTS})", r"\1?"),
+    _usual("E124", rf"\bactor\s+({NAME})\s+(?:are|was|means|equals|be)\b", r"actor \1 is"),
+    _usual("E124", r"\b(is|and)\s+(largest|smallest|leftmost|rightmost|highest|lowest)\b", r"\1 the \2"),
+    _usual("E115 E116 E127", rf"\b(for|within|after)\s+(?:[a-z]+\s+){{1,3}}(?={TIME})", r"\1 "),
+    _usual("E115 E101", r"\bfor\s+(?:every|any|all)\s+new\s+", "for each new "),
+    _usual("E115 E101", r"\b(for\s+each\s+new\s+\w+)\s*[:,]", r"\1 "),
+    _usual("E135", r"\b(any\s+order)\s+((?:<[^>]*>\s*){2,})", lambda m: _listed(m[1], m[2])),
+    _usual("E204", rf"^\s*<{NAME}[^>]*>\s*::=.*$", ""),
+    _usual("E127 E101", rf"\b(after\s+{TIME})\s*(?:until|till|up\s+to|and|-)\s*({TIME})", r"\1 to \2"),
+    _usual("E127 E101",
+           r"\b(?:in\s+case\s+of|upon|after|if|when)\s+(?:a\s+)?(?:failure|error)\s+of\b", "on failure of"),
+    _usual("E101 E124 E103", r"\bwhat\s+(?:comes|came|arrives|entered|appears)(?:\s+in)?\s+(from)\b",
+           r"what enters \1"),
+    _usual("E101 E124 E103", r"\bwhat\s+(?:moved|starts)\s+first\b", "what moves first"),
+    _usual("E101 E124 E103", r"\bwhat\s+(?:stands|stays|lies|is\s+at\s+rest)\b(?:\s+still)?", "what rests"),
+    _usual("E101 E124 E103", r"\bmost\s+(left|right)\b", r"\1most"),
+    _usual("E127", rf"\s*\b(?:until|unless|while|since)\s+({CALL})", r" ends when \1"),
+    _usual("E127", rf"\b(?:if)\s+({CALL})\s*(?:then)?", r"\1"),
+    _usual("E108", r"<\s*([^<>]+?)\s*>", lambda m: f"<{re.sub(r'[^0-9a-zA-Z_]+', '_', m[1])}>"),
+    _usual("E107", rf"<({NAME})(?![\w>])", r"<\1>"),
+    _usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: _action_meant(m[1].lower())),
+    _usual("E201", rf"\b{NAME}(?=\s*\(\s*{NAME}\s*\))", "moving"),
+    _usual("E202", rf"<({NAME})>\s*", ""),
+    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*\)", r"\1(\2, other)"),
+    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),
+    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,[^()]*\)", r"\1(\2)"),
+    _usual("E206", rf"<({NAME})>\s*::=\s*<\1>\s*([^\n|]+)", r"<\1> ::= \2 <\1>?"),
+    _usual("E211", rf"\b({NAME})\(\s*({NAME})\s*,\s*\2\s*\)", r"\1(\2, other)"),
+    _usual("E218", r"\b(?:seconds?|secs?|sec)\b", "s"),
+    _usual("E218", r"\b(?:minutes?|mins|m)\b", "min"),
+    _usual("E218", r"\b(?:pixels?|pix)\b", "px"),
+    _usual("E218", r"\b(?:hours?|hrs?)\b", "h"),
+    _usual("E218", r"\bpercent\b", "%"),
+    _usual("E219", rf"\b({NAME})\s+({NAME}),?\s+({NAME})\b", r"\1(\2, \3)"),
+    _usual("E219", rf"\b(never|always)\s+({NAME})\s+({NAME})", r"\1 moving(\3)"),
+    _usual("E219", rf"\b({NAME})\s+({NAME})\s+({NAME})\b", r"\2(\1, \3)"),
+    _usual("E223", rf"\b(for|within|after|every)\s+{NAME}", r"\1 5 s"),
+    _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px"),
+    _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 s"),
+    _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px/s"),
+    _usual("E227", rf"({CALL})", r"\1 < 5 px"),
+    _usual("E227", rf"({CALL})", r"\1 < 5 s"),
+    _usual("E227", rf"({CALL})", r"\1 < 5 px/s"),
+    _usual("E229", rf"\b(?:inside|outside|reaching)\(\s*({NAME})\s*,\s*({NAME})\s*\)", r"touching(\1, \2)"),
+    _usual("E117", rf"\(\s*({NAME})\s+({NAME})\s*\)", r"(\1, \2)"),
+    _usual("E117", r",\s*\)", ")"),
+    _usual("E118", rf"\b({NAME})\s*\(\s*\)", r"\1(one, other)"),
+    _usual("E113", rf"<\s*({CALL})\s*>", r"\1"),
+    _usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
+)  # fmt: skip
+"""In the order in which they are tried."""

@@ -1,0 +1,186 @@
+"""Runs whose files are joined are the same runs: rows, answers, hits; whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.archive.recordings import recorded
+from tests.cli import Call, caller
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.atomic import replacing
+from visup.agent.storage.journal_reader import Recording
+from visup.archive.asking.database import open_database
+from visup.archive.asking.views import RELATIONS, VIEWS
+from visup.archive.finding.search import read_search
+from visup.archive.inputs import run_inputs
+from visup.archive.joining import compacting
+from visup.archive.joining.compacting import compact
+from visup.archive.joining.manifest import FOLDER, MANIFEST, read_manifest
+from visup.archive.lake import Lake
+from visup.archive.run_tables import Provenance, RunTables, run_tables
+from visup.archive.schema import TABLES
+from visup.runs.resume import recorded_settings
+from visup.runs.settings import WatchSettings
+
+pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
+pytest.importorskip("duckdb", reason="needs the extra `cluster`")
+
+DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
+KEYS = tuple(f"{n:02x}" * 16 for n in range(5))
+SEARCHES = (
+    "converging(arm, satellite) and then touching(arm, satellite)",
+    "touching(a, object_2) within 1 s and not close_to(a, b)",
+    "diverging(spartan, arm)",
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, RunTables]:
+    recording = recorded(tmp_path_factory.mktemp("run"), DOCK)
+    told = recorded_settings(recording.facts(), "")
+    return recording, run_tables(recording, told, Provenance("", "s", "t", 1e9, {"gripper": "new"}))
+
+
+def add(lake: Lake, run: tuple[Recording, RunTables], *keys: str) -> Lake:
+    """Commit runs that differ in their key alone; the last one has no relations."""
+    recording, tables = run
+    for key in keys:
+        own: dict[str, Any] = {t: [(key, *row[1:]) for row in rows] for t, rows in tables.items()}
+        if key == KEYS[-1]:
+            own["relations"] = own["alerts"] = []
+        lake.commit(own, recording, run_inputs(DOCK))
+    return lake
+
+
+@pytest.fixture(scope="module")
+def loose(
+    tmp_path_factory: pytest.TempPathFactory, run: tuple[Recording, RunTables]
+) -> tuple[dict[str, Any], Lake]:
+    """A lake whose runs are not joined, and what it tells."""
+    lake = add(Lake.create(tmp_path_factory.mktemp("loose") / "lake"), run, *KEYS)
+    return told(lake), lake
+
+
+def told(lake: Lake) -> dict[str, Any]:
+    """All that a lake tells: its rows, what every view answers, and where conditions may be."""
+    found: dict[str, Any] = {name: list(lake.rows(name)) for name in TABLES}
+    with open_database(lake) as database:
+        for view in (*VIEWS, *RELATIONS[:3], *(f"lake.{name}" for name in TABLES)):
+            rows = database.ask(f"SELECT * FROM {view}").to_pylist()
+            found[f"view {view}"] = sorted(json.dumps(r, default=str) for r in rows)
+        for text in SEARCHES:
+            found[text] = read_search(text).possible_runs(database)
+    return {**found, "keys": lake.runs(), "has": [lake.has(key) for key in KEYS]}
+
+
+def test_a_joined_lake_tells_the_same(
+    tmp_path: Path, run: tuple[Recording, RunTables], loose: tuple[dict[str, Any], Lake]
+) -> None:
+    lake = add(Lake.create(tmp_path / "lake"), run, *KEYS[:3])
+    assert compact(lake, now=1e9).joined == 3
+    add(lake, run, *KEYS[2:])  # one again, which is there
+    half = told(lake)
+    assert compact(lake, now=1e9 + 1, grace_s=0.0).tidied == 5
+    assert half == told(lake) == loose[0]
+    assert not [f for name in TABLES for f in lake.files(name) if f.stem in KEYS]
+    assert len(list((lake.path / FOLDER).iterdir())) == 1  # the first was small, and went into it
+    assert compact(lake).joined == 0
+
+
+@settings(max_examples=3, deadline=None)
+@given(st.permutations(KEYS[:4]), st.integers(1, 3), st.integers(1, 3))
+def test_the_same_runs_make_the_same_partitions(
+    tmp_path_factory: pytest.TempPathFactory,
+    run: tuple[Recording, RunTables],
+    keys: list[str],
+    first: int,
+    most: int,
+) -> None:
+    """Whatever the order in which they came; and no partition is larger than it may be."""
+    lake = Lake.create(tmp_path_factory.mktemp("order") / "lake")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compacting, "MOST_RUNS", most)
+        for part in (keys[:first], keys[first:]):
+            compact(add(lake, run, *part))
+        parts = read_manifest(lake.path).partitions
+    assert sorted(key for part in parts for key in part.runs) == sorted(keys)
+    assert all(len(part.runs) <= most for part in parts)
+    assert len({part.number for part in parts}) == len(parts)
+    assert [r["run"] for r in lake.rows("runs")] == sorted(keys)
+
+
+def test_joining_may_stop_anywhere(
+    tmp_path: Path,
+    run: tuple[Recording, RunTables],
+    loose: tuple[dict[str, Any], Lake],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lake = add(Lake.create(tmp_path / "lake"), run, *KEYS)
+    allowed = 0
+
+    @contextmanager
+    def failing(path: Path) -> Iterator[Path]:
+        nonlocal allowed
+        allowed -= 1
+        if allowed < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        with replacing(path) as draft:
+            yield draft
+
+    monkeypatch.setattr("visup.archive.joining.partition.replacing", failing)
+    monkeypatch.setattr("visup.agent.storage.atomic.replacing", failing)
+    for stop in (0, 5, len(TABLES) + 3):  # in the first file, in the middle, at the manifest
+        allowed = stop
+        with pytest.raises(OutputError, match="No space left"):
+            compact(lake, grace_s=0.0)
+        assert lake.runs() == list(KEYS)
+        assert not (lake.path / MANIFEST).exists()
+    allowed = 100
+    assert compact(lake, grace_s=0.0).joined == len(KEYS)
+    assert told(lake) == loose[0]
+
+
+def test_a_reader_that_began_before_is_not_disturbed(
+    tmp_path: Path, run: tuple[Recording, RunTables]
+) -> None:
+    lake = add(Lake.create(tmp_path / "lake"), run, *KEYS[:3])
+    question = "SELECT count(*) AS n, count(DISTINCT run) AS runs FROM relations"
+    with open_database(lake) as database:
+        before = database.ask(question).to_pylist()
+        compact(lake)
+        add(lake, run, KEYS[3])
+        assert database.ask(question).to_pylist() == before
+    with open_database(lake) as database:
+        assert database.ask(question).to_pylist()[0]["runs"] == 4
+
+
+@pytest.mark.parametrize("text", ["{", '{"version": 9}', '{"version": 1}'])
+def test_a_damaged_list_of_partitions_is_refused(tmp_path: Path, text: str) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    (lake.path / MANIFEST).write_text(text)
+    with pytest.raises(OutputError, match="list of partitions"):
+        lake.runs()
+
+
+def test_the_command(
+    loose: tuple[dict[str, Any], Lake],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    visup: Call = caller(monkeypatch, capfd)
+    first = visup("archive", "compact", loose[1].path)
+    assert (first.code, first.out) == (0, "Joined: 5 runs; the lake has 1 partition.\n")
+    again = visup("archive", "compact", loose[1].path, "--now")
+    assert again.out == (
+        "Joined: 0 runs; the lake has 1 partition. Files that were replaced went, of 5 runs.\n"
+    )
+    assert visup("archive", "compact", loose[1].path.parent).code == 2

@@ -1,0 +1,140 @@
+"""`for each new part <take(part)>`: a loop with another part each time round.
+
+The dumb twin of such a loop is the same loop written out, with an actor for each part that is known by
+name from the start: what is believed of the loop must be what is believed of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.tasks.scripted import Played, Script, Spell, mind_at, play, task_of
+from visup.agent import Event, Observation, Status, Verdict
+from visup.agent.storage.checkpoint import dump_state, load_state
+from visup.tasks import parse_task
+from visup.tasks.supervision.supervise import finish, task_reasoner
+
+ARM, BIN, FIRST = 1, 2, 3
+PARTS = 3
+EVERY_S = 7.0
+LOOP = """<empty> ::= <reach> {loop} <leave>
+<reach> ::= touching(arm, bin)
+<take(part)> ::= coupled(arm, part) apart(part, bin) decoupled(arm, part)
+<leave> ::= apart(arm, bin) for 2 s
+"""
+
+
+def loop(times: str = "") -> str:
+    return LOOP.format(loop=f"for each new part <take(part)>{times}")
+
+
+def written_out(order: Sequence[int]) -> str:
+    return LOOP.format(loop=" ".join(f"<take(part_{k})>" for k in order))
+
+
+def emptied(order: Sequence[int], *, alike: bool = True, leaves: bool = True) -> Script:
+    """A bin out of which parts are taken in an order, each for 4 s; one taken again was put back."""
+    spells = []
+    for part in range(PARTS):
+        back = 0.0
+        for taken in (2.0 + EVERY_S * k for k, p in enumerate(order) if p == part):
+            spells.append(Spell("touching", back, taken + 1.5, (BIN, FIRST + part)))
+            spells.append(Spell("touching", taken, taken + 4.5, (ARM, FIRST + part)))
+            spells.append(Spell("coupled", taken + 0.5, taken + 4.5, (ARM, FIRST + part)))
+            back = taken + 5.5
+        if part not in order:
+            spells.append(Spell("touching", 0.0, 1e9, (BIN, FIRST + part)))
+    end = 2.0 + EVERY_S * len(order)
+    spells.append(Spell("touching", 0.5, end if leaves else 1e9, (ARM, BIN)))
+    names = {FIRST + k: {"part" if alike else f"part_{k}": 0.9} for k in range(PARTS)}
+    names |= {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}}
+    return Script(
+        tuple(spells), objects=dict.fromkeys(names, (0.0, 1000000000.0)), identities=names
+    )
+
+
+def watched(text: str, script: Script, rounds: int) -> Played:
+    until = 2.0 + EVERY_S * rounds + 6.0
+    return play(task_reasoner([parse_task(text)]), script, until, fps=4.0)
+
+
+def verdict(played: Played) -> Verdict:
+    return finish(task_of(played))
+
+
+def done(played: Played) -> list[int]:
+    """The parts whose rounds were told complete, by what their objects are."""
+    told = [e for e in played.events if e.kind == "stage_done" and "take" in e.data["stage"]]
+    bound = {b.actor: b.object_id for b in task_of(played).bindings}
+    return [(bound[e.data["stage"][5:-1]] or 0) - FIRST for e in told]
+
+
+orders = st.permutations(range(PARTS)).flatmap(
+    lambda p: st.integers(1, PARTS).map(lambda n: tuple(p[:n]))
+)
+
+
+@settings(max_examples=3)
+@given(orders, st.booleans())
+def test_the_loop_is_judged_as_the_loop_written_out(order: tuple[int, ...], leaves: bool) -> None:
+    one = watched(loop(), emptied(order, leaves=leaves), len(order))
+    known = emptied(order, alike=False, leaves=leaves)
+    twin = watched(written_out(order), known, len(order))
+    assert verdict(one) is verdict(twin)
+    assert done(one) == list(order)
+    assert [e.kind for e in one.events] == [e.kind for e in twin.events]
+
+
+@pytest.mark.parametrize(
+    ("order", "times", "expected"),
+    [
+        ((1,), " at least 2 times", False),
+        ((1, 0), " at least 2 times", True),
+        ((1, 1), " at least 2 times", False),
+    ],
+)
+def test_rounds_are_counted_and_one_part_makes_one_round(
+    order: tuple[int, ...], times: str, expected: bool
+) -> None:
+    played = watched(loop(times), emptied(order), len(order))
+    assert (verdict(played) is Verdict.SUCCEEDED) is expected
+
+
+def test_a_part_that_comes_later_has_the_next_round() -> None:
+    script = emptied((0, 2))
+    late = {**script.objects, FIRST: (0.0, 8.5), FIRST + 2: (8.6, 1e9)}
+    few = {k: v for k, v in late.items() if k not in (FIRST + 1,)}
+    played = watched(loop(" at least 2 times"), replace(script, objects=few), 2)
+    assert verdict(played) is Verdict.SUCCEEDED
+    assert done(played)[-1] == 2
+
+
+def test_nobody_waits_for_parts_that_do_not_come() -> None:
+    at_first = task_of(watched(loop(), emptied(()), 0))
+    assert {s.status for s in at_first.stages if s.stage == "take(part_9)"} == {Status.PENDING}
+    nobody = task_of(watched(loop(), replace(emptied(()), identities={}), 0))
+    assert nobody.evidence == "not found yet: arm, bin, part"
+
+
+def test_rounds_that_may_come_are_one_prospect_while_their_parts_are_not_there() -> None:
+    one = {k: v for k, v in emptied((0,)).objects.items() if k <= FIRST}
+    next_ones = task_of(watched(loop(), replace(emptied(()), objects=one), 0)).prospects
+    rounds = [p.stage for p in next_ones if p.stage.startswith("take")]
+    assert rounds == ["take(part_2)"]
+
+
+def test_a_run_that_is_taken_up_again_in_a_round_goes_on_as_if_it_had_not_been_left() -> None:
+    script, whole = emptied((1, 0)), watched(loop(), emptied((1, 0)), 2)
+    reasoner = task_reasoner([parse_task(loop())])
+    at = next(i for i, m in enumerate(whole.minds) if m.time >= 4.0)
+    mind, events = load_state(dump_state(whole.minds[at])), list[Event]()
+    for index in range(at + 1, len(whole.minds)):
+        now = mind_at(script, index / 4.0, index, mind)
+        outcome = reasoner(now, Observation(index, index / 4.0, (640, 480)))
+        mind, events = outcome.mind, [*events, *outcome.events]
+    assert events == [e for e in whole.events if e.time > 4.0]

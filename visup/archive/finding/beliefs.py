@@ -1,0 +1,188 @@
+"""What conditions about relations depend on, step by step: kept beside a run, which is then judged at once.
+
+Reasoning again about a run takes seconds. A condition that names relations alone sees of a mind who is
+present, what each is taken for and plays, and what holds between them; that is noted when the run is added,
+and the same judge judges it. A run without such a note, or with one of another visup, is reasoned about
+again.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Mind, ObjectBelief, Presence, Region, RelationTable, TaskBelief, Verdict
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT, Candidate
+from visup.agent.model.relation_columns import RelationBlock
+from visup.agent.model.step import Step
+from visup.agent.model.task_beliefs import Binding
+from visup.archive.finding.judge import as_rules_see
+from visup.archive.lake import BELIEFS
+from visup.rules.relations.reasoner import COLUMNS, NAMES
+from visup.rules.safety.compiled_rules import compile_rules
+from visup.rules.safety.expression import Expression
+from visup.version import __version__
+
+FORMAT = 1
+STATES = 1 + max(row for column in COLUMNS.each for row in column.rows)
+SURE = tuple(sorted({column.confidence for column in COLUMNS.each}))
+"""Rows of numbers that say how sure an answer is; the others do not count here."""
+NUMBERS = 1 + max(
+    max(c.confidence, -1 if c.value is None else c.value, -1 if c.sigma is None else c.sigma)
+    for c in COLUMNS.each
+)
+NOWHERE = cast("Region", None)
+"""Where an object is: not kept, and not asked for by relations."""
+Cast = Mapping[str, Any]
+"""Who is there: as JSON, kept where it changes."""
+
+
+def told_by_relations(pattern: Expression) -> bool:
+    """Whether a condition depends on nothing but relations between objects."""
+    prepared = compile_rules((pattern.rule,))
+    return not prepared.facts and not prepared.quantities and set(prepared.relations) <= set(NAMES)
+
+
+@dataclass(slots=True)
+class BeliefNotes:
+    """Takes the steps of a run, and gives what is kept of them."""
+
+    times: list[float] = field(default_factory=list)
+    frames: list[int] = field(default_factory=list)
+    states: list[NDArray[np.int8]] = field(default_factory=list)
+    sure: list[NDArray[np.float64]] = field(default_factory=list)
+    casts: list[tuple[int, Cast]] = field(default_factory=list)
+    whole: bool = True
+
+    def __call__(self, step: Step) -> None:
+        """Take one step."""
+        mind = as_rules_see(step.mind)
+        table = mind.relations
+        if not isinstance(table, RelationTable):
+            table = RelationTable(extra=table)
+        blocks = [block for block in table.parts if block.columns is COLUMNS]
+        self.whole = self.whole and _is_all(table, blocks)
+        found = _cast_of(mind, table.ids if blocks else None)
+        if not self.casts or self.casts[-1][1] != found:
+            self.casts.append((len(self.times), found))
+        self.times.append(step.time)
+        self.frames.append(step.frame_index)
+        for block in blocks:
+            self.states.append(block.state[:STATES].ravel())
+            self.sure.append(block.numbers[list(SURE)].ravel())
+
+    def content(self) -> bytes:
+        """The file; nothing where a plug-in's reasoner is among those that were heard."""
+        if not self.whole:
+            return b""
+        told = {"format": FORMAT, "visup": __version__, "casts": self.casts}
+        out = BytesIO()
+        np.savez_compressed(
+            out,
+            times=np.array(self.times),
+            frames=np.array(self.frames, np.int64),
+            states=np.concatenate([*self.states, np.empty(0, np.int8)]),
+            sure=np.concatenate([*self.sure, np.empty(0)]),
+            told=np.frombuffer(json.dumps(told).encode(), np.uint8),
+        )
+        return out.getvalue()
+
+
+def read_minds(folder: Path) -> list[Mind] | None:
+    """The minds of a run, with what is kept of them; None where that is not there, or of another visup."""
+    try:
+        # Read whole first: of a damaged one NumPy would leave the file open.
+        with np.load(BytesIO((folder / BELIEFS).read_bytes()), allow_pickle=False) as kept:
+            told = json.loads(kept["told"].tobytes())
+            if (told["format"], told["visup"]) != (FORMAT, __version__):
+                return None
+            return list(
+                _minds(told["casts"], *(kept[k] for k in ("times", "frames", "states", "sure")))
+            )
+    except (OSError, ValueError, KeyError, IndexError, TypeError, zipfile.BadZipFile):
+        return None
+
+
+def _is_all(table: RelationTable, blocks: list[RelationBlock]) -> bool:
+    """Whether the relations that conditions name stand in one block, and a plug-in adds nothing to them."""
+    others = {n for part in table.parts if part.columns is not COLUMNS for n in part.columns.named}
+    return len(blocks) <= 1 and others.union(r.name for r in table.extra).isdisjoint(NAMES)
+
+
+def _cast_of(mind: Mind, related: tuple[int, ...] | None) -> Cast:
+    names = {str(b.id): b.name for b in mind.present()}
+    played = [[b.actor, b.object_id] for t in mind.tasks for b in t.bindings if b.object_id]
+    return {
+        "names": names,
+        "related": None if related is None else list(related),
+        "played": played,
+        "actors": {actor: list(models) for actor, models in mind.actors.items()},
+        "unknown": sorted(mind.unknown),
+    }
+
+
+def _minds(
+    casts: list[tuple[int, Cast]],
+    times: NDArray[np.float64],
+    frames: NDArray[np.int64],
+    states: NDArray[np.int8],
+    sure: NDArray[np.float64],
+) -> Iterator[Mind]:
+    changes, at = dict(casts), [0, 0]
+    made, pairs = Mind(), -1
+    ids: tuple[int, ...] = ()
+    for number, (time, frame) in enumerate(zip(times.tolist(), frames.tolist(), strict=True)):
+        if number in changes:
+            made, related = _mind_of(changes[number])
+            ids = tuple(related or ())
+            pairs = -1 if related is None else len(ids) * (len(ids) - 1) // 2
+        table = RelationTable(ids)
+        if pairs >= 0:
+            ends = at[0] + STATES * pairs, at[1] + len(SURE) * pairs
+            state = states[at[0] : ends[0]].reshape(STATES, pairs)
+            numbers = np.full((NUMBERS, pairs), np.nan)
+            numbers[list(SURE)] = sure[at[1] : ends[1]].reshape(len(SURE), pairs)
+            table = RelationTable(ids, (RelationBlock(COLUMNS, state, _never(pairs), numbers),))
+            at = list(ends)
+        yield Mind(
+            time=time,
+            frame_index=frame,
+            objects=made.objects,
+            relations=table,
+            tasks=made.tasks,
+            unknown=made.unknown,
+            actors=made.actors,
+        )
+
+
+@lru_cache(maxsize=64)
+def _never(pairs: int) -> NDArray[np.float64]:
+    """Since when relations hold: not kept, and not asked for."""
+    return np.zeros((STATES, pairs))
+
+
+def _mind_of(told: Cast) -> tuple[Mind, list[int] | None]:
+    """Who is there, and between whom relations are kept."""
+    played = tuple(Binding(actor, (), number) for actor, number in told["played"])
+    mind = Mind(
+        objects={int(number): _object(int(number), name) for number, name in told["names"].items()},
+        tasks=(TaskBelief("", Verdict.UNKNOWN, bindings=played),) if played else (),
+        unknown=frozenset(told["unknown"]),
+        actors={actor: tuple(models) for actor, models in told["actors"].items()},
+    )
+    return mind, told["related"]
+
+
+@lru_cache(maxsize=1024)
+def _object(number: int, name: str) -> ObjectBelief:
+    known = () if name == UNKNOWN_OBJECT else (Candidate(name, 1.0, 1.0),)
+    return ObjectBelief(number, NOWHERE, Presence.SEEN, 0.0, 0.0, True, known)

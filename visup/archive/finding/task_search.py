@@ -1,0 +1,65 @@
+"""A task as a question: in which runs was it carried out, and when?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from visup.agent import TaskBelief, Truth, Verdict
+from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
+from visup.archive.asking.database import LakeDatabase
+from visup.archive.finding.judge import Hit
+from visup.runs.replay import changed_settings, replay
+from visup.runs.settings import WatchSettings
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSearch:
+    """Looks for the runs in which a task succeeded.
+
+    Attributes:
+        file: A task file.
+    """
+
+    file: Path
+    quick: bool = False
+
+    def possible_runs(self, database: LakeDatabase) -> list[str]:
+        """See `Search`: any run may have it, with whoever plays its actors."""
+        found: list[str] = database.ask("SELECT run FROM lake.runs ORDER BY run")["run"].to_pylist()
+        return found
+
+    def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
+        """See `Search`: from the first stage under way to success."""
+        watch = _TaskTimes()
+        replay(recording, changed_settings(settings, tasks=(str(self.file),)), tell=watch)
+        return tuple(sorted(watch.done.values(), key=lambda hit: (hit.end, hit.rule)))
+
+
+@dataclass(slots=True)
+class _TaskTimes:
+    """When each task began and succeeded; told of each step."""
+
+    begun: dict[str, float] = field(default_factory=dict)
+    done: dict[str, Hit] = field(default_factory=dict)
+
+    def __call__(self, step: Step) -> None:
+        """Take down one step."""
+        for task in step.mind.tasks:
+            if task.current is not None:
+                self.begun.setdefault(task.task, step.time)
+            if task.verdict is Verdict.SUCCEEDED and task.task not in self.done:
+                begin = self.begun.get(task.task, step.time)
+                self.done[task.task] = _hit(task, begin, step)
+            elif task.verdict is not Verdict.SUCCEEDED:
+                self.done.pop(task.task, None)  # it came to nothing after all
+
+
+def _hit(task: TaskBelief, begin: float, step: Step) -> Hit:
+    objects = tuple(b.object_id for b in task.bindings if b.object_id is not None)
+    names = tuple(
+        step.mind.objects[i].name if i in step.mind.objects else f"object {i}" for i in objects
+    )
+    sure = round(task.confidence, 6)
+    return Hit(objects, names, Truth.TRUE.value, begin, step.time, False, sure, rule=task.task)

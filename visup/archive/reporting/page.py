@@ -1,0 +1,127 @@
+"""The page of a lake: one HTML file that opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.atomic import write_whole
+from visup.archive.reporting.figures import all_figures, duration_figures, verdict_figure
+from visup.archive.reporting.statistics import LakeStatistics, StageDuration
+from visup.report.page.html import embedded, plotly_source, script_hash
+from visup.report.page.sections import figures
+from visup.wording import printable
+
+DURATION_HEAD = ("task", "stage", "runs", "a tenth under", "median", "a tenth over", "longest")
+
+
+def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
+    """Write the page of a lake.
+
+    Raises:
+        ExtraMissingError: There are figures, and Plotly is not installed.
+        OutputError: The file cannot be written.
+    """
+    try:
+        write_whole(path, lake_page(found, lake).encode())
+    except OSError as fault:
+        raise OutputError(
+            f"the report cannot be written ({fault.strerror or fault})", where=str(path)
+        ) from fault
+
+
+def lake_page(found: LakeStatistics, lake: Path) -> str:
+    """The whole page; the same lake always gives the same one.
+
+    Raises:
+        ExtraMissingError: There are figures, and Plotly is not installed.
+    """
+    drawn = list(all_figures(found))
+    shared, own = files("visup.report.page"), files("visup.archive.reporting")
+    plotly = plotly_source() if drawn else ""
+    script = (shared / "figures.js").read_text(encoding="utf-8")
+    text = {
+        "title": escape(lake.absolute().name),
+        "tiles": _tiles(found),
+        "verdicts": figures([verdict_figure(found)], "No run says when it was taken."),
+        "durations": _duration_table(found.durations, ""),
+        "weeks": figures(duration_figures(found), "No stage was followed."),
+        "actors": _duration_table(found.by_actor, "who played, or label"),
+        "drifts": _drifts(found),
+        "failures": _failures(found),
+        "figures": embedded(drawn),
+    }
+    page = Template((own / "lake.html").read_text(encoding="utf-8"))
+    return page.substitute(
+        {name: printable(words) for name, words in text.items()},
+        style=(shared / "report.css").read_text(encoding="utf-8"),
+        plotly=plotly,
+        script=script,
+        scripts_allowed=" ".join(map(script_hash, (plotly, script))),
+    )
+
+
+def _tiles(found: LakeStatistics) -> str:
+    ended: dict[str, int] = {}
+    for _, verdict, count in found.verdicts:
+        ended[verdict] = ended.get(verdict, 0) + count
+    facts = {"runs": f"{found.runs:,}", "hours of video": f"{found.hours:,.1f}"}
+    facts |= {v.replace("_", " "): f"{n:,}" for v, n in sorted(ended.items()) if v != "none"}
+    tiles = (f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in facts.items())
+    return f"<dl class=tiles>{''.join(tiles)}</dl>"
+
+
+def _duration_table(of: Sequence[StageDuration], group: str) -> str:
+    rows = [
+        (
+            *((d.group,) if group else ()),
+            d.task,
+            d.stage,
+            f"{d.runs:,}",
+            *(f"{s:.1f} s" for s in (d.low, d.mid, d.high, d.longest)),
+        )
+        for d in of
+    ]
+    head = (*((group,) if group else ()), *DURATION_HEAD)
+    return _table(head, rows, "No stage was followed.")
+
+
+def _drifts(found: LakeStatistics) -> str:
+    rows = [
+        (
+            d.task,
+            d.stage,
+            f"{d.before:.1f} s",
+            f"{d.after:.1f} s",
+            f"{d.change:+.0%}",
+            f"{d.runs:,}",
+            f"{d.chance:.1g}",
+        )
+        for d in found.drifts
+    ]
+    head = ("task", "stage", "first quarter", "last quarter", "change", "runs", "by chance")
+    return _table(head, rows, "No stage has become slower or faster, as far as can be told.")
+
+
+def _failures(found: LakeStatistics) -> str:
+    rows = [
+        (f.stage or "none", f.alert.replace("_", " ") or "none", f"{f.runs:,}", f"{f.share:.0%}",
+         f"{f.clip} ({f.run[:8]})")
+        for f in found.failures
+    ]  # fmt: skip
+    head = ("stage that failed", "gravest alert", "runs", "of those that failed", "such as")
+    return _table(head, rows, "No run failed.")
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]], empty: str) -> str:
+    lines = "".join(f"<tr>{''.join(f'<td>{escape(c)}' for c in row)}" for row in rows)
+    if not lines:
+        return f"<p class=empty>{escape(empty)}</p>"
+    first = "".join(f"<th>{escape(c)}" for c in head)
+    return (
+        f"<div class=scroll><table><thead><tr>{first}</thead><tbody>{lines}</tbody></table></div>"
+    )

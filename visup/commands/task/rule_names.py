@@ -1,0 +1,79 @@
+"""Names of one rule: its variables, those of `exists` and `forall`, values of `let`; where each stands."""
+
+from __future__ import annotations
+
+import re
+
+from visup.rules.formula.units import Span
+from visup.rules.language.keywords import FUNCTIONS, KEYWORDS
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
+from visup.tasks.tools.editing import NameUse
+
+_START = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
+_PASSED_OVER = re.compile(r"#[^\n]*|(?<=\")[^\"\n]*(?=\")")
+_IN_SENTENCE = re.compile(r"\{\w+\}")
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?!\w|\s*\()")
+_HEAD = re.compile(r"\s*rule\s+\w+\s*\(([^()]*)\)")
+_BOUND = re.compile(r"\b(?:let|exists|forall)\s+(\w+)")
+
+
+def rule_references(text: str, word: NameUse) -> list[NameUse]:
+    """All places that mean the same variable or value as a word of a rule; none where it is bound by nothing.
+
+    Args:
+        text: A file of rules.
+        word: A name of it.
+    """
+    begin, rule = _rule_around(text, word.span)
+    if word.name not in _bound(rule):
+        return []
+    first = text.count("\n", 0, begin)
+    return [
+        NameUse(word.name, "name", _span(rule, m.start(), m.end(), first))
+        for m in _NAME.finditer(rule)
+        if m[0] == word.name
+    ]
+
+
+def rule_rename_refused(text: str, word: NameUse, new: str) -> str | None:
+    """Why a name of a rule cannot become another one, or None when it can."""
+    if re.fullmatch(r"[A-Za-z_]\w*", new) is None or new == "is":
+        return f"`{new}` is no name: letters, digits and `_`, beginning with a letter"
+    known = {**KEYWORDS, **FUNCTIONS, **PREDICATES, **QUANTITIES}
+    if new in known:
+        return f"`{new}` is a word of the language"
+    _, rule = _rule_around(text, word.span)
+    if any(m[0] == new for m in _NAME.finditer(rule)):
+        return f"there is something called `{new}` in this rule already"
+    return None
+
+
+def _rule_around(text: str, span: Span) -> tuple[int, str]:
+    """Where the rule begins that holds a place, and its text, comments and what no name is blank."""
+    at = sum(len(line) + 1 for line in text.split("\n")[: span.line - 1]) + span.column - 1
+    starts = [m.start() for m in _START.finditer(text)]
+    begin = max((s for s in starts if s <= at), default=0)
+    end = min((s for s in starts if s > at), default=len(text))
+    return begin, _PASSED_OVER.sub(lambda m: _blank(m[0]), text[begin:end])
+
+
+def _blank(passed_over: str) -> str:
+    """Blanks in the place of a comment, or of a sentence but for the names in it."""
+    if passed_over.startswith("#"):
+        return " " * len(passed_over)
+    kept = [" "] * len(passed_over)
+    for m in _IN_SENTENCE.finditer(passed_over):
+        kept[m.start() : m.end()] = m[0]
+    return "".join(kept)
+
+
+def _bound(rule: str) -> set[str]:
+    head = _HEAD.match(rule)
+    variables = re.findall(r"\w+", re.sub(r"\bmay\s+repeat\b", "", head[1])) if head else []
+    return {*variables, *_BOUND.findall(rule)}
+
+
+def _span(rule: str, begin: int, end: int, first: int) -> Span:
+    line = first + rule.count("\n", 0, begin) + 1
+    column = begin - rule.rfind("\n", 0, begin)
+    return Span(line, column, line, column + end - begin)

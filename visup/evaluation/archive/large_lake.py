@@ -1,0 +1,107 @@
+"""How fast a large lake answers, in a process of its own, as a command is one."""
+
+from __future__ import annotations
+
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+from visup.archive.asking.database import LakeDatabase, open_database
+from visup.archive.finding.search import find, read_search
+from visup.archive.joining.manifest import read_manifest
+from visup.archive.lake import Lake
+from visup.evaluation.archive.multiplied import lend_recordings, multiply
+from visup.evaluation.figures import Progress
+
+PATTERNS = {
+    "named": "converging(arm, satellite) and then touching(arm, satellite)"
+    " and then diverging(arm, satellite) within 5 s",
+    "anybody": "converging(a, b) and then touching(a, b) and then diverging(a, b) within 5 s",
+}
+QUESTIONS = {
+    "durations": "SELECT task, stage, count(*) AS runs, median(took) AS median_s,"
+    " quantile_cont(took, 0.9) AS p90_s FROM (SELECT run, task, stage, sum(seconds) AS took FROM stages"
+    " WHERE status IN ('active', 'progressing', 'paused', 'stalled') GROUP BY ALL) GROUP BY ALL",
+    "longest": "SELECT clip, task, stage, seconds FROM stages WHERE status = 'progressing'"
+    " ORDER BY seconds DESC LIMIT 20",
+    "failures": "SELECT task, stage, count(DISTINCT run) AS runs FROM stages"
+    " WHERE status IN ('failing', 'failed') GROUP BY ALL",
+}
+JUDGED = 4
+"""Runs that are looked into to know what one takes."""
+
+
+def time_large_lake(
+    small: Lake, place: Path, runs: int, rows: int, seed: int, progress: Progress
+) -> dict[str, Any]:
+    """Make a large lake and ask it.
+
+    Args:
+        small: What it is made of.
+        place: A new folder for it, or one in which it was made before.
+        runs: How many it has.
+        rows: How many rows of relations and events, about.
+        seed: Of all that is drawn.
+        progress: Shows what is being done.
+
+    Returns:
+        `runs`, `partitions`, `gb` on the disk; `open_s`; for each pattern `find_NAME_s` (which runs can have
+        it, warm), `possible_NAME` and `scanned_NAME` (share of runs); `judge_s` (to look into one of them, on
+        one core); for each question `sql_NAME_s`, warm; `memory_mb`, the most that the process took.
+    """
+    if (place / "lake.json").exists():
+        lake = Lake.open(place)
+    else:
+        lake, _ = multiply(small, place, runs, rows, seed, progress)
+    progress("asking")
+    ((_, found),) = _alone(lake, small)
+    sizes = (f.stat().st_size for f in place.rglob("*.parquet"))
+    parts = read_manifest(place).partitions
+    return {"runs": len(lake.runs()), "partitions": len(parts), "gb": sum(sizes) / 1e9, **found}
+
+
+def _alone(lake: Lake, small: Lake) -> list[tuple[Any, dict[str, Any]]]:
+    """Ask in a fresh process, whose memory is nobody else's."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return [(lake, pool.submit(_answers, lake, small).result())]
+
+
+def _answers(lake: Lake, small: Lake) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    begin = time.perf_counter()
+    with open_database(lake) as database:
+        found["open_s"] = time.perf_counter() - begin
+        for name, pattern in PATTERNS.items():
+            found |= _pattern_figures(lake, database, name, pattern)
+        for name, sql in QUESTIONS.items():
+            found[f"sql_{name}_s"] = min(_timed(database, sql) for _ in range(3))
+        runs = read_search(PATTERNS["named"]).possible_runs(database)[:JUDGED]
+    # Linux gives kilobytes; what looking into runs takes is not the lake's.
+    found["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    lend_recordings(small, lake, runs)
+    begin = time.perf_counter()
+    count = sum(1 for _ in find(lake, read_search(PATTERNS["named"]), runs))
+    return {**found, "judge_s": (time.perf_counter() - begin) / count if count else None}
+
+
+def _pattern_figures(lake: Lake, database: LakeDatabase, name: str, pattern: str) -> dict[str, Any]:
+    times = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        possible = read_search(pattern).possible_runs(database)
+        times.append(time.perf_counter() - begin)
+    return {
+        f"find_{name}_s": min(times),
+        f"possible_{name}": len(possible),
+        f"scanned_{name}": len(possible) / len(lake.runs()),
+    }
+
+
+def _timed(database: LakeDatabase, sql: str) -> float:
+    begin = time.perf_counter()
+    database.ask(sql)
+    return time.perf_counter() - begin

@@ -1,0 +1,138 @@
+"""All parts of `visup eval archive`: those that are wanted, with their figures."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import SettingsError
+from visup.archive.lake import Lake
+from visup.evaluation.archive.exactness import compare_find
+from visup.evaluation.archive.kills import compare_killed
+from visup.evaluation.archive.large_lake import time_large_lake
+from visup.evaluation.archive.recorded import lake_of_missions
+from visup.evaluation.archive.scheduling import measure_scheduler
+from visup.evaluation.archive.throughput import measure_throughput
+from visup.evaluation.figures import Progress, silent
+from visup.evaluation.missions.files import mission_folders
+
+ROWS_PER_RUN = 1_000
+
+
+@dataclass(frozen=True, slots=True)
+class ArchiveSizes:
+    """How much is done of each part.
+
+    Attributes:
+        formulas: Random conditions whose finding is compared.
+        every: Of recorded runs, use every n-th frame of a mission.
+        kills: Kills of workers; a tenth as many of the command with its scheduler.
+        clips: Short clips that are watched meanwhile.
+        runs: Of the large lake.
+        frames: Of each mission whose watching is timed.
+        rounds: How often that is.
+        jobs: Of the scheduler.
+        workers: Of the scheduler.
+    """
+
+    formulas: int = 50
+    every: int = 4
+    kills: int = 4
+    clips: int = 8
+    runs: int = 1_000
+    frames: int = 100
+    rounds: int = 1
+    jobs: int = 1_000
+    workers: int = 100
+
+
+@dataclass(slots=True)
+class _Evaluation:
+    missions: Sequence[Path]
+    sizes: ArchiveSizes
+    seed: int
+    place: Path
+    progress: Progress
+    small: Lake | None = None
+
+    def recorded(self) -> Lake:
+        """The recorded runs, made when they are first wanted."""
+        if self.small is None:
+            of = self.missions, 1, self.sizes.every, self.progress
+            self.small = lake_of_missions(self.place, *of)
+        return self.small
+
+    def exact(self) -> Mapping[str, Any]:
+        lake, count = self.recorded(), self.sizes.formulas
+        return compare_find(lake, count, self.seed, self.place, self.progress)
+
+    def kills(self) -> Mapping[str, Any]:
+        kills = self.sizes.kills
+        heads = -(-kills // 10)
+        place = self.place / "kills"
+        return compare_killed(place, self.sizes.clips, kills, heads, self.seed, self.progress)
+
+    def large(self) -> Mapping[str, Any]:
+        runs, place = self.sizes.runs, self.place / "large"
+        rows = runs * ROWS_PER_RUN
+        return time_large_lake(self.recorded(), place, runs, rows, self.seed, self.progress)
+
+    def throughput(self) -> Mapping[str, Any]:
+        place = self.place / "throughput"
+        place.mkdir()
+        of = self.sizes.frames, self.sizes.rounds
+        return measure_throughput(place, self.missions, *of, self.progress)
+
+    def scheduler(self) -> Mapping[str, Any]:
+        return measure_scheduler(self.sizes.workers, self.sizes.jobs, self.progress)
+
+
+PARTS: Mapping[str, Callable[[_Evaluation], Mapping[str, Any]]] = {
+    "exact": _Evaluation.exact,
+    "kills": _Evaluation.kills,
+    "large": _Evaluation.large,
+    "throughput": _Evaluation.throughput,
+    "scheduler": _Evaluation.scheduler,
+}
+
+
+def evaluate_archive(
+    folder: Path,
+    *,
+    part: Sequence[str] | None = None,
+    seed: int = 23,
+    progress: Progress = silent,
+    **sizes: int,
+) -> dict[str, Any]:
+    """Figures of lakes.
+
+    Args:
+        folder: Missions, of which lakes are made.
+        part: Which parts, of `PARTS`; all if none.
+        seed: Of all that is drawn.
+        progress: Shows what is being done.
+        sizes: How much is done, as of `ArchiveSizes`.
+
+    Returns:
+        `items` with the figures of each part, `total` with `different`: what ought to be equal and is not.
+
+    Raises:
+        SettingsError: There is no such part, or no mission.
+    """
+    wanted = list(part or PARTS)
+    if unknown := sorted({*wanted} - {*PARTS}):
+        raise SettingsError(
+            f"there is no part '{unknown[0]}'", expected=f"some of: {', '.join(PARTS)}"
+        )
+    missions = mission_folders(folder)
+    with tempfile.TemporaryDirectory() as scratch:
+        made = _Evaluation(missions, ArchiveSizes(**sizes), seed, Path(scratch), progress)
+        items = {name: dict(PARTS[name](made)) for name in wanted}
+    return {"items": items, "total": {"different": sum(_different(i) for i in items.values())}}
+
+
+def _different(figures: Mapping[str, Any]) -> int:
+    return int(figures.get("different", 0))

@@ -1,0 +1,134 @@
+"""How many workers one scheduler can serve: by workers that sleep for as long as a clip takes.
+
+A process cannot be a thousand workers of a cluster, but it can be a hundred that sleep: the scheduler, in a
+process of its own, does for each of them and for each job what it does for any. What it takes then, when
+nothing is done and for each job, is reckoned up to the workers and clips that are asked about.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from visup.archive.extra import imported
+from visup.evaluation.figures import Progress
+
+IDLE_S = 10.0
+ASKED_WORKERS = 1_000
+ASKED_CLIPS = 100_000
+CLIP_S = 60.0
+"""How long a worker takes for a clip: a minute of video in real time."""
+WAITING_PER_WORKER = 3
+_WORKERS = "from visup.evaluation.archive.scheduling import sleepers; sleepers('{}', {})"
+_ADDRESS = re.compile(rb"tcp://[\d.]+:\d+")
+
+
+def measure_scheduler(workers: int, jobs: int, progress: Progress) -> dict[str, Any]:
+    """What a scheduler takes.
+
+    Args:
+        workers: How many sleep.
+        jobs: How many jobs they do.
+        progress: Shows what is being done.
+
+    Returns:
+        `workers` and `jobs`; `idle_ms` of the processor for each worker and second, `job_ms` for each job;
+        `busy`, the share of a core that a scheduler of 1,000 workers takes, each of which is a minute at a
+        clip; `breaks_at`, the workers with which it would be 60 % busy; `hours` for 100,000 clips.
+    """
+    distributed, psutil = imported("distributed"), imported("psutil")
+    with (
+        _scheduler() as (process, address),
+        _sleeping(address, workers),
+        distributed.Client(address, timeout=30) as client,
+    ):
+        client.wait_for_workers(workers, timeout=120)
+        progress("idle")
+        idle = _taken(psutil.Process(process), lambda: time.sleep(IDLE_S))
+        progress("working")
+        seconds, took = _timed(psutil.Process(process), client, jobs, workers)
+    idle_each = idle / IDLE_S / workers
+    job = max(0.0, took - idle_each * workers * seconds) / jobs
+    per_worker = idle_each + job / CLIP_S
+    return {
+        "workers": workers,
+        "jobs": jobs,
+        "idle_ms": 1e3 * idle_each,
+        "job_ms": 1e3 * job,
+        "busy": ASKED_WORKERS * per_worker,
+        "breaks_at": round(0.6 / per_worker),
+        "hours": ASKED_CLIPS * CLIP_S / ASKED_WORKERS / 3600,
+    }
+
+
+def _timed(process: Any, client: Any, jobs: int, workers: int) -> tuple[float, float]:
+    """Seconds that some jobs take, and those of the scheduler's processor."""
+    begin = time.perf_counter()
+    took = _taken(process, lambda: _run_jobs(client, jobs, workers))
+    return time.perf_counter() - begin, took
+
+
+def _taken(process: Any, work: Any) -> float:
+    """Seconds of the processor that a process takes meanwhile."""
+    before = process.cpu_times()
+    work()
+    after = process.cpu_times()
+    return float(after.user + after.system - before.user - before.system)
+
+
+def _run_jobs(client: Any, jobs: int, workers: int) -> None:
+    """Jobs handed over as a lake's are: a few for each worker, and one more for each that is done."""
+    completed = imported("distributed").as_completed()
+    left = iter(range(jobs))
+    for _, number in zip(range(workers * WAITING_PER_WORKER), left, strict=False):
+        completed.add(client.submit(time.sleep, 2.0, key=f"job-{number}", pure=False))
+    for _ in completed:
+        number = next(left, -1)
+        if number >= 0:
+            completed.add(client.submit(time.sleep, 2.0, key=f"job-{number}", pure=False))
+
+
+@contextmanager
+def _scheduler() -> Iterator[tuple[int, str]]:
+    words = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    with subprocess.Popen([*words, *where], stderr=subprocess.PIPE) as process:
+        try:
+            assert process.stderr is not None
+            found = next(filter(None, map(_ADDRESS.search, process.stderr)))
+            yield process.pid, found.group().decode()
+        finally:
+            process.kill()
+
+
+@contextmanager
+def _sleeping(address: str, workers: int) -> Iterator[None]:
+    """So many workers in a process."""
+    code = _WORKERS.format(address, workers)
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def sleepers(address: str, workers: int) -> None:
+    """Be so many workers of one thread each, until somebody ends this process."""
+    asyncio.run(_sleepers(address, workers))
+
+
+async def _sleepers(address: str, workers: int) -> None:
+    kind = imported("distributed").Worker
+    made = [
+        kind(address, nthreads=1, memory_limit=0, dashboard=False, name=f"sleeper-{n}")
+        for n in range(workers)
+    ]
+    for worker in made:
+        await worker
+    await asyncio.gather(*(worker.finished() for worker in made))

@@ -1,0 +1,82 @@
+"""The last seconds of what was seen, as JPEG in memory: at most so many seconds, and so many bytes."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.report.video import playable_size
+
+QUALITY = 80
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedFrame:
+    """A frame as it is kept.
+
+    Attributes:
+        time: Seconds of the source.
+        jpeg: The picture.
+    """
+
+    time: float
+    jpeg: bytes
+
+
+def encoded(image: NDArray[np.uint8], time: float) -> EncodedFrame:
+    """A frame as it is kept: no wider than a video of a run.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        time: Seconds of the source.
+    """
+    size = playable_size(image.shape[1], image.shape[0])
+    if size != (image.shape[1], image.shape[0]):
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    return EncodedFrame(time, jpeg_of(image))
+
+
+def jpeg_of(image: NDArray[np.uint8], quality: int = QUALITY) -> bytes:
+    """A picture as JPEG.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        quality: 0 to 100.
+    """
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return data.tobytes()
+
+
+class FrameRing:
+    """The last frames, oldest first.
+
+    Args:
+        span_s: How long a frame is kept, seconds of the source.
+        most_bytes: How much all of them may take; beyond, the oldest go earlier.
+
+    Attributes:
+        size: What they take now, bytes.
+    """
+
+    def __init__(self, span_s: float, most_bytes: int) -> None:
+        self.size = 0
+        self._span_s, self._most_bytes = span_s, most_bytes
+        self._frames: deque[EncodedFrame] = deque()
+
+    def add(self, frame: EncodedFrame) -> None:
+        """Keep a further frame; what is too old, or too much, goes."""
+        self._frames.append(frame)
+        self.size += len(frame.jpeg)
+        while self._frames and (
+            self.size > self._most_bytes or frame.time - self._frames[0].time > self._span_s
+        ):
+            self.size -= len(self._frames.popleft().jpeg)
+
+    def __iter__(self) -> Iterator[EncodedFrame]:
+        """Oldest first."""
+        return iter(self._frames)

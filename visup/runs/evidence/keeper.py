@@ -1,0 +1,212 @@
+"""Keeps evidence of the alerts of a run, in the folder `evidence` beside its journal.
+
+An alert has a picture at once, `alert-ID.jpg`, so that whoever is told can look; its clip follows some
+seconds later under a name that is known from the beginning. Alerts that open while a clip is being made share
+it. What belongs to which alert stands in `alert-ID.json`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from visup.agent import Alert, AlertCondition, Frame, Severity
+from visup.agent.cycle.own_troubles import NOT_RECORDED
+from visup.agent.execution.runners import error_line
+from visup.agent.model.step import Step
+from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.jsonable import to_jsonable
+from visup.agent.storage.text_file import read_text_file
+from visup.agent.storage.wall_clock import RecordStamp
+from visup.report.annotate import annotate
+from visup.runs.evidence.clip_spool import SUFFIX, ClipSpool, write_clip_of
+from visup.runs.evidence.frame_ring import EncodedFrame, FrameRing, encoded, jpeg_of
+from visup.runs.settings import EvidenceOptions
+
+EVIDENCE = "evidence"
+LONGEST_CLIP_S = 120.0
+"""A clip that further alerts make longer ends here, and the next alert has a new one."""
+
+SNAPSHOT_QUALITY = 90
+ROOM_EVERY_S = 30.0
+"""Seconds between two looks at the room on the disk: an alert about it stays as long."""
+KEYS = ("snapshot", "clip")
+
+
+class _Room:
+    """What is free on the disk of a folder, looked at once in a while.
+
+    Args:
+        folder: Which.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._looked, self._free = folder, -ROOM_EVERY_S, math.inf
+
+    def free(self) -> float:
+        """Bytes."""
+        now = time.monotonic()
+        if now - self._looked >= ROOM_EVERY_S:
+            self._looked = now
+            with suppress(OSError):
+                self._free = float(shutil.disk_usage(self._folder).free)
+        return self._free
+
+
+def _not_recorded(key: str, said: str, why: str) -> AlertCondition:
+    return AlertCondition(NOT_RECORDED, (), Severity.WARNING, said, (why,), key=key, needs=())
+
+
+class EvidenceKeeper:
+    """An observer that keeps a picture and a clip of each alert.
+
+    Args:
+        folder: Of the run.
+        options: How long clips are, and how much memory frames before an alert may take.
+        fps: Frames a second that are looked at.
+        stamp: Camera, host, and time by the clock of the wall.
+    """
+
+    def __init__(
+        self, folder: Path, options: EvidenceOptions, fps: float, stamp: RecordStamp | None = None
+    ) -> None:
+        self._folder = folder / EVIDENCE
+        self._options, self._fps, self._stamp = options, fps, stamp or RecordStamp()
+        self._ring = FrameRing(options.before_s, int(options.memory_mb * 2**20))
+        self._clip: ClipSpool | None = None
+        self._begun = self._until = 0.0
+        self._links: dict[int, Mapping[str, str]] = {}
+        self._fault = ""
+        self._left: list[Path] = []
+        self._room = _Room(folder)
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="evidence")
+        self._writing: list[Any] = []
+        for spool in sorted(folder.parent.glob(f"*/{EVIDENCE}/*{SUFFIX}")):
+            self._write_later(spool)  # whoever made it was killed
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Keep the frame for a while, and evidence of the alerts that open."""
+        seen = encoded(frame.image, step.time)
+        self._guarded(lambda: self._go_on(seen))
+        opened = [a for a in step.alerts if a.closed is None]
+        if opened:
+            self._guarded(lambda: self._keep(opened, step, frame, seen))
+        self._ring.add(seen)
+
+    def links(self, alert: Alert) -> Mapping[str, str]:
+        """Where the evidence of an alert is: `snapshot`, `clip`; nothing where there is none."""
+        found = self._links.get(alert.id)
+        if found is None:
+            found = self._noted(alert)
+        if alert.closed is not None:
+            self._links.pop(alert.id, None)
+        return found
+
+    def runtime_faults(self) -> Iterable[AlertCondition]:
+        """That evidence cannot be kept, as long as it cannot."""
+        if self._fault:
+            said = "Pictures and clips of alerts cannot be kept; supervision goes on."
+            yield _not_recorded(EVIDENCE, said, self._fault)
+        least = self._options.least_free_bytes
+        if least and self._room.free() < least:
+            said = "The disk is nearly full; the oldest pictures and clips of alerts go."
+            left = f"{self._room.free() / 1e9:.1f} GB are left, {least / 1e9:.1f} are to be."
+            yield _not_recorded("room", said, left)
+
+    def move_to(self, folder: Path) -> None:
+        """Keep what comes from now on beside another journal."""
+        self._end_clip()
+        self._folder = folder / EVIDENCE
+
+    def close(self, wait_s: float = 10.0) -> None:
+        """End the clip; what is not written then is left to whoever goes on with the run.
+
+        Args:
+            wait_s: How long the last clips may take, seconds.
+        """
+        self._end_clip()
+        wait(self._writing, timeout=wait_s)
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def _guarded(self, act: Callable[[], None]) -> None:
+        """Evidence may be lost, supervision goes on: what is wrong is told."""
+        try:
+            act()
+        except Exception as fault:
+            self._fault = error_line(fault)
+            self._end_clip()
+
+    def _go_on(self, seen: EncodedFrame) -> None:
+        if self._clip:
+            self._clip.add(seen)
+            if seen.time >= self._until:
+                self._end_clip()
+
+    def _keep(self, opened: Sequence[Alert], step: Step, frame: Frame, seen: EncodedFrame) -> None:
+        first = f"alert-{opened[0].id}"
+        self._folder.mkdir(exist_ok=True)
+        picture = jpeg_of(annotate(frame.image, step.mind), SNAPSHOT_QUALITY)
+        write_whole(self._folder / f"{first}.jpg", picture)
+        self._clip_for(first, seen)
+        assert self._clip
+        names = {"snapshot": f"{first}.jpg", "clip": f"{self._clip.path.stem}.webm"}
+        for alert in opened:
+            told = {**to_jsonable(alert), **self._stamp.of(alert.opened), **names}
+            write_whole(self._folder / f"alert-{alert.id}.json", json.dumps(told).encode() + b"\n")
+            self._links[alert.id] = {key: self._link(name) for key, name in names.items()}
+        self._fault = ""
+
+    def _clip_for(self, name: str, seen: EncodedFrame) -> None:
+        """Begin a clip with what was seen before, or have the one that is being made go on longer."""
+        if self._clip and seen.time - self._begun > LONGEST_CLIP_S:
+            self._end_clip()
+        if self._clip is None:
+            path = self._folder / f"{name}{SUFFIX}"
+            path.unlink(missing_ok=True)
+            self._clip, self._begun = ClipSpool(path), seen.time
+            for before in (*self._ring, seen):
+                self._clip.add(before)
+        self._until = seen.time + self._options.after_s
+
+    def _end_clip(self) -> None:
+        clip, self._clip = self._clip, None
+        if clip:
+            with suppress(OSError):
+                clip.close()
+            self._write_later(clip.path)
+
+    def _write_later(self, spool: Path) -> None:
+        self._writing = [w for w in self._writing if not w.done()]
+        left, self._left = self._left, []
+        for one in (*left, spool):
+            with suppress(RuntimeError):  # no room for a thread: the next process does it
+                self._writing.append(self._worker.submit(self._write, one))
+
+    def _write(self, spool: Path) -> None:
+        try:
+            write_clip_of(spool, spool.with_suffix(".webm"), self._fps)
+        except FileNotFoundError:
+            return  # it was deleted meanwhile, to make room
+        except Exception as fault:
+            self._fault = error_line(fault)
+            self._left.append(spool)
+
+    def _link(self, name: str) -> str:
+        path = self._folder / name
+        base = self._options.link
+        return str(path) if base is None else f"{base}/{path.parent.parent.name}/{EVIDENCE}/{name}"
+
+    def _noted(self, alert: Alert) -> Mapping[str, str]:
+        """What a process before this one noted."""
+        try:
+            told = json.loads(read_text_file(self._folder / f"alert-{alert.id}.json"))
+            return {key: self._link(Path(str(told[key])).name) for key in KEYS}
+        except (OSError, ValueError, KeyError, TypeError):
+            return {}

@@ -1,0 +1,5 @@
+"""What a run needs that nobody sits beside, for months.
+
+One run follows the other (`next_run.py`), nobody is woken at night for what can wait (`quiet_hours.py`), and
+it is known what its time is spent on (`phase_meter.py`).
+"""

@@ -1,0 +1,153 @@
+"""Sees to the room of a store once in a while, in a thread: a slow disk holds up no camera."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from visup.runs.evidence.keeper import EVIDENCE
+from visup.serving.room.retention import Removal, RemovalReason, removals
+from visup.serving.room.stored import StoredFiles, StoredRun, look_into
+from visup.serving.site.records import RetentionLimits
+from visup.serving.site_log import SITE, SiteEvent, Tell
+
+LOOK_S = 10.0
+"""Seconds between two looks: cameras of a site write some megabytes meanwhile."""
+
+WHY = {
+    RemovalReason.AGE: "they were older than is to be kept",
+    RemovalReason.STORE: "the store was larger than it may be",
+    RemovalReason.DISK: "the disk was nearly full",
+}
+
+
+class Housekeeper:
+    """Deletes what is not kept any more.
+
+    Args:
+        store: Folder of all runs.
+        limits: What is kept; replaced when the site file changes.
+        tell: Told what was deleted.
+        now: Seconds since 1970.
+
+    Attributes:
+        limits: As given.
+        room: Bytes of the store by what they are, as last looked at.
+        deleted: How many runs, and evidence of how many alerts, were deleted so far.
+    """
+
+    def __init__(
+        self,
+        store: Path,
+        limits: RetentionLimits,
+        tell: Tell,
+        now: Callable[[], float] = time.time,
+    ) -> None:
+        self.limits = limits
+        self.room: Mapping[str, float] = {}
+        self.deleted: Counter[str] = Counter({"runs": 0, EVIDENCE: 0})
+        self._store, self._tell, self._now = store, tell, now
+        self._looked: float | None = None
+        self._full = False
+        self._thread: threading.Thread | None = None
+
+    def turn(self, now: float, going_on: Iterable[Path]) -> None:
+        """Look, if it is time to and the last look is over; returns at once.
+
+        Args:
+            now: Seconds from any start.
+            going_on: Folders of the runs that are under way.
+        """
+        busy = self._thread is not None and self._thread.is_alive()
+        if busy or (self._looked is not None and now - self._looked < LOOK_S):
+            return
+        self._looked = now
+        under_way = tuple(going_on)
+        self._thread = threading.Thread(
+            target=self._look_quietly, args=(under_way,), name="housekeeper", daemon=True
+        )
+        self._thread.start()
+
+    def look(self, going_on: Iterable[Path]) -> None:
+        """Look, and delete what is not kept any more.
+
+        Args:
+            going_on: Folders of the runs that are under way.
+
+        Raises:
+            OSError: The store cannot be read.
+        """
+        files = look_into(self._store, going_on)
+        gone = removals(files, self.limits, self._now())
+        for one in gone:
+            _remove(one)
+        self._note(files, gone)
+        self._tell_of(gone)
+        self._tell_if_full(files.free + sum(one.size for one in gone))
+
+    def _look_quietly(self, going_on: Iterable[Path]) -> None:
+        with suppress(OSError):  # a store that is away comes back, or its cameras tell
+            self.look(going_on)
+
+    def _note(self, files: StoredFiles, gone: tuple[Removal, ...]) -> None:
+        self.room = {
+            "free": float(files.free),
+            "runs": float(files.size - files.evidence_size),
+            EVIDENCE: float(files.evidence_size),
+        }
+        self.deleted.update(_kind(one) for one in gone)
+
+    def _tell_of(self, gone: tuple[Removal, ...]) -> None:
+        for why in RemovalReason:
+            counts = Counter(_kind(one) for one in gone if one.why is why)
+            if counts:
+                freed = sum(one.size for one in gone if one.why is why) / 1e6
+                what = " and ".join(
+                    f"{n} runs" if kind == "runs" else f"evidence of {n} alerts"
+                    for kind, n in sorted(counts.items())
+                )
+                said = f"{what} deleted ({freed:.1f} MB): {WHY[why]}"
+                kind = SiteEvent.NO_ROOM if why is RemovalReason.DISK else SiteEvent.DELETED
+                self._tell(SITE, said, kind, why=why.value, freed_bytes=round(freed * 1e6))
+
+    def _tell_if_full(self, free: float) -> None:
+        """Say it when nothing is left that could go, once until there is room again."""
+        full = free < self.limits.free_bytes
+        if full and not self._full:
+            said = (
+                f"the disk has {free / 1e9:.1f} GB left and nothing that can be deleted: make room"
+            )
+            self._tell(SITE, said, SiteEvent.NO_ROOM, free_bytes=round(free))
+        self._full = full
+
+
+def _kind(one: Removal) -> str:
+    return "runs" if isinstance(one.what, StoredRun) else EVIDENCE
+
+
+def _remove(one: Removal) -> None:
+    """Delete it; a file that cannot be is tried again at the next look."""
+    if isinstance(one.what, StoredRun):
+        folder = one.what.folder
+        others = [p for p in folder.iterdir() if p.name != EVIDENCE] if folder.is_dir() else []
+        _delete(others)
+    else:
+        folder = one.what.files[0].parent.parent
+        _delete(one.what.files)
+    for empty in (folder / EVIDENCE, folder):
+        with suppress(OSError):  # there is something left in it
+            empty.rmdir()
+
+
+def _delete(paths: Iterable[Path]) -> None:
+    for path in paths:
+        with suppress(OSError):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)

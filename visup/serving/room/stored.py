@@ -1,0 +1,126 @@
+"""What a store holds: runs, and the evidence of each alert in them."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from visup.agent.storage.journal_reader import JOURNAL
+from visup.runs.evidence.keeper import EVIDENCE
+from visup.serving.run_store import is_run_name
+
+
+@dataclass(frozen=True, slots=True)
+class StoredEvidence:
+    """Files of one alert: its picture, its clip, its record.
+
+    Attributes:
+        files: Paths.
+        size: Bytes.
+        written: When the last of them was written, seconds since 1970.
+    """
+
+    files: tuple[Path, ...]
+    size: int
+    written: float
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRun:
+    """A run in the store.
+
+    Attributes:
+        folder: Of the run.
+        size: Bytes of all but evidence.
+        written: When it was last written to, seconds since 1970.
+        goes_on: Whether it is under way.
+        evidence: Of its alerts, the oldest first.
+    """
+
+    folder: Path
+    size: int
+    written: float
+    goes_on: bool
+    evidence: tuple[StoredEvidence, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StoredFiles:
+    """All that a store holds.
+
+    Attributes:
+        runs: Of all cameras.
+        free: Bytes that are free on its disk.
+    """
+
+    runs: tuple[StoredRun, ...]
+    free: int
+
+    @property
+    def evidence_size(self) -> int:
+        """Bytes of all evidence."""
+        return sum(e.size for run in self.runs for e in run.evidence)
+
+    @property
+    def size(self) -> int:
+        """Bytes of everything."""
+        return self.evidence_size + sum(run.size for run in self.runs)
+
+
+def look_into(store: Path, going_on: Iterable[Path]) -> StoredFiles:
+    """What a store holds now; files that vanish meanwhile are left out.
+
+    Args:
+        store: Folder of all runs.
+        going_on: Folders of the runs that are under way.
+    """
+    under_way = set(going_on)
+    folders = sorted(p for p in store.glob("*/*") if is_run_name(p.name) and _is_plain_folder(p))
+    runs = tuple(_run(folder, goes_on=folder in under_way) for folder in folders)
+    return StoredFiles(runs, shutil.disk_usage(store).free)
+
+
+def _is_plain_folder(path: Path) -> bool:
+    """What a link leads to belongs to somebody else."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def _run(folder: Path, *, goes_on: bool) -> StoredRun:
+    own = [seen for p in folder.iterdir() if p.name != EVIDENCE for seen in _sizes([p])]
+    evidence = folder / EVIDENCE
+    kept = tuple(_evidence(evidence)) if _is_plain_folder(evidence) else ()
+    journal = folder / JOURNAL
+    written = max((at for _, at in own), default=max((e.written for e in kept), default=0.0))
+    with suppress(OSError):
+        written = written or journal.stat().st_mtime
+    return StoredRun(folder, sum(size for size, _ in own), written, goes_on, kept)
+
+
+def _evidence(folder: Path) -> Iterator[StoredEvidence]:
+    """By alert: files whose names differ in their ending alone belong together."""
+    together: dict[str, list[Path]] = {}
+    for path in folder.iterdir():
+        together.setdefault(path.name.lstrip(".").partition(".")[0], []).append(path)
+    found = []
+    for files in together.values():
+        seen = _sizes(files)
+        if seen:
+            size, written = sum(s for s, _ in seen), max(at for _, at in seen)
+            found.append(StoredEvidence(tuple(sorted(files)), size, written))
+    yield from sorted(found, key=lambda e: (e.written, e.files))
+
+
+def _sizes(paths: Sequence[Path]) -> list[tuple[int, float]]:
+    """Size and time of each file that is there; of a folder, those of all files in it."""
+    found = []
+    for path in paths:
+        with suppress(OSError):
+            if _is_plain_folder(path):
+                found += _sizes(list(path.iterdir()))
+            else:
+                told = path.lstat()
+                found.append((told.st_size, told.st_mtime))
+    return found

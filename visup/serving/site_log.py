@@ -1,0 +1,100 @@
+"""What happens to cameras, told to whoever keeps the service: as lines, or as records that programs read."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any, Protocol
+
+from visup.agent.storage.wall_clock import utc_text
+from visup.wording import escaped_json
+
+SITE = "site"
+"""What messages that are about no camera are about."""
+
+
+class SiteEvent(StrEnum):
+    """Kinds of what happens."""
+
+    BEGUN = "begun"
+    RESUMED = "resumed"
+    ENDED = "ended"
+    DIED = "died"
+    HUNG = "hung"
+    TOO_LARGE = "too_large"
+    NOT_CLOSED = "not_closed"
+    NOT_BEGUN = "not_begun"
+    NOTICE = "notice"
+    """A word of the camera itself, such as that its stream dropped."""
+    ROLLED = "rolled"
+    RELOADED = "reloaded"
+    NOT_RELOADED = "not_reloaded"
+    MONITORED = "monitored"
+    NOT_MONITORED = "not_monitored"
+    DELETED = "deleted"
+    NO_ROOM = "no_room"
+
+
+_WARNINGS = frozenset(
+    {
+        SiteEvent.DIED,
+        SiteEvent.HUNG,
+        SiteEvent.TOO_LARGE,
+        SiteEvent.NOT_CLOSED,
+        SiteEvent.NOT_BEGUN,
+        SiteEvent.NOTICE,
+        SiteEvent.NOT_RELOADED,
+        SiteEvent.NOT_MONITORED,
+        SiteEvent.NO_ROOM,
+    }
+)
+
+
+class Tell(Protocol):
+    """Told what happened."""
+
+    def __call__(
+        self, camera: str, text: str, kind: SiteEvent = SiteEvent.NOTICE, /, **facts: Any
+    ) -> None:
+        """Pass it on.
+
+        Args:
+            camera: Its name, or `SITE`.
+            text: One sentence.
+            kind: What sort of thing it is.
+            facts: The same for programs, such as `run` or `exit_code`.
+        """
+
+
+class SiteLog:
+    """Writes what happens, a line each.
+
+    Args:
+        write: Takes a line.
+        as_json: Whether lines are JSON objects.
+        now: Seconds since 1970.
+    """
+
+    def __init__(
+        self,
+        write: Callable[[str], object],
+        *,
+        as_json: bool = False,
+        now: Callable[[], float] = time.time,
+    ) -> None:
+        self._write, self._as_json, self._now = write, as_json, now
+        self._host = socket.gethostname()
+
+    def __call__(
+        self, camera: str, text: str, kind: SiteEvent = SiteEvent.NOTICE, /, **facts: Any
+    ) -> None:
+        """Write one line."""
+        time_text = utc_text(self._now())
+        if not self._as_json:
+            self._write(f"{time_text} {camera}: {text}")
+            return
+        level = "warning" if kind in _WARNINGS else "info"
+        named = {"time": time_text, "level": level, "host": self._host, "camera": camera}
+        self._write(escaped_json({**named, "kind": kind.value, "text": text, **facts}))
