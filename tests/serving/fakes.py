@@ -45,6 +45,9 @@ class FakeChild:
     def memory_mb(self) -> float | None:
         return self.memory
 
+    def cpu_s(self) -> float | None:
+        return None
+
     def ask_to_end(self) -> None:
         self.asked += 1
         if not self.stubborn and self.code is None:

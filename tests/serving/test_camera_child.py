@@ -108,7 +108,7 @@ def test_it_is_given_its_job_and_what_it_tells_is_heard() -> None:
 
 
 def test_no_password_stands_in_the_list_of_processes() -> None:
-    one = child("import sys; sys.stdin.read()")
+    one = child("import sys; sum(range(10**7)); sys.stdin.read()")
     words = Path(f"/proc/{one.pid}/cmdline")
     if not words.exists():
         one.kill()
@@ -118,6 +118,7 @@ def test_no_password_stands_in_the_list_of_processes() -> None:
     assert b"swordfish77" not in words.read_bytes()
     assert b"swordfish77" not in Path(f"/proc/{one.pid}/environ").read_bytes()
     wait_for(lambda: 1.0 < (one.memory_mb() or 0.0) < 200.0)
+    wait_for(lambda: 0.0 < (one.cpu_s() or 0.0) < 20.0)
     one.kill()
     wait_for(lambda: one.exit_code() is not None)
     one.close()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -76,6 +78,18 @@ def wait_for(what: Callable[[], object], seconds: float = 60.0) -> None:
         time.sleep(0.02)
 
 
+def read_by_a_new_process(run: Path) -> str:
+    """Why the state cannot be taken up where nothing is loaded yet, or 'None'."""
+    code = (
+        "import sys; from pathlib import Path; from visup.runs.checkpoints import read_checkpoint;"
+        "print(read_checkpoint(Path(sys.argv[1]))[1])"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code, str(run)], capture_output=True, text=True, check=True
+    )
+    return told.stdout.strip()
+
+
 def test_it_ends_without_its_supervisor_and_the_next_goes_on(tmp_path: Path) -> None:
     from visup.serving.camera_child import CameraChild
 
@@ -96,8 +110,13 @@ def test_it_ends_without_its_supervisor_and_the_next_goes_on(tmp_path: Path) -> 
     kept, _ = read_checkpoint(tmp_path / "run")
     assert kept
     assert kept.frame_index == last  # the state after the last step was kept, too
+    assert read_by_a_new_process(tmp_path / "run") == "None"
 
-    later = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGTERM))
+    def stop_once_it_watches() -> None:
+        wait_for(lambda: Recording.open(tmp_path / "run").count() > before)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    later = threading.Thread(target=stop_once_it_watches)
     later.start()
     _, told = watched(CameraJob(settings, OPTIONS, tmp_path / "run", resume=True))
     later.join()

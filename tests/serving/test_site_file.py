@@ -61,6 +61,7 @@ behaviours = ["lamp.py", "package.module:Lamp"]
 preset = "cell"
 pace = 5.0
 fov = 40.0
+rest_s = 2.0
 sinks = ["webhook:https://example.org/hook", "file:alerts.jsonl"]
 """
     one = camera(tmp_path, text)
@@ -77,6 +78,7 @@ sinks = ["webhook:https://example.org/hook", "file:alerts.jsonl"]
         preset="cell",
         pace=5.0,
         fov_vertical_deg=40.0,
+        rest_s=2.0,
     )
     assert one.options.sinks == (
         f"file:{tmp_path / 'alerts.jsonl'}",

@@ -8,6 +8,7 @@ from typing import Any
 
 from visup.agent import Alert, Event, Severity, TaskBelief, Verdict
 from visup.agent.model.records import empty
+from visup.agent.storage.wall_clock import WallClock
 from visup.tasks.tools.outline import Branch
 
 
@@ -172,6 +173,7 @@ class RunData:
         spans: How stages, relations and presences changed.
         key_frames: In order of time.
         efforts: What each behaviour took.
+        clock: When it was by the clock of the wall, as far as that is known: of a camera.
         facts: Further facts about the run, in the order to show them: settings, versions, timing;
             values may be nested mappings and lists.
         problem: Why the source ended early, or None.
@@ -195,6 +197,7 @@ class RunData:
     key_frames: tuple[KeyFrame, ...] = ()
     efforts: tuple[BehaviourCost, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=empty)
+    clock: WallClock = field(default_factory=WallClock)
     problem: str | None = None
     notes: tuple[str, ...] = ()
     courses: tuple[Branch, ...] = ()

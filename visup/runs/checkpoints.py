@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from visup.version import __version__
 
 CHECKPOINT = "state.bin"
 LARGEST_STATE_BYTES = 2**30
+HELD_IN = ("visup.runs.wiring", "visup.report.collector")
+"""Classes of these, and of all that they use, may be in a state; reading one makes only what is loaded."""
 PACKED = b"VISUPSTZ"
 """Before a state that is compressed."""
 BYTES_AN_HOUR = 160e6
@@ -168,6 +171,8 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
     Returns:
         It, or None when there is none that can be used, and then why, when there is one.
     """
+    for name in HELD_IN:
+        import_module(name)
     try:
         packed = unsealed(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES))
         told = load_state(_unpacked(packed))

@@ -93,6 +93,7 @@ class Recorder:
         self._patience = 0
         self._lost = 0
         self._clock: WallClock | None = None
+        self._wall = WallClock()
         self._fault = ""
 
     def __call__(self, step: Step, frame: Frame) -> None:
@@ -106,7 +107,7 @@ class Recorder:
 
     def keep_clock(self, clock: WallClock) -> None:
         """Note when it was by the clock of the wall, with the next step."""
-        self._clock = clock
+        self._clock = self._wall = clock
         self.facts["began"] = clock.text(0.0)
 
     def begin_anew(self) -> None:
@@ -228,7 +229,7 @@ class Recorder:
         videos = self.folder.glob("annotated*.webm")
         # In the order of writing: `annotated.webm`, `annotated-2.webm`, ...
         names = sorted((path.name for path in videos), key=lambda name: (len(name), name))
-        return replace(collected, videos=tuple(names))
+        return replace(collected, videos=tuple(names), clock=self._wall)
 
 
 def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:

@@ -229,6 +229,7 @@ def catch_up(
     source: VideoSource,
     past: InterruptedRun,
     tell: Callable[[Step, Frame], None],
+    late: Callable[[Step], None],
     *,
     whole: bool,
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
@@ -239,6 +240,7 @@ def catch_up(
         source: Just opened.
         past: The run.
         tell: Told of the recorded steps whose frames there are.
+        late: Told of all recorded steps since the state.
         whole: Whether its behaviours are as the state left them, too.
 
     Returns:
@@ -249,7 +251,7 @@ def catch_up(
     """
     after = past.state.frame_index if past.state else -1
     if source.live:
-        return _live(agent, source, past, after), ("Nothing was seen in between.",)
+        return _live(agent, source, past, late, after), ("Nothing was seen in between.",)
     answers = past.recording.answers()
     differing = 0
     frames: Iterator[Frame] = iter(source)
@@ -259,7 +261,9 @@ def catch_up(
         differing += pack_observation(_without_troubles(again)) != pack_observation(
             _without_troubles(seen)
         )
-        tell(agent.reason(seen, answers.get(seen.frame_index, {})), frame)
+        step = agent.reason(seen, answers.get(seen.frame_index, {}))
+        tell(step, frame)
+        late(step)
     notes = []
     if not whole and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
@@ -296,11 +300,17 @@ def _without_troubles(observation: Observation) -> Observation:
     )
 
 
-def _live(agent: Agent, source: VideoSource, past: InterruptedRun, after: int) -> Iterator[Frame]:
+def _live(
+    agent: Agent,
+    source: VideoSource,
+    past: InterruptedRun,
+    late: Callable[[Step], None],
+    after: int,
+) -> Iterator[Frame]:
     """Frames of a camera, counted and timed on from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):
-        agent.reason(last, answers.get(last.frame_index, {}))
+        late(agent.reason(last, answers.get(last.frame_index, {})))
         for behaviour in agent.behaviours:
             if missed := getattr(behaviour, "missed", None):
                 missed(last)

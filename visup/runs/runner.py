@@ -32,7 +32,6 @@ from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.runs.unattended.next_run import RollOver, RunPlaces
 from visup.runs.unattended.phase_meter import PhaseMeter
-from visup.runs.unattended.quiet_hours import QuietGate, QuietHours
 from visup.runs.wiring import VerdictMonitor, build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 from visup.version import __version__
@@ -112,6 +111,7 @@ def _supervised(
     with ExitStack() as stack:
         answered = audience.operator is not None and bool(audience.operator.answers)
         run = _Run(settings, folder, options, past, stack, answered=answered)
+        run.keep_evidence()
         frames = run.catch_up(past) if past else run.source
         run.connect(audience, past)
         timed = run.timed(frames, past)
@@ -147,12 +147,10 @@ class _Run:
         # Before the journal: what is refused leaves no run behind.
         told = past.recording.facts().get("clock") if past else None
         self._stamp = RecordStamp(options.camera, WallClock.read(told), live=self.source.live)
-        self._sinks = sinks_of(options, settings.source, self._stamp)
+        written = past.recording.written() if past else None
+        self._sinks = sinks_of(options, settings.source, self._stamp, written)
         stack.callback(self._sinks.close)
-        resume = past is not None
-        self._recorder = (
-            Recorder(settings, self.source, folder, options, resume=resume) if folder else None
-        )
+        self._recorder = self._recorder_in(folder, options, resume=past is not None)
         stack.callback(self._close_journals)
         if past:
             past.check_unchanged()  # now that nobody else may write it
@@ -164,12 +162,12 @@ class _Run:
         self._last: Step | None = None  # while none is under way
         self._stopped = False
 
-    def _keep_quiet(self, options: RunOptions, past: InterruptedRun | None) -> None:
-        if options.quiet:
-            hours = QuietHours.read(options.quiet, options.timezone)
-            last = past.recording.written() if past else None
-            gate = QuietGate(hours, lambda time_s: self._stamp.clock.seconds(time_s), last)
-            self._sinks.alerts.gate = gate
+    def _recorder_in(
+        self, folder: Path | None, options: RunOptions, *, resume: bool
+    ) -> Recorder | None:
+        if folder is None:
+            return None
+        return Recorder(self._settings, self.source, folder, options, resume=resume)
 
     def _close_journals(self) -> None:
         self._roll_over.wait(BOOKS_S)
@@ -180,7 +178,8 @@ class _Run:
         """Make the agent what it was, and give the frames that are left."""
         past, whole = self._take_up(past)
         tell = self._recorder.catch_up if self._recorder else lambda step, frame: None
-        frames, notes = catch_up(self._agent, self.source, past, tell, whole=whole)
+        late = self._sinks.alerts.late
+        frames, notes = catch_up(self._agent, self.source, past, tell, late, whole=whole)
         self._notes = (*self._notes, *notes)
         return frames
 
@@ -209,12 +208,12 @@ class _Run:
         """Let everyone follow the agent, and its surroundings report their faults."""
         if self._recorder:
             self._stamp.changed = self._recorder.keep_clock
+            if self._stamp.clock.anchors:
+                self._recorder.keep_clock(self._stamp.clock)
         # The journal comes first: what is told was recorded before.
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
-        self._keep_quiet(self._options, past)
         # Evidence comes before who is told where it is.
-        self._evidence = self._evidence_in(self._folder, self._options)
         kept = (self._evidence,) if self._evidence else ()
         others = (*audience.observers, *kept, self._sinks, *answering)
         clocked = (self._stamp,) if self.source.live else ()
@@ -230,16 +229,17 @@ class _Run:
             self.source.notify = notify(self._sinks, audience.notice)
             self._faults.add_source(self.source.runtime_faults)
 
-    def _evidence_in(self, folder: Path | None, options: RunOptions) -> EvidenceKeeper | None:
-        """What keeps evidence of alerts, where that is wanted."""
-        if options.evidence is None or folder is None:
-            return None
+    def keep_evidence(self) -> None:
+        """Keep evidence of alerts, where that is wanted."""
+        self._evidence: EvidenceKeeper | None = None
+        wanted = self._options.evidence
+        if wanted is None or self._folder is None:
+            return
         fps = self.source.fps / self.source.every
-        keeper = EvidenceKeeper(folder, options.evidence, fps, self._stamp)
-        self._stack.callback(keeper.close, options.closing_s)
+        keeper = self._evidence = EvidenceKeeper(self._folder, wanted, fps, self._stamp)
+        self._stack.callback(keeper.close, self._options.closing_s)
         self._faults.add_source(keeper.runtime_faults)
         self._sinks.alerts.links = keeper.links
-        return keeper
 
     def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
         """Say something before the first frame; who is told nothing then finds it among the notes."""

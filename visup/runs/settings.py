@@ -192,6 +192,8 @@ class WatchSettings:
     ] = ()
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
+    rest_s: float | None = None
+    """Seconds between two looks for motion while nothing changes; None to look at each frame."""
     detections: Annotated[
         Path | None,
         Option(
@@ -294,6 +296,8 @@ class RunOptions:
     """A run that goes on is followed by the next after so many seconds of the source."""
     run_bytes: int | None = None
     """So is one whose journal has become larger."""
+    deliveries: Path | None = None
+    """File in which alerts wait until sinks take them, also over a kill; None to drop what they do not."""
     quiet: tuple[str, ...] = ()
     """Hours in which only critical alerts go to sinks, such as '22:00-06:00'."""
     timezone: str | None = None

@@ -24,6 +24,7 @@ from visup.percepts.detections import (
 )
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
+from visup.percepts.motion.resting import RestingMotion
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.video import VideoSource, open_source
@@ -250,7 +251,8 @@ def _behaviours(
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
     taught = database.taught if database is not None else ()
-    moving: Behaviour = AppearanceBehaviour(taught) if taught else MotionBehaviour()
+    eyes = RestingMotion(settings.rest_s) if settings.rest_s else MotionBehaviour()
+    moving: Behaviour = AppearanceBehaviour(taught) if taught else eyes
     if places:
         moving = PlacedBehaviour(places, taught)
     if boxes:

@@ -86,6 +86,14 @@ class CameraChild:
             return None
         return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
+    def cpu_s(self) -> float | None:
+        """Processor time that it has used, seconds; None where the system does not say."""
+        try:
+            told = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+            return sum(map(int, told[11:15])) / os.sysconf("SC_CLK_TCK")
+        except (OSError, ValueError):
+            return None
+
     def ask_to_end(self) -> None:
         """Let it finish its step and close its books."""
         self._signal(signal.SIGTERM)

@@ -14,7 +14,7 @@ import threading
 import time
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -35,6 +35,9 @@ from visup.serving.warm_up import has_job, warm_up
 
 CLOSING_S = 10.0
 """How long a run's last process is waited for, seconds."""
+
+DELIVERIES = "deliveries.sqlite"
+"""In the folder of a camera: alerts that its sinks have not taken yet."""
 
 BEAT_S = 0.5
 """Seconds between two signs of life."""
@@ -119,7 +122,7 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
             past.settings if past else job.settings,
             folder,
             audience=audience,
-            options=job.options,
+            options=replace(job.options, deliveries=job.folder.parent / DELIVERIES),
             past=past,
             at_once=False,
         )

@@ -57,6 +57,10 @@ class Child(Protocol):
         """Memory in use, megabytes, or None."""
         ...
 
+    def cpu_s(self) -> float | None:
+        """Processor time used, seconds, or None."""
+        ...
+
     def ask_to_end(self) -> None:
         """Let it close its books."""
         ...
@@ -161,6 +165,7 @@ class CameraSupervisor:
     def status(self, now: float) -> CameraStatus:
         """What is told of it to those who ask from outside."""
         life = self._life
+        self.figures.take({"cpu_s": life.child.cpu_s()} if life else {})
         stepped = None if life is None or life.last_step is None else now - life.last_step
         return CameraStatus(
             self.camera.name,

@@ -1,6 +1,7 @@
 """Sinks: alerts and figures for other programs, outside of the cycle.
 
-Read `outbox.py` (how nothing waits for a sink), then `lines.py` (files), `webhook.py`, and
+Read `outbox.py` (how nothing waits for a sink), `insistent_outbox.py` with `delivery_log.py` (how nothing is
+lost where a service watches), then `lines.py` (files), `webhook.py`, and
 `registry.py` (what `--sink` means).
 """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,8 @@ from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import to_jsonable
 from visup.agent.storage.wall_clock import RecordStamp
 from visup.redaction import redacted
+from visup.sinks.delivery_log import DeliveryLog
+from visup.sinks.insistent_outbox import InsistentOutbox
 from visup.sinks.outbox import Outbox
 
 VERSION = 1
@@ -46,6 +49,7 @@ class AlertSender:
         outboxes: Of the sinks.
         source: What is watched.
         stamp: What else stands in every record: camera, host, time of the wall.
+        log: Where records wait for outboxes that do not give up; None where they are left in outboxes.
 
     Attributes:
         links: Tells where the evidence of an alert is, by keys of its record.
@@ -53,9 +57,13 @@ class AlertSender:
     """
 
     def __init__(
-        self, outboxes: Sequence[Outbox], source: str, stamp: RecordStamp | None = None
+        self,
+        outboxes: Sequence[Outbox | InsistentOutbox],
+        source: str,
+        stamp: RecordStamp | None = None,
+        log: DeliveryLog | None = None,
     ) -> None:
-        self._outboxes = outboxes
+        self._outboxes, self._log = outboxes, log
         self._stamp = stamp or RecordStamp()
         self._source = redacted(source)
         self.links: Callable[[Alert], Mapping[str, str]] = lambda alert: {}
@@ -63,20 +71,47 @@ class AlertSender:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Send the alerts that a step opened or closed."""
-        for alert in self.gate(step):
-            when = alert.opened if alert.closed is None else alert.closed
-            self._send({**alert_record(alert, self._source), **self.links(alert)}, when)
+        records = [self._record_of(alert) for alert in self.gate(step)]
+        if records or step.alerts:
+            self._send(records, step.frame_index)
+
+    def late(self, step: Step) -> None:
+        """Send what a step told that was recorded by a process that was killed before it could send it."""
+        if self._log and step.alerts and step.frame_index > self._log.told_frame:
+            records = [self._record_of(alert) for alert in self.gate(step)]
+            self._send(records, step.frame_index)
 
     def notice(self, text: str) -> None:
         """Send a sentence that cannot wait for a step."""
         told = {"version": VERSION, "record": "notice", "source": self._source, "text": text}
-        self._send(told)
+        self._send([{**told, **self._stamp.of(None)}])
 
     def end(self, verdict: Verdict | None, steps: int) -> None:
         """Send the verdict."""
-        self._send(verdict_record(verdict, steps, self._source))
+        self._send([{**verdict_record(verdict, steps, self._source), **self._stamp.of(None)}])
 
-    def _send(self, record: dict[str, Any], when: float | None = None) -> None:
-        stamped = {**record, **self._stamp.of(when)}
+    def _record_of(self, alert: Alert) -> dict[str, Any]:
+        when = alert.opened if alert.closed is None else alert.closed
+        told = {**alert_record(alert, self._source), **self.links(alert)}
+        return {**told, **self._stamp.of(when)}
+
+    def _send(self, records: Sequence[dict[str, Any]], frame_index: int | None = None) -> None:
+        if self._log and self._noted(self._log, records, frame_index):
+            return
         for outbox in self._outboxes:
-            outbox.offer(stamped)
+            for record in records:
+                outbox.offer(record)
+
+    def _noted(
+        self, log: DeliveryLog, records: Sequence[dict[str, Any]], frame_index: int | None
+    ) -> bool:
+        """Whether records wait in the log now; where it cannot be written they go out at once or never."""
+        insistent = [o for o in self._outboxes if isinstance(o, InsistentOutbox)]
+        try:
+            lost = log.add([o.key for o in insistent], records, frame_index)
+        except sqlite3.Error:
+            return False
+        for outbox in insistent:
+            outbox.dropped += lost
+            outbox.wake()
+        return True

@@ -80,24 +80,11 @@ class Outbox:
     @property
     def note(self) -> str | None:
         """What the user should know at the end, or None when all was delivered."""
-        if not (self.dropped or self.failed):
-            return None
-        why = f": {self.fault}" if self.fault else ""
-        counts = f"{self.failed} failed, {self.dropped} dropped"
-        return f"Not all could be delivered to the sink {self.sink.name}: {counts}{why}"
+        return not_delivered(self.sink.name, self.failed, self.dropped, self.fault)
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with the sink now."""
-        if self.fault or self.dropped:
-            yield AlertCondition(
-                SINK_FAILED,
-                (),
-                Severity.WARNING,
-                f"The sink '{self.sink.name}' does not accept everything that is sent to it.",
-                tuple(part for part in (self.fault, _dropped(self.dropped)) if part),
-                key=self.sink.name,
-                needs=(),
-            )
+        yield from sink_fault(self.sink.name, self.fault, self.dropped)
 
     def _run(self) -> None:
         while not self._given_up.is_set():
@@ -124,6 +111,28 @@ class Outbox:
         else:
             self.delivered += 1
             self.fault = ""
+
+
+def not_delivered(name: str, failed: int, dropped: int, fault: str) -> str | None:
+    """What the user should know of a sink at the end, or None when it took all."""
+    if not (dropped or failed):
+        return None
+    why = f": {fault}" if fault else ""
+    return f"Not all could be delivered to the sink {name}: {failed} failed, {dropped} dropped{why}"
+
+
+def sink_fault(name: str, fault: str, dropped: int) -> Iterable[AlertCondition]:
+    """The condition of a sink that does not take all, as long as it does not."""
+    if fault or dropped:
+        yield AlertCondition(
+            SINK_FAILED,
+            (),
+            Severity.WARNING,
+            f"The sink '{name}' does not accept everything that is sent to it.",
+            tuple(part for part in (fault, _dropped(dropped)) if part),
+            key=name,
+            needs=(),
+        )
 
 
 def _dropped(count: int) -> str:

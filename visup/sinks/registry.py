@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.wall_clock import RecordStamp
 from visup.redaction import redacted
+from visup.sinks.delivery_log import DeliveryLog
+from visup.sinks.insistent_outbox import InsistentOutbox
 from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import CLOSING_S, MOST_WAITING, Outbox, Sink
@@ -55,6 +58,7 @@ class Sinks:
         closing_s: How long each may take to deliver what is left at the end, seconds.
         stamp: What else stands in every record of an alert.
         access: How servers of webhooks know that records come from here.
+        log: Where records of alerts wait until sinks take them; None to drop what they do not.
 
     Attributes:
         outboxes: One for each.
@@ -68,12 +72,13 @@ class Sinks:
         closing_s: float = CLOSING_S,
         stamp: RecordStamp | None = None,
         access: WebhookAccess | None = None,
+        log: DeliveryLog | None = None,
     ) -> None:
-        self._closing_s = closing_s
+        self._closing_s, self._log = closing_s, log
         made = [open_sink(w, access) for w in wanted]
-        self.outboxes = [Outbox(s, _room(s)) for s in made]
+        self.outboxes = [_outbox(s, n, log) for n, s in enumerate(made)]
         self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
-        self.alerts = AlertSender(self._of_alerts, source, stamp)
+        self.alerts = AlertSender(self._of_alerts, source, stamp, log)
         self._observers: list[Observer] = [
             _sender(o, _OF_STEPS[_kind(o)]) for o in self.outboxes if _kind(o) in _OF_STEPS
         ]
@@ -105,8 +110,16 @@ class Sinks:
 
     def close(self) -> None:
         """Close all sinks; once is enough."""
-        for outbox in self.outboxes:
-            outbox.close(self._closing_s)
+        insistent = [o for o in self.outboxes if isinstance(o, InsistentOutbox)]
+        for outbox in insistent:
+            outbox.begin_closing()  # all at once: what is left then is not lost
+        until = time.monotonic() + self._closing_s
+        for each in self.outboxes:
+            left = max(0.05, until - time.monotonic()) if each in insistent else self._closing_s
+            each.close(left)
+        if self._log:
+            self._log.close()
+            self._log = None
 
 
 def _jsonl(wanted: str, place: str) -> Sink:
@@ -146,7 +159,14 @@ _OF_STEPS: dict[str, Callable[[Step, Frame], object]] = {
 }
 
 
-def _kind(outbox: Outbox) -> str:
+def _outbox(sink: Sink, number: int, log: DeliveryLog | None) -> Outbox | InsistentOutbox:
+    """Two sinks may be shown by the same name: their place in the list tells them apart."""
+    if log is None or sink.name.partition(":")[0] in _OF_STEPS:
+        return Outbox(sink, _room(sink))
+    return InsistentOutbox(sink, f"{number} {sink.name}", log)
+
+
+def _kind(outbox: Outbox | InsistentOutbox) -> str:
     return outbox.sink.name.partition(":")[0]
 
 
@@ -154,7 +174,7 @@ def _room(sink: Sink) -> int:
     return MOST_STEPS if sink.name.partition(":")[0] in _OF_STEPS else MOST_WAITING
 
 
-def _sender(outbox: Outbox, of: Callable[[Step, Frame], object]) -> Observer:
+def _sender(outbox: Outbox | InsistentOutbox, of: Callable[[Step, Frame], object]) -> Observer:
     def send(step: Step, frame: Frame) -> None:
         outbox.offer(of(step, frame))
 

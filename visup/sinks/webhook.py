@@ -30,7 +30,15 @@ HEADERS = {"Content-Type": "application/json", "User-Agent": "visup"}
 
 
 class DeliveryError(OSError):
-    """A record was not taken."""
+    """A record was not taken.
+
+    Attributes:
+        final: Whether it will not be, however often it is sent.
+    """
+
+    def __init__(self, said: str, *, final: bool = False) -> None:
+        super().__init__(said)
+        self.final = final
 
 
 class Webhook:
@@ -89,8 +97,9 @@ class Webhook:
             else:
                 if 200 <= status < 300:
                     return
-                if (status < 500 and status != BUSY) or last:
-                    raise DeliveryError(_answer(status))
+                final = status < 500 and status != BUSY
+                if final or last:
+                    raise DeliveryError(_answer(status), final=final)
             self._wait(FIRST_WAIT_S * 2**attempt)
 
     def close(self) -> None:

@@ -313,3 +313,30 @@ def archive_closing(figures: Figures) -> Iterator[str]:
 def anything_different(figures: Figures) -> bool:
     """Whether something is not equal that ought to be."""
     return bool(figures["total"]["different"])
+
+
+def serving_closing(figures: Figures) -> Iterator[str]:
+    """What went wrong, and how the service took it."""
+    total = figures["total"]
+    yield (
+        f"{total['kills']} kills, {total['troubles']} troubles of streams, {total['reloads']} reloads, "
+        f"{total['sink_down']} times the sink was down ({total['refused']} records refused), "
+        f"{total['disk_full']} times the disk was full"
+    )
+    yield (
+        f"a camera is back in {total['median_s']:.1f} s (median), at most {total['slowest_s']:.1f} s; "
+        f"{total['not_back']} not back; memory {100 * total['memory_growth']:+.1f} %; "
+        f"closed in {total['closing_s']:.1f} s with exit code {total['exit_code']}"
+    )
+    yield (
+        f"one camera of 640x480 at 5 frames a second takes {100 * total['idle_cpu']:.1f} % of a processor "
+        f"while nothing moves ({100 * total['idle_cpu_without_rest']:.0f} % without rest), "
+        f"{100 * total['busy_cpu']:.0f} % while something does"
+    )
+
+
+def serving_failed(figures: Figures) -> bool:
+    """Whether an alert was lost or told twice, or a camera was away too long."""
+    from visup.evaluation.serving.rehearsal import failed
+
+    return failed(figures)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from visup.commands.eval import adapters
 from visup.commands.eval.evaluation import EvaluationCommand, count, flag, folder_argument
 from visup.commands.options import Setting
@@ -198,6 +200,33 @@ MACHINERY_EVALUATIONS = (
             Setting("traffic", float, 0.0, Option("Hours of traffic.", at_least=0.0)),
         ),
         closing=adapters.totals_closing,
+    ),
+    EvaluationCommand(
+        "serve",
+        """A service rehearsed: four cameras, kills, full disk, sinks down; every alert accounted for.
+
+        Two looped files and two network cameras on loopback that stall, drop and send garbage. Exit code 1
+        when an alert was lost or told twice, or a camera was away for more than 10 s after a kill.
+        """,
+        "visup.evaluation.serving.rehearsal:evaluate_serving",
+        "rehearsing",
+        (
+            *("alerts", "lost", "twice", "resent", "without_evidence", "kills", "slowest_s"),
+            *("median_s", "memory_growth", "frames", "dropped", "cpu"),
+        ),
+        (
+            Setting("minutes", float, 120.0, Option("How long.", at_least=1.0)),
+            Setting("kill_every", float, 60.0, Option("Seconds between kills.", at_least=5.0)),
+            Setting(
+                "store",
+                Path | None,
+                None,
+                Option("An empty folder; on a disk of at most 4 GB that is filled now and then."),
+            ),
+            _SEED,
+        ),
+        closing=adapters.serving_closing,
+        failed=adapters.serving_failed,
     ),
     EvaluationCommand(
         "stepping",

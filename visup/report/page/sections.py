@@ -81,7 +81,7 @@ def narrative(run: RunData) -> str:
     """All sentences in order, each leading to the key frame nearest to it."""
     if not run.events:
         return "<p class=empty>Nothing happened that was worth telling.</p>"
-    lines = "".join(_told(e, nearest(run.key_frames, e)) for e in run.events)
+    lines = "".join(_told(run, e, nearest(run.key_frames, e)) for e in run.events)
     more = (
         f"<p class=empty>{run.events_left_out} later sentences are only in the journal.</p>"
         if run.events_left_out
@@ -95,9 +95,18 @@ def nearest(key_frames: Sequence[KeyFrame], event: Event) -> KeyFrame | None:
     return min(key_frames, key=lambda k: (abs(k.time - event.time), k.time), default=None)
 
 
-def _told(event: Event, key: KeyFrame | None) -> str:
+def _time(run: RunData, seconds: float, lead: str = "") -> str:
+    """A time of the source, with that of the wall where it is known."""
+    wall = run.clock.text(seconds)
+    if wall is None:
+        return f"<time>{lead}{seconds:.1f} s</time>"
+    clock = f"<span class=clock>{wall[11:19]}</span>"
+    return f'<time datetime="{wall}" title="{wall}">{lead}{seconds:.1f} s {clock}</time>'
+
+
+def _told(run: RunData, event: Event, key: KeyFrame | None) -> str:
     word = SEVERITY_WORDS[event.severity]
-    time = f"<time>{event.time:.1f} s</time>"
+    time = _time(run, event.time)
     mark = f'<span class=mark title="{word}" aria-label="{word}">{MARKS[event.severity]}</span>'
     text = f"{time}{mark}<span>{escape(event.text)}</span>"
     inside = f'<a href="#{_anchor(key)}">{text}</a>' if key else f"<div>{text}</div>"
@@ -119,7 +128,7 @@ def _alert(run: RunData, alert: Alert) -> str:
     return (
         f'<li class="alert {word}"><p class=alert-head><span class=tag>{word}</span> '
         f"<strong>{escape(alert.kind.replace('_', ' '))}</strong> "
-        f"<time>from {alert.opened:.1f} s</time>, {until}</p>"
+        f"{_time(run, alert.opened, 'from ')}, {until}</p>"
         f"<p>{escape(alert.cause)}</p>"
         + (f"<p class=quiet>{escape(who)}</p>" if who else "")
         + (f"<p class=quiet>Evidence</p><ul class=evidence>{evidence}</ul>" if evidence else "")

@@ -102,9 +102,15 @@ def _watched(run: RunData) -> str:
     width, height = run.frame_size
     what = f"visup watched {run.duration:.1f} s of video ({run.frames} frames, {width}×{height})"
     if not run.tasks:
-        return f"{what} without a task."
+        return f"{what} without a task.{_began(run)}"
     names = ", ".join(f"“{t.task}”" for t in run.tasks)
-    return f"{what} against the task{'s' if len(run.tasks) > 1 else ''} {names}."
+    return f"{what} against the task{'s' if len(run.tasks) > 1 else ''} {names}.{_began(run)}"
+
+
+def _began(run: RunData) -> str:
+    """When it began by the clock of the wall, where that is known."""
+    at = run.clock.text(0.0)
+    return f" It began on {at[:10]} at {at[11:19]} UTC." if at else ""
 
 
 def _followed(run: RunData) -> str:

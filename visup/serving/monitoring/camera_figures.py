@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-COUNTED = ("frames", "dropped", "alerts_info", "alerts_warning", "alerts_critical")
+COUNTED = ("frames", "dropped", "cpu_s", "alerts_info", "alerts_warning", "alerts_critical")
 PHASE = "ms_"
 """Before the name of a phase: milliseconds that it took."""
 

@@ -86,7 +86,7 @@ class MonitoringServer:
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         answer = self.answer
 
-        class Handler(BaseHTTPRequestHandler):
+        class MonitoringHandler(BaseHTTPRequestHandler):
             timeout = PATIENCE_S
             server_version, sys_version = "visup", ""
 
@@ -108,7 +108,7 @@ class MonitoringServer:
             def log_message(self, *said: Any) -> None:
                 """Who asks is nobody's business."""
 
-        return Handler
+        return MonitoringHandler
 
 
 class _BoundedServer(ThreadingHTTPServer):

@@ -22,6 +22,7 @@ _COUNTERS: tuple[tuple[str, str, Value], ...] = (
         "Frames that were dropped to keep pace.",
         lambda c: c.totals.get("dropped"),
     ),
+    ("visup_cpu_seconds", "Processor time of its processes.", lambda c: c.totals.get("cpu_s")),
     ("visup_restarts", "How often the process of a camera was begun again.", lambda c: c.restarts),
 )
 _GAUGES: tuple[tuple[str, str, Value], ...] = (

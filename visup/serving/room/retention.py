@@ -16,7 +16,8 @@ from visup.serving.site.records import RetentionLimits
 
 DAY_S = 86400.0
 FRESH_S = 120.0
-"""A run that was written to so lately may be one that has just begun, or whose books are being closed."""
+"""A run that was written to so lately may have just begun, or its books are being closed; whoever was told of
+an alert so lately may still look at its evidence."""
 
 SLACK = 1.1
 """So much more than is wanted is freed on a full disk, that not every look finds it full again."""
@@ -59,16 +60,17 @@ def removals(files: StoredFiles, limits: RetentionLimits, now: float) -> tuple[R
     over = (r for r in files.runs if not r.goes_on and r.size and now - r.written > FRESH_S)
     runs = sorted(over, key=lambda r: r.written)
     evidence = sorted((e for r in files.runs for e in r.evidence), key=lambda e: e.written)
+    settled = [e for e in evidence if now - e.written > FRESH_S]
     gone: list[Removal] = [
         *_old(runs, now - DAY_S * limits.days),
         *_old(evidence, now - DAY_S * limits.evidence_days),
     ]
     if limits.store_bytes is not None:
         excess = files.size - limits.store_bytes - _freed(gone)
-        gone += _until(excess, [*runs, *evidence], gone, RemovalReason.STORE)
+        gone += _until(excess, [*runs, *settled], gone, RemovalReason.STORE)
     free = files.free + _freed(gone)
     short = SLACK * limits.free_bytes - free if free < limits.free_bytes else 0.0
-    gone += _until(short, [*evidence, *runs], gone, RemovalReason.DISK)
+    gone += _until(short, [*settled, *runs], gone, RemovalReason.DISK)
     return tuple(gone)
 
 

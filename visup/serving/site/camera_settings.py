@@ -63,6 +63,7 @@ def camera_of(
         realtime=one.realtime,
         patience_s=one.patience_s,
         attention=one.attention,
+        rest_s=one.rest_s or None,
     )
     QuietHours.read(one.quiet, site.timezone)  # mistakes are told now
     options = _options(site, one, folder, environment)

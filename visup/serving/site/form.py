@@ -159,6 +159,12 @@ class CameraTable(_Table):
         ge=0,
         description="How long a stream that drops is tried again within a process.",
     )
+    rest_s: float = Field(
+        default=4.0,
+        ge=0,
+        le=60,
+        description="Seconds between two looks for motion while nothing in the picture changes; 0 for none.",
+    )
     attention: bool = Field(default=False, description="Match well-known objects less often.")
     quiet: Names = Field(
         default=(),

@@ -1,0 +1,67 @@
+"""What one camera takes of a processor: while nothing moves, and while something crosses all the time."""
+
+from __future__ import annotations
+
+import time
+from itertools import cycle
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame
+from visup.evaluation.serving.scene import CROSSING, PACE, scene
+from visup.runs.evidence.frame_ring import FrameRing, encoded
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent
+from visup.serving.site.form import CameraTable
+
+NOISE = 2.0
+"""Of each pixel, levels: that of a camera in a lit room."""
+
+SETTLE_S, WATCHED_S = 20.0, 60.0
+
+
+def camera_costs(seed: int = 0) -> dict[str, float]:
+    """Shares of a processor that one camera takes, 640x480 pixels at 5 frames a second.
+
+    Of each frame what is done is what the service does, but for decoding and the journal; time is that of
+    the processor, so that other work on the machine counts little.
+
+    Args:
+        seed: Of the scene and the noise.
+
+    Returns:
+        `idle_cpu`, `idle_cpu_without_rest`, `busy_cpu`.
+    """
+    frames = scene(seed)
+    rest_s = float(CameraTable.model_fields["rest_s"].default)
+    return {
+        "idle_cpu": _share(frames[-1:], rest_s, seed),
+        "idle_cpu_without_rest": _share(frames[-1:], None, seed),
+        "busy_cpu": _share(frames[4 : CROSSING - 4 : 2], rest_s, seed),
+    }
+
+
+def _share(pictures: list[NDArray[np.uint8]], rest_s: float | None, seed: int) -> float:
+    """Seconds of a processor for a second of the source."""
+    agent = build_agent(WatchSettings(source="scene", rest_s=rest_s), live=True)
+    ring = FrameRing(8.0, 2**25)
+    noise = _noise(pictures[0].shape, seed)
+    used = 0.0
+    watched = WATCHED_S if rest_s else WATCHED_S / 6.0
+    for number, picture in enumerate(cycle(pictures)):
+        now = number / PACE
+        if now >= SETTLE_S + watched:
+            break
+        image = np.clip(picture + noise[number % len(noise)], 0, 255).astype(np.uint8)
+        begin = time.process_time()
+        agent.step(Frame(number, now, image))
+        ring.add(encoded(image, now))
+        used += (time.process_time() - begin) if now >= SETTLE_S else 0.0
+    agent.close()
+    return used / watched
+
+
+def _noise(shape: tuple[int, ...], seed: int) -> list[NDArray[np.int16]]:
+    rng = np.random.default_rng(seed)
+    return [np.rint(rng.normal(0.0, NOISE, shape)).astype(np.int16) for _ in range(7)]

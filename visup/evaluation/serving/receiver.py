@@ -1,0 +1,57 @@
+"""A server that takes records of alerts, and is down now and then."""
+
+from __future__ import annotations
+
+import json
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+LARGEST = 2**20
+
+
+class AlertReceiver:
+    """Takes records.
+
+    Attributes:
+        records: What was taken, in order.
+        down: Whether it refuses all.
+        refused: How many it has refused.
+        port: Where it listens.
+    """
+
+    def __init__(self) -> None:
+        self.records: list[dict[str, Any]] = []
+        self.down = False
+        self.refused = 0
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
+        self._server.daemon_threads = True
+        self.port = int(self._server.server_address[1])
+        threading.Thread(target=self._server.serve_forever, args=(0.2,), daemon=True).start()
+
+    def close(self) -> None:
+        """Take no more."""
+        self._server.shutdown()
+        self._server.server_close()
+
+    def _take(self, body: bytes) -> int:
+        """The status of the answer."""
+        if self.down:
+            self.refused += 1
+            return 503
+        self.records.append(json.loads(body))
+        return 204
+
+    def _handler(self) -> type[BaseHTTPRequestHandler]:
+        take = self._take
+
+        class ReceiverHandler(BaseHTTPRequestHandler):
+            def do_POST(self) -> None:
+                size = min(int(self.headers.get("Content-Length", 0)), LARGEST)
+                self.send_response(take(self.rfile.read(size)))
+                self.end_headers()
+
+            def log_message(self, *said: Any) -> None:
+                pass
+
+        return ReceiverHandler

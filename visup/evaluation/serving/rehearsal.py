@@ -1,0 +1,273 @@
+"""Rehearses a service: four cameras, two of them over the network with troubles, and all that goes wrong."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from visup.agent.model.errors import SettingsError
+from visup.evaluation.figures import Progress, silent, sums_of
+from visup.evaluation.serving.account import account_of
+from visup.evaluation.serving.costs import camera_costs
+from visup.evaluation.serving.night import Balloon, Killer, Timetable
+from visup.evaluation.serving.receiver import AlertReceiver
+from visup.evaluation.serving.scene import (
+    CAMERA,
+    PACE,
+    RULE,
+    SITE,
+    jpegs,
+    scene,
+    write_clip,
+)
+from visup.evaluation.serving.streams import TroubledStream
+
+NAMES = ("file-1", "file-2", "stream-1", "stream-2")
+START_S = 300.0
+CALM_S = 30.0
+"""At the end nothing goes wrong any more, so that what waits can be told."""
+
+DOWN_S, FULL_S = 20.0, 15.0
+LOOK_S = 0.2
+_SAMPLE = re.compile(r'^(visup_\w+)\{(?:.*,)?camera="([^"]+)"[^}]*\} (\S+)$', re.MULTILINE)
+
+
+def evaluate_serving(
+    minutes: float = 120.0,
+    kill_every: float = 60.0,
+    store: Path | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Rehearse a service for some time.
+
+    Args:
+        minutes: How long.
+        kill_every: Seconds between two kills.
+        store: An empty folder for its runs; on a small disk (at most 4 GB) that is filled now and then.
+        seed: Of all that goes wrong.
+        progress: Shows what is being done.
+
+    Returns:
+        `items` by camera: `alerts`, `lost`, `twice`, `resent`, `without_evidence`, `kills`, `slowest_s`,
+        `frames`, `dropped`, `restarts`, `cpu` (share of a processor); `total`: sums, `median_s` of a return,
+        `memory_growth` (share, from the second quarter to the last), `closing_s`, `exit_code`, what went
+        wrong how often, and `camera_costs`.
+    """
+    if store is not None and (not store.is_dir() or any(store.iterdir())):
+        raise SettingsError("the store is not an empty folder", where=str(store))
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        stage = Rehearsal(folder, store or folder / "store", seed, stack)
+        told = stage.rehearse(minutes, kill_every, progress)
+    progress("what a camera takes")
+    return {**told, "total": {**told["total"], **camera_costs(seed)}}
+
+
+class Rehearsal:
+    """All that takes part.
+
+    Args:
+        folder: For the site file and the clips.
+        store: For the runs.
+        seed: Of all that goes wrong.
+        stack: Ends what was begun.
+    """
+
+    def __init__(self, folder: Path, store: Path, seed: int, stack: ExitStack) -> None:
+        self._folder, self._store = folder, store
+        store.mkdir(exist_ok=True)
+        self._receiver = AlertReceiver()
+        stack.callback(self._receiver.close)
+        scenes = [scene(seed + n) for n in range(len(NAMES))]
+        for number in (0, 1):
+            write_clip(folder / f"{number}.webm", scenes[number])
+        self._streams = [TroubledStream(jpegs(s), seed + n) for n, s in enumerate(scenes[2:])]
+        for stream in self._streams:
+            stack.callback(stream.close)
+        self._balloon = Balloon(store)
+        stack.callback(self._balloon.empty)
+        self._killer = Killer(store, NAMES, seed)
+        self._monitoring = _free_port()
+        self._write_site()
+        self._figures: dict[str, dict[str, float]] = {}
+        self._memory: list[float] = []
+        self._watched_s = 1.0
+        self._wrongs = {"reloads": 0, "sink_down": 0}
+        self._ends: list[tuple[float, Any]] = []
+
+    def rehearse(self, minutes: float, kill_every: float, progress: Progress) -> dict[str, Any]:
+        """From the first frame to the account."""
+        with self._service() as process:
+            self._wait_until_ready(process)
+            begin = time.monotonic()
+            end = begin + 60.0 * minutes
+            table = self._timetable(process, kill_every)
+            while (now := time.monotonic()) < end and process.poll() is None:
+                self._look(process.pid)
+                if now < end - CALM_S:
+                    table.turn(now)
+                self._end_what_is_due(now)
+                left = (end - now) / 60.0
+                progress(f"{left:.1f} minutes left, {len(self._killer.kills)} kills")
+                time.sleep(LOOK_S)
+            asked = time.monotonic()
+            self._watched_s = asked - begin
+            process.send_signal(signal.SIGTERM)
+            code = process.wait(60)
+            return self._told(time.monotonic() - asked, code)
+
+    def _write_site(self) -> None:
+        loops = [f"loop:{self._folder / f'{n}.webm'}" for n in (0, 1)]
+        sources = [*loops, *(s.url for s in self._streams)]
+        cameras = (
+            CAMERA.format(name=name, source=source, pace=PACE)
+            for name, source in zip(NAMES, sources, strict=True)
+        )
+        head = SITE.format(
+            store=self._store,
+            port=self._receiver.port,
+            monitoring=self._monitoring,
+            hours=2.0 / 60.0,
+            free_gb=0.05 if self._balloon.possible else 0.5,
+        )
+        (self._folder / "own.rules").write_text(RULE)
+        (self._folder / "site.toml").write_text(head + "".join(cameras))
+
+    @contextmanager
+    def _service(self) -> Iterator[subprocess.Popen[bytes]]:
+        words = [sys.executable, "-m", "visup.cli", "serve", str(self._folder / "site.toml")]
+        with (self._folder / "log").open("ab") as log:
+            process = subprocess.Popen([*words, "--json"], stderr=log)
+        try:
+            yield process
+        finally:
+            process.kill()
+            process.wait()
+
+    def _wait_until_ready(self, process: subprocess.Popen[bytes]) -> None:
+        until = time.monotonic() + START_S
+        while time.monotonic() < until and process.poll() is None:
+            self._look(process.pid)
+            if all(self._figures.get(n, {}).get("visup_frames_seen_total") for n in NAMES):
+                return
+            time.sleep(LOOK_S)
+        raise SettingsError(
+            "the service did not begin", where=(self._folder / "log").read_text()[-2000:]
+        )
+
+    def _timetable(self, process: subprocess.Popen[bytes], kill_every: float) -> Timetable:
+        def reload() -> None:
+            self._wrongs["reloads"] += 1
+            process.send_signal(signal.SIGHUP)
+
+        def sink_down() -> None:
+            self._wrongs["sink_down"] += 1
+            self._receiver.down = True
+            self._ends.append((time.monotonic() + DOWN_S, self._sink_up))
+
+        def full() -> None:
+            if self._balloon.possible:
+                self._balloon.fill()
+                self._ends.append((time.monotonic() + FULL_S, self._balloon.empty))
+
+        def kill() -> None:
+            self._killer.strike(self._of_each("visup_restarts_total"))
+
+        return Timetable(((kill_every, kill), (100.0, reload), (75.0, sink_down), (130.0, full)))
+
+    def _sink_up(self) -> None:
+        self._receiver.down = False
+
+    def _end_what_is_due(self, now: float) -> None:
+        for due in [e for e in self._ends if e[0] <= now]:
+            self._ends.remove(due)
+            due[1]()
+
+    def _of_each(self, figure: str) -> dict[str, float]:
+        return {name: told.get(figure, 0.0) for name, told in self._figures.items()}
+
+    def _look(self, pid: int) -> None:
+        """What the service tells of itself."""
+        with suppress(OSError):
+            at = f"http://127.0.0.1:{self._monitoring}/metrics"
+            with urllib.request.urlopen(at, timeout=5) as answer:  # it is our own
+                page = answer.read().decode()
+            for figure, camera, value in _SAMPLE.findall(page):
+                self._figures.setdefault(camera, {})[figure] = float(value)
+            frames = self._of_each("visup_frames_seen_total")
+            self._killer.look(self._of_each("visup_restarts_total"), frames)
+            cameras = [f.get("visup_memory_bytes", 0.0) for f in self._figures.values()]
+            if len(cameras) == len(NAMES) and all(cameras):
+                self._memory.append(sum(cameras) / 2**20 + _resident_mb(pid))
+
+    def _told(self, closing_s: float, code: int) -> dict[str, Any]:
+        items = {name: self._of_camera(name) for name in NAMES}
+        keys = ("alerts", "lost", "twice", "resent", "without_evidence", "kills", "restarts")
+        backs = [k.back_s for k in self._killer.kills if k.back_s is not None]
+        total = {
+            **sums_of(list(items.values()), (*keys, "frames", "dropped")),
+            "not_back": sum(k.back_s is None for k in self._killer.kills),
+            "median_s": median(backs) if backs else 0.0,
+            "slowest_s": max(backs, default=0.0),
+            "memory_growth": _growth(self._memory),
+            "closing_s": closing_s,
+            "exit_code": code,
+            "troubles": sum(s.troubles for s in self._streams),
+            "disk_full": self._balloon.filled,
+            "refused": self._receiver.refused,
+            **self._wrongs,
+        }
+        return {"items": items, "total": total}
+
+    def _of_camera(self, name: str) -> dict[str, Any]:
+        figures = self._figures.get(name, {})
+        own = [k for k in self._killer.kills if k.camera == name]
+        return {
+            **asdict(account_of(self._store / name, self._receiver.records)),
+            "kills": len(own),
+            "slowest_s": max((k.back_s or 0.0 for k in own), default=0.0),
+            "restarts": figures.get("visup_restarts_total", 0.0),
+            "frames": figures.get("visup_frames_seen_total", 0.0),
+            "dropped": figures.get("visup_frames_dropped_total", 0.0),
+            "cpu": figures.get("visup_cpu_seconds_total", 0.0) / self._watched_s,
+        }
+
+
+def failed(figures: Mapping[str, Any]) -> bool:
+    """Whether an alert was lost or told twice, or a camera did not come back in time."""
+    total = figures["total"]
+    late = total["slowest_s"] > 10.0 or total["not_back"]
+    return bool(total["lost"] or total["twice"] > total["resent"] or late)
+
+
+def _growth(memory: Sequence[float]) -> float:
+    """From the second quarter to the last, as a share."""
+    quarter = len(memory) // 4
+    if not quarter:
+        return 0.0
+    return median(memory[-quarter:]) / median(memory[quarter : 2 * quarter]) - 1.0
+
+
+def _resident_mb(pid: int) -> float:
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])

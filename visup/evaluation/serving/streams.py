@@ -1,0 +1,93 @@
+"""Network cameras on loopback (MJPEG over HTTP) that stall, drop and send garbage, each of a seed."""
+
+from __future__ import annotations
+
+import random
+import threading
+import time
+from collections.abc import Sequence
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from visup.evaluation.serving.scene import FPS
+
+BOUNDARY = "frame"
+TROUBLE_EVERY_S = 40.0
+"""Seconds between two troubles of a camera, on average."""
+
+STALL_S = (2.0, 8.0)
+
+
+class TroubledStream:
+    """A camera.
+
+    Args:
+        pictures: JPEG, of one round of what it sees.
+        seed: Of its troubles.
+
+    Attributes:
+        url: Where it is.
+        troubles: How often something went wrong.
+    """
+
+    def __init__(self, pictures: Sequence[bytes], seed: int) -> None:
+        self._pictures = pictures
+        self._rng = random.Random(seed)  # dice, not secrets
+        self._begun = time.monotonic()
+        self._next = self._pause()
+        self._over = threading.Event()
+        self.troubles = 0
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
+        self._server.daemon_threads = True
+        self.url = f"http://127.0.0.1:{self._server.server_address[1]}/stream.mjpg"
+        threading.Thread(target=self._server.serve_forever, args=(0.2,), daemon=True).start()
+
+    def close(self) -> None:
+        """End it."""
+        self._over.set()
+        self._server.shutdown()
+        self._server.server_close()
+
+    def _pause(self) -> float:
+        return time.monotonic() + self._rng.expovariate(1.0 / TROUBLE_EVERY_S)
+
+    def _send_to(self, out: Any) -> None:
+        """Send frames as time brings them, until the connection drops."""
+        while not self._over.wait(1.0 / FPS):
+            number = int((time.monotonic() - self._begun) * FPS) % len(self._pictures)
+            picture = self._pictures[number]
+            if time.monotonic() > self._next:
+                self._next = self._pause()
+                self.troubles += 1
+                trouble = self._rng.choice(("stall", "drop", "garbage", "cut off"))
+                if trouble == "drop":
+                    return
+                if trouble == "stall":
+                    self._over.wait(self._rng.uniform(*STALL_S))
+                picture = self._spoilt(trouble, picture)
+            head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
+            out.write(head.encode() + picture + b"\r\n")
+
+    def _spoilt(self, trouble: str, picture: bytes) -> bytes:
+        if trouble == "garbage":
+            return self._rng.randbytes(len(picture))
+        return picture[: len(picture) // 3] if trouble == "cut off" else picture
+
+    def _handler(self) -> type[BaseHTTPRequestHandler]:
+        send_to = self._send_to
+
+        class StreamHandler(BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.send_response(200)
+                kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
+                self.send_header("Content-Type", kind)
+                self.end_headers()
+                try:
+                    send_to(self.wfile)
+                except OSError:
+                    self.close_connection = True
+
+            def log_message(self, *said: Any) -> None:
+                pass
+
+        return StreamHandler
