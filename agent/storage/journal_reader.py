@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.contract.percept_values import LARGEST_SIDE, check_value, expect, is_finite
+from visup.agent.model.did_you_mean import closest_file
 from visup.agent.model.errors import BehaviourError, OutputError
 from visup.agent.model.records import Observation
 from visup.agent.storage.atomic import replacing
@@ -25,6 +26,16 @@ JOURNAL = "journal.sqlite"
 _LARGEST_ROW = LARGEST_STEP_BYTES
 _LARGEST_RECORD = 16 * 2**20
 """Characters of a record that is no step."""
+
+
+def _nearest_run(run: Path) -> str | None:
+    """The hint that names a run beside, where one has nearly that name."""
+    try:
+        runs = [p.name for p in run.parent.iterdir() if (p / JOURNAL).is_file()]
+    except OSError:
+        return None
+    near = closest_file(run, runs)
+    return f"did you mean {near}?" if near and near != run else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +64,7 @@ class Recording:
                 "there is no recorded run here",
                 where=str(run),
                 expected=f"a run folder with {JOURNAL}",
+                hint=_nearest_run(run),
             )
         it = cls(path)
         for _ in it._rows("SELECT 1 FROM steps, run LIMIT 1"):
