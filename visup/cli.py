@@ -25,6 +25,7 @@ from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
+from visup.commands.serve.console_command import console
 from visup.commands.serve.site_commands import app as serve_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
@@ -57,6 +58,7 @@ app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)
 app.command("export")(export)
+app.command("console")(console)
 app.command("query")(query)
 app.command("find")(find)
 app.command("render")(render)

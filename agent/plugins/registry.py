@@ -7,6 +7,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from visup.agent.contract.behaviour import Behaviour
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import BehaviourError
 from visup.agent.plugins.factory import BehaviourFactory, Constructor
 
@@ -59,7 +60,9 @@ class Registry:
 
     def _unknown(self, name: str) -> BehaviourError:
         return BehaviourError(
-            f"there is no behaviour called '{name}'", expected=f"one of: {', '.join(self.names())}"
+            f"there is no behaviour called '{name}'",
+            expected=f"one of: {', '.join(self.names())}",
+            hint=did_you_mean(name, self.names()),
         )
 
     def factory(self, name: str) -> BehaviourFactory:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.contract.percept_values import LARGEST_SIDE, check_value, expect, is_finite
+from visup.agent.model.did_you_mean import closest_file
 from visup.agent.model.errors import BehaviourError, OutputError
 from visup.agent.model.records import Observation
 from visup.agent.storage.atomic import replacing
@@ -25,6 +26,16 @@ JOURNAL = "journal.sqlite"
 _LARGEST_ROW = LARGEST_STEP_BYTES
 _LARGEST_RECORD = 16 * 2**20
 """Characters of a record that is no step."""
+
+
+def _nearest_run(run: Path) -> str | None:
+    """The hint that names a run beside, where one has nearly that name."""
+    try:
+        runs = [p.name for p in run.parent.iterdir() if (p / JOURNAL).is_file()]
+    except OSError:
+        return None
+    near = closest_file(run, runs)
+    return f"did you mean {near}?" if near and near != run else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +64,7 @@ class Recording:
                 "there is no recorded run here",
                 where=str(run),
                 expected=f"a run folder with {JOURNAL}",
+                hint=_nearest_run(run),
             )
         it = cls(path)
         for _ in it._rows("SELECT 1 FROM steps, run LIMIT 1"):
@@ -103,10 +115,24 @@ class Recording:
         """
         sql = "SELECT frame_index, seen, crc FROM steps WHERE frame_index > ? ORDER BY frame_index"
         for path, (index, seen, crc) in self._rows(sql, (after,)):
-            where = f"{path}, frame {index}"
-            if not isinstance(seen, bytes) or zlib.crc32(seen) != crc:
-                raise _damaged(where, "its check sum is wrong")
-            yield checked(unpack_observation(seen, where), where)
+            yield _perceived(path, index, seen, crc)
+
+    def moments(self) -> Iterator[tuple[int, float]]:
+        """Number and time of each frame that was judged, seconds, in their order."""
+        rows = self._rows("SELECT frame_index, time FROM steps ORDER BY frame_index")
+        return ((int(index), float(time)) for _, (index, time) in rows)
+
+    def step_at(self, frame: int) -> tuple[dict[str, Any], Observation]:
+        """What was believed after one step, in short, and what was perceived in it.
+
+        Raises:
+            OutputError: There is no such step, or it is damaged.
+        """
+        sql = "SELECT frame_index, time, summary, seen, crc FROM steps WHERE frame_index = ?"
+        for path, (index, time, text, seen, crc) in self._rows(sql, (frame,)):
+            told = {"frame_index": index, "time": time, **self._record(text)}
+            return told, _perceived(path, index, seen, crc)
+        raise OutputError(f"frame {frame} was not judged in this run", where=str(self.path))
 
     def stamp(self) -> RecordStamp:
         """What is known of a record besides what it tells: camera, host, time by the clock of the wall."""
@@ -159,6 +185,14 @@ class Recording:
             return json.loads(text)
         except (ValueError, TypeError, RecursionError) as fault:
             raise _damaged(str(self.path), str(fault)) from fault
+
+
+def _perceived(path: Path, index: int, seen: Any, crc: Any) -> Observation:
+    """What was perceived in a step, from its row in the journal."""
+    where = f"{path}, frame {index}"
+    if not isinstance(seen, bytes) or zlib.crc32(seen) != crc:
+        raise _damaged(where, "its check sum is wrong")
+    return checked(unpack_observation(seen, where), where)
 
 
 def checked(observation: Observation, where: str) -> Observation:

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from visup.agent.model.did_you_mean import closest
+from visup.agent.model.did_you_mean import closest_file
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.percepts.video.capture import (
     Capture,
@@ -179,7 +179,5 @@ def _nearest(path: Path) -> str:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:
         return f"there is no folder {path.parent} that can be read"
-    # The endings are often the same, and make any two names look alike.
-    alike = [n for n in names if closest(path.stem, [Path(n).stem])]
-    near = closest(path.name, alike)
-    return f"did you mean {path.parent / near}?" if near else "check the name"
+    near = closest_file(path, names)
+    return f"did you mean {near}?" if near else "check the name"

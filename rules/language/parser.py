@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from functools import partial
+from functools import cache, partial
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -140,8 +140,9 @@ def load_rules(path: str | Path) -> tuple[Rule, ...]:
     return parse_rules(text, str(path))
 
 
+@cache
 def shipped_rules() -> tuple[Rule, ...]:
-    """The rules of `safety.rules`, which ships with visup."""
+    """The rules of `safety.rules`, which ships with visup; read once a process."""
     text = files("visup.rules.safety").joinpath("safety.rules").read_text(encoding="utf-8")
     return parse_rules(text, "safety.rules")
 

@@ -300,7 +300,7 @@ class _FormulaChecker:
             yield call.span, what, None, hint or "rename the variable"
 
 
-SYNONYMS = {"count": "objects", "number": "objects", "height_above": "position_y"}
+SYNONYMS = {"count": "objects", "number": "objects", "iou": "overlap"}
 SYNONYMS |= {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
 SYNONYMS |= {"visible": "seen", "present": "seen", "gone": "lost", "contact": "touching"}
 SYNONYMS |= {

@@ -204,7 +204,7 @@ def test_a_manifest_says_what_each_clip_is_watched_for(place: Path) -> None:
 
 def test_the_manifest_of_the_page_is_one(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "archives.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r"```\n(source,.*?)```", page, re.DOTALL)
+    (text,) = re.findall(r"```\n(source,task.*?)```", page, re.DOTALL)
     (tmp_path / "m.csv").write_text(text)
     (tmp_path / "m1.mp4").touch()
     (tmp_path / "m2.mp4").touch()

@@ -11,8 +11,9 @@ from tests.cli import Call
 from tests.first_hours.test_sessions import piped
 from visup import watch
 from visup.agent.cycle.answers import resolve_model
-from visup.agent.model.errors import OutputError, SettingsError
+from visup.agent.model.errors import BehaviourError, OutputError, SettingsError
 from visup.agent.model.mind import Mind
+from visup.agent.plugins.registry import discover_behaviours
 from visup.agent.storage.journal_reader import _unreadable
 from visup.runs.settings import complete_task
 from visup.terminal.display import html_of
@@ -44,6 +45,19 @@ def test_names_are_suggested_as_they_are_written() -> None:
         resolve_model(Mind(), "rms ram", ["rms_arm", "spartan"])
     assert "did you mean 'rms_arm'?" in str(refused.value)
     assert "one of: rms_arm, spartan, unknown" in str(refused.value)
+
+
+def test_a_run_or_behaviour_of_nearly_that_name_is_suggested(visup: Call, tmp_path: Path) -> None:
+    (tmp_path / "runs" / "road").mkdir(parents=True)
+    (tmp_path / "runs" / "road" / "journal.sqlite").touch()
+    (tmp_path / "runs" / "rod2.mp4").touch()  # near, and no run
+    for words in (("export", "runs/rod", "mot"), ("replay", "runs/rod")):
+        assert "did you mean runs/road?" in " ".join(visup(*words).err.split())
+    assert "did you mean" not in visup("replay", "runs/bottles").err
+    assert "did you mean" not in visup("replay", "nowhere/road").err
+    with pytest.raises(BehaviourError) as refused:
+        discover_behaviours().where("peple")
+    assert refused.value.hint == "did you mean 'people'?"
 
 
 def test_what_is_perceived_is_told_in_words(

@@ -221,11 +221,20 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
 
         def tell(done: int, total: int | None, lag_s: float | None = None) -> None:
             took = bar.tasks[0].elapsed or 0.0
-            rate = f"{done / took:.1f} frames/s" if took > 1.0 else ""
-            late = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= LAG_TOLD_S else ""
-            bar.update(task, completed=done, total=total, rate=f"{rate}{late}")
+            bar.update(task, completed=done, total=total, rate=pace_text(done, took, lag_s))
 
         yield tell
+
+
+def pace_text(done: int, took_s: float, lag_s: float | None) -> str:
+    """How fast frames are looked at, and by how much a live source is ahead where that is worth a word.
+
+    >>> pace_text(50, 2.0, 3.0)
+    '25.0 frames/s, 3.0 s behind'
+    """
+    rate = f"{done / took_s:.1f} frames/s" if took_s > 1.0 else ""
+    late = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= LAG_TOLD_S else ""
+    return f"{rate}{late}"
 
 
 def _print_result(console: Console, result: RunResult, *, as_json: bool) -> None:

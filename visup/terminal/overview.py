@@ -26,6 +26,7 @@ PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "rules": "check, list and explain safety rules",
         },
         "Look into a run": {
+            "console": "runs in the browser: timeline, beliefs, reasons",
             "step": "step through it, back and forth, and ask why",
             "replay": "reason again, with other tasks or rules",
             "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Region
-from visup.evaluation.reasoning.calibration import Calibration
+from visup.evaluation.calibration import Calibration
 from visup.rules.identity.votes import VoteSettings, candidates, unknown_probability
 
 SET = VoteSettings()

@@ -8,6 +8,7 @@ handed over at a time, so that a scheduler never holds a hundred thousand of the
 from __future__ import annotations
 
 import logging
+import multiprocessing
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -70,18 +71,34 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
     has_dashboard = find_spec("bokeh") is not None
     with (
         _quiet(),
+        _loaded_once(distributed),
         distributed.LocalCluster(
             n_workers=settings.processes,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
             memory_limit=memory,
-            dashboard_address="127.0.0.1:0" if has_dashboard else None,
+            dashboard_address="127.0.0.1:0",  # any free port: several may fill lakes here
             silence_logs=logging.CRITICAL,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
         yield Pool(client, cluster.dashboard_link if has_dashboard else None)
+
+
+@contextmanager
+def _loaded_once(distributed: Any) -> Iterator[None]:
+    """Workers are forked from a process that has loaded all that they need, and done nothing else.
+
+    So a worker in place of one that died is there at once, and what is loaded stands in memory once.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        yield
+        return
+    with imported("dask").config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
+        server = distributed.utils.get_mp_context()
+        server.set_forkserver_preload(["distributed", watch_job.__module__, "visup.runs.wiring"])
+        yield
 
 
 @contextmanager

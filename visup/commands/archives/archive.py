@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,12 +19,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rich.console import Console
+    from rich.table import Table
 
     from visup.archive.filling.filling import FillResult
     from visup.archive.filling.plan import FailedClip, Plan
     from visup.archive.filling.watching import ClipOutcome
     from visup.archive.lake import Lake
     from visup.archive.replaying import RunChanges
+    from visup.evaluation.archive.calibrating import Reliability
 
 Into = Annotated[
     Path, typer.Option("--into", metavar="LAKE", help="The lake; made when it is not there.")
@@ -170,6 +172,44 @@ def compact(
     said = f"Joined: {done.joined} runs; the lake has {done.partitions} partition{ending}."
     gone = f" Files that were replaced went, of {done.tidied} runs." if done.tidied else ""
     echo(f"{said}{gone}")
+
+
+@app.command("calibrate")
+def calibrate(
+    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    truth: Annotated[
+        Path,
+        typer.Option(metavar="FILE", help="What is true: source,verdict,objects,stages (CSV)."),
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+) -> None:
+    """Say how much confidences are worth: how often what was said so surely was right."""
+    from visup.archive.asking.database import open_database
+    from visup.archive.lake import Lake
+    from visup.evaluation.archive.calibrating import read_truth, reliabilities
+    from visup.terminal.console import echo_json, make_console
+
+    with open_database(Lake.open(lake)) as database:
+        found = reliabilities(database, read_truth(truth))
+    if as_json:
+        echo_json([asdict(one) for one in found])
+        return
+    console = make_console()
+    for one in found:
+        console.print(_reliability_table(one))
+
+
+def _reliability_table(one: Reliability) -> Table:
+    from visup.terminal.tables import table
+
+    shown = table("how often", "confidence", "right")
+    for b in one.bins:
+        shown.add_row(f"{b['count']:.0f}", f"{b['confidence']:.2f}", f"{b['right']:.2f}")
+    shown.title = (
+        f"{one.kind}: {one.count} said, {one.right:.0%} right,"
+        f" calibration error {one.error:.3f}, Brier {one.brier:.3f}"
+    )
+    return shown
 
 
 @app.command("report")

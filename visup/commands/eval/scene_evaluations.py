@@ -171,6 +171,15 @@ SCENE_EVALUATIONS = (
         folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
     ),
     EvaluationCommand(
+        "feedback",
+        """Precision of alerts of each kind, from what people said of them in the console.""",
+        "visup.evaluation.feedback:evaluate_feedback",
+        "counting",
+        ("alerts", "right", "false", "precision"),
+        (),
+        folder_argument("Folder with run folders anywhere below it."),
+    ),
+    EvaluationCommand(
         "clips",
         """Rendered clips of what footage lacks: pan, shake, zoom, stops, eclipse ...
 

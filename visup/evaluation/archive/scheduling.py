@@ -2,7 +2,8 @@
 
 A process cannot be a thousand workers of a cluster, but it can be a hundred that sleep: the scheduler, in a
 process of its own, does for each of them and for each job what it does for any. What it takes then, when
-nothing is done and for each job, is reckoned up to the workers and clips that are asked about.
+nothing is done and for each job, is reckoned up to the workers and clips that are asked about: Dask lets a
+worker of many tell less often that it is there.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from typing import Any
 
 from visup.archive.extra import imported
@@ -21,6 +23,7 @@ from visup.evaluation.figures import Progress
 
 IDLE_S = 10.0
 ASKED_WORKERS = 1_000
+MOST_BUSY = 0.6
 ASKED_CLIPS = 100_000
 CLIP_S = 60.0
 """How long a worker takes for a clip: a minute of video in real time."""
@@ -38,9 +41,10 @@ def measure_scheduler(workers: int, jobs: int, progress: Progress) -> dict[str, 
         progress: Shows what is being done.
 
     Returns:
-        `workers` and `jobs`; `idle_ms` of the processor for each worker and second, `job_ms` for each job;
-        `busy`, the share of a core that a scheduler of 1,000 workers takes, each of which is a minute at a
-        clip; `breaks_at`, the workers with which it would be 60 % busy; `hours` for 100,000 clips.
+        `workers` and `jobs`; `beat_ms` of the processor for each time that a worker tells that it is there,
+        `job_ms` for each job; `busy`, the share of a core that a scheduler of 1,000 workers takes, each of
+        which is a minute at a clip; `breaks_at`, the workers with which it would be 60 % busy; `hours` for
+        100,000 clips.
     """
     distributed, psutil = imported("distributed"), imported("psutil")
     with (
@@ -53,16 +57,20 @@ def measure_scheduler(workers: int, jobs: int, progress: Progress) -> dict[str, 
         idle = _taken(psutil.Process(process), lambda: time.sleep(IDLE_S))
         progress("working")
         seconds, took = _timed(psutil.Process(process), client, jobs, workers)
-    idle_each = idle / IDLE_S / workers
-    job = max(0.0, took - idle_each * workers * seconds) / jobs
-    per_worker = idle_each + job / CLIP_S
+    interval = imported("distributed.scheduler").heartbeat_interval
+    beat = idle / IDLE_S / workers * interval(workers)
+    job = max(0.0, took - idle / IDLE_S * seconds) / jobs
+
+    def busy(of: int) -> float:
+        return of * float(beat / interval(of) + job / CLIP_S)
+
     return {
         "workers": workers,
         "jobs": jobs,
-        "idle_ms": 1e3 * idle_each,
+        "beat_ms": 1e3 * beat,
         "job_ms": 1e3 * job,
-        "busy": ASKED_WORKERS * per_worker,
-        "breaks_at": round(0.6 / per_worker),
+        "busy": busy(ASKED_WORKERS),
+        "breaks_at": next(n for n in count(100, 100) if busy(n) > MOST_BUSY),
         "hours": ASKED_CLIPS * CLIP_S / ASKED_WORKERS / 3600,
     }
 

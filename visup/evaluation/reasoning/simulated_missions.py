@@ -19,6 +19,7 @@ import numpy as np
 from visup.agent import Frame, Mind, ObjectBelief, Presence
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
+from visup.evaluation.calibration import Calibration
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.files import mission_folders
 from visup.evaluation.missions.overlaps import COVERING_IOU, SMALLEST_SCORED_PX
@@ -26,7 +27,6 @@ from visup.evaluation.missions.pose_errors import true_spin
 from visup.evaluation.missions.recorder import MissionRecorder
 from visup.evaluation.missions.runner import mission_total, report_scores
 from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth, parse_truth
-from visup.evaluation.reasoning.calibration import Calibration
 from visup.evaluation.simulation.percepts import PerceptNoise, behaviours_of, frames_of
 from visup.evaluation.simulation.truth_masks import Mission, TrueMask, load_mission
 from visup.rules.reasoners import default_reasoners

@@ -99,7 +99,7 @@ def _distance_figure(run: RunData, pair: tuple[int, int]) -> Figure:
         f"distance-{pair[0]}-{pair[1]}",
         f"{names[0]} and {names[1]}",
         f"From {gaps[0]:.0f} px at {times[0]:.1f} s to {gaps[-1]:.0f} px at {times[-1]:.1f} s"
-        + (f"; {told}." if told else "; no lasting way of moving was told."),
+        + (f"; {told}." if told else "; no lasting trend was reported."),
         traces,
         layout,
     )

@@ -20,14 +20,14 @@ VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {
     Verdict.UNKNOWN: ("Unknown", "The task could not be followed."),
 }
 WITHOUT_TASK: dict[Verdict | None, tuple[str, str]] = {
-    None: ("Nothing to report", "There was no task to judge, and nothing grave was seen."),
+    None: ("Nothing unsafe was seen", "There was no task to judge."),
     Verdict.INTERRUPTED: (
-        "Something grave",
-        "There was no task to judge, but something grave was seen.",
+        "Something grave was seen",
+        "There was no task to judge.",
     ),
     Verdict.UNKNOWN: (
-        "Not watched whole",
-        "There was no task to judge, and nothing grave was seen, but not all could be watched.",
+        "Not all could be watched",
+        "There was no task to judge; nothing unsafe was seen in what could be watched.",
     ),
 }
 SEVERITY_WORDS = {

@@ -119,6 +119,8 @@ def percept_text(value: object) -> str:
             )
         case Health():
             return f"camera {value.status.value}" + (f": {value.detail}" if value.detail else "")
+        case float():
+            return f"{value:.6g}"
     text = str(value)
     return text if len(text) <= 70 else f"{text[:67]}..."
 

@@ -1,0 +1,201 @@
+"""The console in a real browser: what somebody does in it, and that nothing goes wrong on the way."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from tests.archive.recordings import meeting, record
+from tests.console.test_runs import SETTINGS
+from tests.teaching.browser import Browser, found_browser
+from visup.console.feedback import read_feedback
+
+OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("library")
+    record(folder / "evening", meeting(), SETTINGS)
+    record(folder / "<b>morning", meeting(30), SETTINGS)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(folder: Path) -> Iterator[str]:
+    found_browser()
+    tokens = {"VISUP_CONSOLE_TOKEN": OPERATOR, "VISUP_CONSOLE_VIEWER_TOKEN": VIEWER}
+    command = [sys.executable, "-m", "visup.cli", "console", str(folder), "--port", "0"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, **tokens}
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert "token=" in line, line
+        yield line.split()[-1].partition("?")[0]
+        process.terminate()
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    with Browser(tmp_path / "profile", (1280, 860)) as browser:
+        yield browser
+        assert browser.value("window.troubles || []") == []
+
+
+LISTEN = (
+    "window.troubles = []; window.onerror = (m) => window.troubles.push(String(m));"
+    "console.error = (...m) => window.troubles.push(m.join(' '));"
+)
+
+
+def open_run(browser: Browser, address: str, token: str = OPERATOR) -> None:
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+    browser.open(f"{address}?token={token}")
+    browser.until("document.querySelectorAll('.runs tbody a').length == 2")
+    browser.value(
+        "[...document.querySelectorAll('.runs a')].find(a => a.innerText == 'evening').click()"
+    )
+    browser.until("document.querySelector('img.picture')?.complete")
+    browser.until("document.querySelector('img.picture').naturalWidth > 0")
+
+
+def tab(browser: Browser, name: str) -> None:
+    browser.value(
+        f"[...document.querySelectorAll('.q-tab')].find(t => t.innerText.trim() == '{name}').click()"
+    )
+
+
+def press(browser: Browser, text: str) -> None:
+    browser.until(
+        f"[...document.querySelectorAll('button')].some(b => b.innerText.trim() == '{text}')"
+    )
+    browser.value(
+        f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() == '{text}').click()"
+    )
+
+
+def shows(browser: Browser, text: str) -> None:
+    browser.until(f"document.body?.innerText.includes({text!r})")
+
+
+def test_a_run_is_found_and_opened(browser: Browser, address: str) -> None:
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+    browser.open(f"{address}?token={OPERATOR}")
+    browser.until("document.querySelectorAll('.runs tbody tr').length == 2")
+    shows(browser, "<b>morning")
+    assert "token" not in browser.value("location.href")
+    browser.value("document.querySelector('input[aria-label=\"Search runs\"]').focus()")
+    browser.type("dock even")
+    browser.until("document.querySelectorAll('.runs tbody tr').length == 1")
+    browser.value("document.querySelector('.runs a').click()")
+    shows(browser, "frame 0")
+    shows(browser, "approach")
+
+
+def test_one_cursor_moves_picture_timeline_and_belief(browser: Browser, address: str) -> None:
+    open_run(browser, address)
+    x, y, w, _ = browser.value(
+        "(() => { const r = document.querySelector('.bars').getBoundingClientRect();"
+        "return [r.x, r.y, r.width, r.height]; })()"
+    )
+    browser.click(x + 0.5 * w, y + 8)
+    browser.until("/29|30/.test(document.querySelector('img.picture').src.split('/').pop())")
+    shows(browser, "frame 29")
+    browser.press("ArrowRight")
+    shows(browser, "frame 30")
+    browser.press("End")
+    shows(browser, "frame 59")
+    browser.press("Home")
+    shows(browser, "frame 0")
+    browser.press("n")
+    browser.until("document.body && !document.body.innerText.includes('frame 0')")
+    browser.press(" ")
+    browser.until("document.body?.innerText.includes('frame 59')")
+
+
+def test_why_and_what_if_are_answered(browser: Browser, address: str) -> None:
+    open_run(browser, address)
+    browser.press("End")
+    shows(browser, "frame 59")
+    tab(browser, "Ask")
+    press(browser, "identity 1")
+    shows(browser, "[frame")
+    tab(browser, "Try")
+    browser.until("document.querySelector('input[aria-label=\"What is assumed\"]')")
+    browser.value("document.querySelector('input[aria-label=\"What is assumed\"]').focus()")
+    browser.type("object 99 arm")
+    press(browser, "Try")
+    shows(browser, "there is no object 99")
+
+
+def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
+    browser: Browser, address: str, folder: Path
+) -> None:
+    open_run(browser, address, VIEWER)
+    tab(browser, "Alerts")
+    shows(browser, "only what is open")
+    assert not browser.value("document.body?.innerText.includes('false alarm')")
+    browser.open(f"{address}?token={OPERATOR}")
+    open_run(browser, address)
+    tab(browser, "Alerts")
+    press(browser, "false alarm")
+    shows(browser, "false alarm")
+    end = [f.opinion for f in read_feedback(folder / "evening").values()]
+    assert end == ["false alarm"]
+
+
+def violations(browser: Browser) -> list[str]:
+    """What axe-core calls serious or critical on the page as it is."""
+    browser.until("document.getAnimations().every(a => a.playState == 'finished')")
+    program = files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+    browser.value(program + "; 0")
+    browser.value("window.found = null; axe.run().then(r => window.found = r.violations); 0")
+    browser.until("window.found !== null")
+    grave = "window.found.filter(v => ['serious', 'critical'].includes(v.impact))"
+    return list(
+        browser.value(
+            f"{grave}.map(v => v.id + ': ' + v.nodes[0].html + v.nodes[0].failureSummary)"
+        )
+    )
+
+
+def test_everybody_can_use_it(browser: Browser, address: str) -> None:
+    browser.open(f"{address}?token={OPERATOR}")
+    browser.until("document.querySelectorAll('.runs tbody a').length == 2")
+    assert violations(browser) == []
+    open_run(browser, address)
+    for name, text in (
+        ("Now", "approach"),
+        ("Told", "in view"),
+        ("Alerts", "only what is open"),
+        ("Ask", "Why?"),
+        ("Try", "from the cursor on"),
+    ):
+        tab(browser, name)
+        shows(browser, text)
+        assert violations(browser) == [], name
+    browser.value("document.querySelector('[aria-label=\"Dark or light\"]').click()")
+    browser.until("document.body.classList.contains('body--dark')")
+    assert violations(browser) == []
+
+
+def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) -> None:
+    with Browser(tmp_path / "small", (390, 780)) as browser:
+        browser.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=390,
+            height=780,
+            deviceScaleFactor=1,
+            mobile=True,
+        )
+        open_run(browser, address)
+        assert browser.value("document.documentElement.scrollWidth") <= 390
+        browser.value("document.querySelector('a[href=\"/wall\"]').click()")
+        shows(browser, "No camera is watched")

@@ -1,0 +1,100 @@
+"""Rows of the timeline: laws of their spans, and what becomes of events."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.agent import Alert, Event, Severity, Status
+from visup.console.timeline_svg import timeline_svg
+from visup.console.tracks import PRESENCE, TimelineTrack, tracks_of
+
+TIMES = st.floats(0.0, 50.0)
+STAGES = st.builds(
+    lambda time, stage, status: Event(
+        "stage_x",
+        time,
+        0,
+        f"{stage} {status}",
+        data={"task": "t", "stage": stage, "status": status},
+    ),
+    TIMES,
+    st.sampled_from(["reach", "grasp"]),
+    st.sampled_from([s.value for s in Status]),
+)
+PRESENCES = st.builds(
+    lambda kind, time, number: Event(kind, time, 0, f"Object {number} <b>", objects=(number,)),
+    st.sampled_from(sorted(PRESENCE)),
+    TIMES,
+    st.integers(1, 4),
+)
+EVENTS = st.lists(st.one_of(STAGES, PRESENCES), max_size=30).map(
+    lambda events: sorted(events, key=lambda e: e.time)
+)
+ALERTS = st.lists(
+    st.builds(
+        lambda number, opened, lasts: Alert(
+            number,
+            "collision_course",
+            Severity.WARNING,
+            opened,
+            opened,
+            (1, 2),
+            "They come near & near.",
+            closed=None if lasts is None else opened + lasts,
+        ),
+        st.integers(1, 99),
+        TIMES,
+        st.none() | st.floats(0.0, 5.0),
+    ),
+    max_size=6,
+)
+
+
+def one_after_the_other(track: TimelineTrack) -> bool:
+    pairs = zip(track.spans, track.spans[1:], strict=False)
+    return all(a.end <= b.start + 1e-9 for a, b in pairs)
+
+
+@given(EVENTS, ALERTS)
+def test_spans_lie_within_the_run_and_states_never_overlap(
+    events: list[Event], alerts: list[Alert]
+) -> None:
+    rows = tracks_of(events, alerts, 60.0)
+    for track in rows:
+        assert all(0.0 <= s.start <= s.end <= 60.0 for s in track.spans)
+        assert track.group == "alert" or one_after_the_other(track)
+    assert len({(t.group, t.label, t.object_id) for t in rows}) == len(rows)
+
+
+@given(EVENTS)
+def test_a_row_says_what_the_last_event_before_a_time_said(events: list[Event]) -> None:
+    rows = {t.label: t for t in tracks_of(events, (), 60.0) if t.group == "stage"}
+    for label, track in rows.items():
+        told = [e for e in events if e.data.get("stage") == label]
+        for moment in (0.0, 13.3, 27.7, 55.0):
+            before = [e for e in told if e.time <= moment]
+            state = before[-1].data["status"] if before else "pending"
+            shown = [s.state for s in track.spans if s.start <= moment < s.end]
+            assert (shown or ["pending"])[-1] == state
+
+
+@given(EVENTS, ALERTS)
+def test_the_picture_is_sound_whatever_was_told(events: list[Event], alerts: list[Alert]) -> None:
+    rows = tracks_of(events, alerts, 60.0)
+    picture = ET.fromstring(timeline_svg(rows, 60.0))
+    bars = [r for r in picture.iter() if r.tag == "rect" and r.get("class") != "row"]
+    assert len(bars) == sum(len(t.spans) for t in rows)
+    assert not re.search("<b>", timeline_svg(rows, 60.0))
+
+
+def test_objects_are_called_by_their_actors() -> None:
+    events = [
+        Event("entry", 1.0, 10, "Object 1 is in view.", objects=(1,)),
+        Event("identified", 2.0, 20, "Object 1 is the arm.", objects=(1,), data={"name": "rms"}),
+    ]
+    (row,) = tracks_of(events, (), 5.0, {"arm": ("rms",)})
+    assert (row.label, row.object_id) == ("1 arm", 1)

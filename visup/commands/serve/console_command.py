@@ -1,0 +1,84 @@
+"""`visup console RUN...`: recorded and running runs in the browser."""
+
+from __future__ import annotations
+
+import os
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from visup.agent.model.errors import ExtraMissingError, SettingsError
+from visup.terminal.console import make_console
+
+if TYPE_CHECKING:
+    from visup.console.access import Access
+
+OPERATOR_TOKEN = "VISUP_CONSOLE_TOKEN"
+VIEWER_TOKEN = "VISUP_CONSOLE_VIEWER_TOKEN"
+SHORTEST_TOKEN = 16
+
+
+def console(
+    places: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Run folders, or folders of them.")
+    ],
+    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")] = 8086,
+    name: Annotated[
+        list[str] | None, typer.Option(help="A name under which this machine is asked for.")
+    ] = None,
+    open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+) -> None:
+    """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
+
+    Runs that go on are followed. The address that is printed holds a token that lets in whoever has it;
+    VISUP_CONSOLE_TOKEN sets your own, VISUP_CONSOLE_VIEWER_TOKEN one for those who may only look.
+    Exit code: 0 when it is stopped, 2 on bad input.
+    """
+    try:
+        from visup.console.access import LOOPBACK
+        from visup.console.library import RunLibrary
+        from visup.console.server import serve_console
+        from visup.console.state import ConsoleState
+    except ModuleNotFoundError as missing:
+        raise ExtraMissingError("the console", "console") from missing
+    if host not in LOOPBACK and OPERATOR_TOKEN not in os.environ:
+        raise SettingsError(
+            f"at {host} others can reach the console",
+            expected=f"a token of your own in {OPERATOR_TOKEN}",
+            hint="put a proxy with TLS before it, too: docs/console.md tells how",
+        )
+    state = ConsoleState(RunLibrary(places))
+    access = _access((*LOOPBACK, host, *(name or ())))
+    out = make_console(soft_wrap=True)
+
+    def ready(address: str) -> None:
+        out.print(f"The console: {address}", markup=False, highlight=False)
+        out.print("Ctrl-C stops it.", style="dim")
+        if open_browser:
+            webbrowser.open(address)
+
+    serve_console(state, access, host, port, ready)
+
+
+def _access(hosts: tuple[str, ...]) -> Access:
+    """Who gets in, by tokens of the environment."""
+    from visup.console.access import Access
+
+    operator, viewer = (_token(name) for name in (OPERATOR_TOKEN, VIEWER_TOKEN))
+    hosts = tuple(dict.fromkeys(hosts))
+    if operator is None:
+        return Access(viewer=viewer, hosts=hosts)
+    return Access(operator, viewer, hosts)
+
+
+def _token(name: str) -> str | None:
+    token = os.environ.get(name)
+    if token is not None and (len(token) < SHORTEST_TOKEN or not token.isascii()):
+        raise SettingsError(
+            f"the token in {name} is too short, or not of plain letters",
+            expected=f"at least {SHORTEST_TOKEN} letters and digits",
+        )
+    return token

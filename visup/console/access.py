@@ -1,0 +1,152 @@
+"""Who may look, and who may act: a guard before every request, page, picture and socket of the console.
+
+- The console listens on this machine alone unless told otherwise.
+- Whoever asks must know a token. The address that is printed holds it once; from then on a cookie does.
+- A request must name this host, so that no foreign name that points here gets in (DNS rebinding), and a
+  request that another page makes is refused, also for the socket, to which browsers let any page connect.
+- The operator's token may act (note, assume, try other texts); the viewer's may only look.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+Scope = MutableMapping[str, Any]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+COOKIE = "visup_console"
+PARAMETER = "token"
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
+WHO = "visup_role"
+"""Where the role of a request stands in its scope."""
+
+LONGEST_BODY = 2**20
+"""Bytes of a request; what pages send is far smaller."""
+
+
+class ConsoleRole(StrEnum):
+    """What somebody may do."""
+
+    VIEWER = "viewer"
+    OPERATOR = "operator"
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """Who gets in.
+
+    Attributes:
+        operator: Token of those who may act.
+        viewer: Token of those who may only look; None for nobody.
+        hosts: Names under which the console may be asked for, without ports.
+    """
+
+    operator: str = field(default_factory=lambda: secrets.token_urlsafe(18))
+    viewer: str | None = None
+    hosts: tuple[str, ...] = LOOPBACK
+
+    def role(self, token: str) -> ConsoleRole | None:
+        """Who has a token, or None."""
+        given = token.encode()
+        if secrets.compare_digest(given, self.operator.encode()):
+            return ConsoleRole.OPERATOR
+        if self.viewer and secrets.compare_digest(given, self.viewer.encode()):
+            return ConsoleRole.VIEWER
+        return None
+
+
+class AccessGuard:
+    """Lets a request through to the application behind it, or not.
+
+    Args:
+        app: The application.
+        access: Who gets in.
+    """
+
+    def __init__(self, app: Application, access: Access) -> None:
+        self._app, self._access = app, access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request or socket."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = _headers(scope["headers"])
+        fault = self._fault(headers)
+        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
+        given = query.get(PARAMETER, [""])[0]
+        role = self._access.role(given or _cookie(headers.get("cookie", "")))
+        if fault or role is None:
+            await _refuse(scope, send, fault or _NO_TOKEN)
+        elif given and scope["type"] == "http":
+            await _welcome(scope, send, given)
+        else:
+            scope[WHO] = role
+            await self._app(scope, receive, send)
+
+    def _fault(self, headers: Mapping[str, str]) -> str:
+        """Why a request is refused whoever makes it; empty when it is not."""
+        host = headers.get("host", "")
+        if _name(host) not in self._access.hosts:
+            return "This console is not known by that name."
+        origin = headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return "Another page asked for this; only the console's own pages may."
+        length = headers.get("content-length", "0")
+        if not length.isdecimal() or int(length) > LONGEST_BODY:
+            return "This request is too long."
+        return ""
+
+
+_NO_TOKEN = "Open the address that `visup console` printed: it holds the token that lets you in."
+
+
+def _headers(given: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
+    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in given}
+
+
+def _name(host: str) -> str:
+    """A host without its port."""
+    name, colon, port = host.rpartition(":")
+    return name if colon and port.isdecimal() else host
+
+
+def _cookie(text: str) -> str:
+    try:
+        found = SimpleCookie(text).get(COOKIE)
+    except CookieError:
+        return ""
+    return found.value if found else ""
+
+
+async def _welcome(scope: Scope, send: Send, token: str) -> None:
+    """Keep the token in a cookie that scripts cannot read, and take it out of the address."""
+    kept = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+    headers = [(b"location", scope["path"].encode()), (b"set-cookie", kept.encode())]
+    await send({"type": "http.response.start", "status": 303, "headers": [*headers, *_SAFE]})
+    await send({"type": "http.response.body", "body": b""})
+
+
+async def _refuse(scope: Scope, send: Send, why: str) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 4403, "reason": why})
+        return
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), *_SAFE]
+    await send({"type": "http.response.start", "status": 403, "headers": headers})
+    await send({"type": "http.response.body", "body": why.encode()})
+
+
+_SAFE = (
+    (b"referrer-policy", b"no-referrer"),
+    (b"x-content-type-options", b"nosniff"),
+    (b"cache-control", b"no-store"),
+)

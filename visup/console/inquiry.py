@@ -1,0 +1,129 @@
+"""Why, why not, and what if, asked of a recorded run: `visup.stepping` behind a lock, for many pages.
+
+The console adds no logic of its own here. Reasons come from the mind that reasoned, which a journal does not
+keep; so the run is reasoned again up to the moment that is asked about. That takes a second for a thousand
+frames, once, and goes on from there the next time.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+
+from visup.agent import Mind
+from visup.agent.model.errors import SettingsError
+from visup.rules.language.parser import parse_rules
+from visup.runs.replay import TranscriptDiff
+from visup.stepping import Stepper
+from visup.stepping.explanations.evidence import Why
+from visup.stepping.what_if import with_rules, with_tasks
+from visup.tasks import parse_task
+from visup.terminal.what_if_commands import parse_assumption
+
+_INCLUDE = re.compile(r"^[^#\n]*\binclude\b", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class AlternativeCourse:
+    """What a branch tells otherwise than the run did.
+
+    Attributes:
+        assumed: What was assumed, in words.
+        differs: Events that only the one, or only the other told; and both verdicts.
+        until: Up to where both were compared, seconds.
+    """
+
+    assumed: str
+    differs: TranscriptDiff
+    until: float
+
+
+class Inquiry:
+    """Questions about one run.
+
+    Args:
+        folder: Of the run.
+
+    Raises:
+        VisupError: It cannot be reasoned about again.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._stepper, self._lock = Stepper.of_run(folder), Lock()
+
+    def why(self, number: int, what: str) -> Why:
+        """Why something is so after a step, as `why` in `visup step`; `not ...` asks why it is not.
+
+        Args:
+            number: Of the step, from 1.
+            what: Such as `alert 2`, `touching 1 2`, `identity 1`, `verdict`, `not coupled 1 2`.
+
+        Raises:
+            VisupError: Nothing is known of it.
+        """
+        text = " ".join(what.split())
+        with self._lock:
+            self._stepper.go(number)
+            if text.partition(" ")[0] == "not":
+                return self._stepper.why_not(text.removeprefix("not").strip())
+            return self._stepper.why(text)
+
+    def mind(self, number: int) -> Mind:
+        """The whole mind after a step, with relations, poses and likelihoods."""
+        with self._lock:
+            self._stepper.go(number)
+            return self._stepper.mind
+
+    def what_if(self, number: int, what: str, steps: int) -> AlternativeCourse:
+        """How the run would have gone on from a step, had something been otherwise.
+
+        Args:
+            number: Of the step, from 1.
+            what: `object 2 satellite`, `touching 1 2 false`, `object 1 hidden`.
+            steps: How many steps there are.
+
+        Raises:
+            VisupError: It says nothing that can be assumed.
+        """
+        words = what.split()
+        if not words:
+            raise SettingsError("no assumption is given", expected="such as: object 2 satellite")
+        with self._lock:
+            self._stepper.go(number)
+            here = self._stepper
+            branch = here.branch(parse_assumption(here.mind, words, here.agent.models))
+            return _course(" ".join(words), branch, steps - number)
+
+    def judged_by(self, kind: str, text: str, steps: int) -> AlternativeCourse:
+        """How the whole run is judged by another task or other rules.
+
+        Args:
+            kind: 'task' or 'rules'.
+            text: Of the file; it may include no other file, since it comes from a page.
+            steps: How many steps there are.
+
+        Raises:
+            VisupError: The text is not as it should be; every mistake in it is told.
+        """
+        if kind == "task" and _INCLUDE.search(text):
+            raise SettingsError(
+                "a task that is written here cannot include another file",
+                hint="put what it needs into the text, or use `visup replay --task FILE`",
+            )
+        with self._lock:
+            self._stepper.go(0)
+            reasoners = self._stepper.agent.reasoners
+            given = (
+                with_rules(reasoners, parse_rules(text))
+                if kind == "rules"
+                else with_tasks(reasoners, (parse_task(text),))
+            )
+            return _course(f"other {kind}", self._stepper.branch(reasoners=given), steps)
+
+
+def _course(assumed: str, branch: Stepper, steps: int) -> AlternativeCourse:
+    if steps > 0:
+        branch.step(steps)
+    return AlternativeCourse(assumed, branch.compare(), branch.mind.time)

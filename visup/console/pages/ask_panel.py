@@ -1,0 +1,91 @@
+"""Why, and why not, at the cursor: the answer is a tree whose leaves are frames."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from nicegui import run, ui
+
+from visup.agent import Severity
+from visup.agent.model.errors import VisupError
+from visup.console.pages.frame import clock, shown_text, worded_button
+from visup.console.pages.playhead import Playhead
+from visup.console.recorded_mind import open_at
+from visup.console.state import ConsoleState
+from visup.stepping.explanations.evidence import Why
+from visup.wording import prose
+
+MOST_LINES = 400
+EXAMPLE = "touching 1 2, identity 1, not coupled 1 2"
+
+
+def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
+    """Lay out the panel."""
+
+    async def ask(what: str) -> None:
+        answer.clear()
+        with answer:
+            ui.label("The run is reasoned again up to here ...").classes("dim")
+            ui.spinner(size="md")
+        try:
+            asked = head.number
+            why = await run.io_bound(lambda: state.inquiry(key).why(asked + 1, what))
+        except VisupError as fault:
+            _say(str(fault))
+            return
+        answer.clear()
+        if why is None:  # the console is being stopped
+            return
+        with answer:
+            ui.label(f"{what}, at {clock(head.run.times[asked])}").classes("dim")
+            _tree(why, head)
+
+    def _say(text: str) -> None:
+        answer.clear()
+        with answer:
+            ui.label(shown_text(text)).classes("why")
+
+    with ui.row().classes("w-full items-center no-wrap"):
+        asked = ui.input(placeholder=EXAMPLE).props('dense outlined aria-label="Why ...?"')
+        asked.classes("grow").on("keydown.enter", lambda: ask(str(asked.value or "")))
+        worded_button("Why?", lambda: ask(str(asked.value or "")), main=True)
+
+    @ui.refreshable
+    def proposed() -> None:
+        with ui.row().classes("gap-1"):
+            for what in proposals(head):
+                worded_button(what, partial(ask, what))
+
+    proposed()
+    head.listen(proposed.refresh)
+    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Answer"'):
+        answer = ui.column().classes("w-full gap-0")
+
+
+def proposals(head: Playhead) -> list[str]:
+    """What one may well ask at the cursor."""
+    mind = head.run.mind(head.number)
+    opened = [a for a in head.run.alerts if a.severity > Severity.INFO and open_at(a, mind.time)]
+    alerts = [f"alert {a.id}" for a in opened[:3]]
+    stages = [t.current for t in mind.tasks if t.current]
+    objects = [b for b in mind.present() if b.candidates][:3]
+    verdict = ["verdict"] if mind.tasks else []
+    return [*alerts, *verdict, *stages, *(f"identity {b.id}" for b in objects)]
+
+
+def _tree(why: Why, head: Playhead, deep: int = 0, left: list[int] | None = None) -> None:
+    """The answer, indented; what speaks of a frame goes there when it is clicked."""
+    left = [MOST_LINES] if left is None else left
+    if left[0] <= 0:
+        return
+    left[0] -= 1
+    with ui.element("div").classes("line").style(f"padding-left:{6 + 14 * deep}px"):
+        if why.time is None:
+            ui.label(shown_text(prose(why.text))).classes("why")
+        else:
+            frame = why.frame_index
+            with ui.element("button").classes("plain why") as button:
+                ui.label(shown_text(why.line()))
+            button.on("click", lambda: head.go(head.run.of_frame(frame or 0)))
+    for part in why.parts:
+        _tree(part, head, deep + 1, left)

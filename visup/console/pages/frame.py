@@ -1,0 +1,81 @@
+"""What all pages have: the bar at the top, the style, and words for states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+
+from nicegui import ui
+
+from visup.agent import Status
+from visup.report.palette import STATUS_COLOURS, css
+from visup.wording import printable
+
+STYLE = files(__package__).joinpath("console.css").read_text(encoding="utf-8")
+
+VERDICT_COLOURS = {
+    "succeeded": css(STATUS_COLOURS[Status.DONE]),
+    "failed": css(STATUS_COLOURS[Status.FAILED]),
+    "interrupted": css(STATUS_COLOURS[Status.FAILED]),
+    "unsafe": css(STATUS_COLOURS[Status.FAILED]),
+    "in_progress": css(STATUS_COLOURS[Status.PROGRESSING]),
+}
+OTHER_COLOUR = "#5a6573"
+
+
+@contextmanager
+def page_frame(title: str) -> Iterator[None]:
+    """The bar at the top, with room for more in it; the page's own elements come after."""
+    ui.add_css(STYLE)
+    ui.add_head_html('<script>document.documentElement.lang = "en"</script>')
+    ui.page_title(f"{title} · visup")
+    dark = ui.dark_mode(value=None)
+    with ui.header(elevated=False).classes("bar"):
+        with ui.element("nav").props('aria-label="Main"'):
+            ui.link("visup", "/").classes("brand")
+            ui.link("cameras", "/wall").classes("nav")
+        with ui.element("h1").classes("crumb"):
+            ui.label(shown_text(title))
+        yield
+        ui.space()
+        button("contrast", "Dark or light", lambda: dark.set_value(not dark.value))
+
+
+def button(icon: str, says: str, act: Callable[[], object]) -> ui.button:
+    """A round button with an icon, and words for those who point at it or cannot see it."""
+    made = ui.button(icon=icon, on_click=act, color=None)
+    made.props(f'flat round dense aria-label="{says}"').classes("icon")
+    made.tooltip(says)
+    return made
+
+
+def worded_button(text: str, act: Callable[[], object], *, main: bool = False) -> ui.button:
+    """A button with a word; the main one of its place stands out."""
+    made = ui.button(text, on_click=act, color=None).props("dense no-caps unelevated")
+    return made.classes("act main" if main else "act")
+
+
+def badge(text: str, colour: str) -> ui.label:
+    """A word on a coloured ground."""
+    return ui.label(shown_text(text)).classes("state").style(f"background:{colour}")
+
+
+def verdict_badge(verdict: str | None, *, ended: bool) -> ui.label:
+    """How a run ended, or that it has not."""
+    words = (verdict or ("no task" if ended else "running")).replace("_", " ")
+    return badge(words, VERDICT_COLOURS.get(verdict or "", OTHER_COLOUR))
+
+
+def shown_text(text: str) -> str:
+    """A text as a page may show it: without marks that turn the reading order."""
+    return printable(text)
+
+
+def clock(seconds: float) -> str:
+    """A time of a run, such as '0:07.3' or '1:02:03.0'."""
+    tenths = round(max(0.0, seconds) * 10)
+    minutes, rest = divmod(tenths, 600)
+    hours, minutes = divmod(minutes, 60)
+    tail = f"{rest // 10:02d}.{rest % 10}"
+    return f"{hours}:{minutes:02d}:{tail}" if hours else f"{minutes}:{tail}"

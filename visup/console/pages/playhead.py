@@ -1,0 +1,92 @@
+"""Where a page is in its run, and how it moves: one cursor over picture, timeline and text."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from visup.console.run_view import RunView
+
+Listener = Callable[[], object]
+TICK_S = 0.125
+"""How often a page moves on while it plays, seconds."""
+
+SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+
+
+@dataclass(slots=True)
+class Playhead:
+    """One page's place in a run.
+
+    Attributes:
+        run: The run.
+        number: Number of the moment, from 0.
+        playing: Whether it moves on by itself.
+        speed: Seconds of the run in one second.
+        time: Where it is, seconds; while it plays, between two moments.
+    """
+
+    run: RunView
+    number: int = 0
+    playing: bool = False
+    speed: float = 1.0
+    time: float = 0.0
+    _listeners: list[Listener] = field(default_factory=list)
+
+    def listen(self, listener: Listener) -> None:
+        """Have something called whenever the place changes."""
+        self._listeners.append(listener)
+
+    def go(self, number: int) -> None:
+        """Be at a moment; the nearest one there is."""
+        number = min(max(0, number), max(0, len(self.run.frames) - 1))
+        changed, self.number = number != self.number, number
+        self.time = self.run.times[number] if self.run.times else 0.0
+        if changed:
+            self._tell()
+
+    def go_to_time(self, seconds: float) -> None:
+        """Be at the last moment that is not after a time."""
+        self.go(self.run.at(seconds))
+
+    def step(self, by: int) -> None:
+        """Go some moments forth or back."""
+        self.go(self.number + by)
+
+    def tick(self, seconds: float = TICK_S) -> None:
+        """Move on, if it plays; it stops at the end."""
+        if not self.playing:
+            return
+        self.time += seconds * self.speed
+        number = self.run.at(self.time)
+        if number != self.number:
+            self.number = number
+            self._tell()
+        if self.time >= self.run.seconds:
+            self.playing = False
+            self._tell()
+
+    def toggle(self) -> None:
+        """Play, or pause; at the end it begins anew."""
+        if not self.playing and self.number >= len(self.run.frames) - 1:
+            self.go(0)
+        self.playing = not self.playing
+        self._tell()
+
+    def next_event(self, forth: bool = True) -> None:
+        """Jump to the next moment at which something was told, or to the one before."""
+        told = sorted({e.time for e in self.run.events})
+        here = self.run.times[self.number] if self.run.times else 0.0
+        if forth:
+            at = bisect_right(told, here + 1e-6)
+            found = told[at] if at < len(told) else None
+        else:
+            at = bisect_left(told, here - 1e-6)
+            found = told[at - 1] if at else None
+        if found is not None:
+            self.go_to_time(found)
+
+    def _tell(self) -> None:
+        for listener in self._listeners:
+            listener()

@@ -1,0 +1,202 @@
+"""The page of one run: picture, timeline, what is believed, what was told, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nicegui import events, ui
+
+from visup.agent.model.errors import VisupError
+from visup.console.access import ConsoleRole
+from visup.console.pages.ask_panel import ask_panel
+from visup.console.pages.belief_panel import belief_panel
+from visup.console.pages.frame import button, clock, page_frame, shown_text, verdict_badge
+from visup.console.pages.playhead import SPEEDS, TICK_S, Playhead
+from visup.console.pages.told_panel import alerts_panel, events_panel
+from visup.console.pages.try_panel import try_panel
+from visup.console.run_view import RunView
+from visup.console.state import ConsoleState
+from visup.console.timeline_svg import timeline_svg
+
+REFRESH_S = 2.0
+"""How often a page asks whether a run that goes on has grown, seconds."""
+
+KEYS = (
+    ("space", "play or pause"),
+    ("← →", "one frame back or forth; with Shift ten"),
+    ("p n", "the event before, the next event"),
+    ("Home End", "to the start, to the end"),
+)
+
+
+def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> None:
+    """Lay out the page.
+
+    Args:
+        state: What all pages share.
+        key: Of the run.
+        role: Of whoever looks.
+        begin: Where to begin, seconds.
+    """
+    try:
+        run = state.view(key, refresh=True)
+    except VisupError as fault:
+        with page_frame("Run"):
+            pass
+        ui.label(shown_text(str(fault))).classes("card w-full")
+        return
+    head = Playhead(run)
+    with page_frame(run.folder.name):
+        verdict_badge(run.verdict, ended=run.ended)
+    if not run.frames:
+        ui.label("Nothing was judged in this run yet.").classes("card w-full")
+        return
+    with ui.element("div").classes("run-grid"):
+        with ui.element("section").classes("card").props('aria-label="Picture and timeline"'):
+            _picture(head, key)
+            _controls(head)
+            _timeline(head)
+        with ui.element("section").classes("card").props('aria-label="What is believed"'):
+            _tabs(state, head, key, role)
+    _keys(head)
+    ui.timer(TICK_S, head.tick)
+    head.go_to_time(begin)
+    if not run.ended:
+        _follow(state, key, head)
+
+
+def _picture(head: Playhead, key: str) -> None:
+    """The frame with what is believed over it, as it is at the cursor."""
+    image = ui.element("img").classes("picture")
+    image.props["alt"] = "The frame with what is believed drawn over it"
+    shown = {"plain": False}
+
+    def show() -> None:
+        plain = "?plain=1" if shown["plain"] else ""
+        image.props["src"] = f"/picture/{key}/{head.number}.jpg{plain}"
+        image.update()
+
+    def switch(plain: bool) -> None:
+        shown["plain"] = plain
+        show()
+
+    show()
+    head.listen(show)
+    ui.checkbox("the picture alone", on_change=lambda e: switch(bool(e.value))).props("dense")
+    if head.run.pictures.problem:
+        ui.label(head.run.pictures.problem).classes("dim")
+
+
+def _controls(head: Playhead) -> None:
+    with ui.element("div").classes("controls").props('role=group aria-label="Playing"'):
+        button("first_page", "To the start", lambda: head.go(0))
+        button("skip_previous", "The event before (p)", lambda: head.next_event(forth=False))
+        button("chevron_left", "One frame back (←)", lambda: head.step(-1))
+        play = button("play_arrow", "Play or pause (space)", head.toggle)
+        button("chevron_right", "One frame forth (→)", lambda: head.step(1))
+        button("skip_next", "The next event (n)", head.next_event)
+        button("last_page", "To the end", lambda: head.go(len(head.run.frames) - 1))
+        speeds = {s: f"{s:g}×" for s in SPEEDS}
+        ui.select(speeds, value=1.0, on_change=lambda e: setattr(head, "speed", e.value)).props(
+            'dense borderless options-dense aria-label="Speed"'
+        )
+        where = ui.label().classes("time")
+        frame = ui.label().classes("dim")
+
+    def show() -> None:
+        play.props(f"icon={'pause' if head.playing else 'play_arrow'}")
+        run = head.run
+        where.set_text(f"{clock(run.times[head.number])} / {clock(run.seconds)}")
+        frame.set_text(f"frame {run.frames[head.number]}")
+
+    head.listen(show)
+    show()
+
+
+def _timeline(head: Playhead) -> None:
+    """Rows over time with one cursor; a click goes there."""
+    with ui.element("div").classes("timeline"):
+        ui.element("div")
+        slider = ui.slider(min=0, max=max(1, len(head.run.frames) - 1), value=0)
+        slider.props('dense aria-label="Moment"').on(
+            "update:model-value", lambda e: head.go(int(e.args)), throttle=0.05
+        )
+        with ui.element("div").classes("labels").props("aria-hidden=true"):
+            for track in head.run.tracks:
+                ui.label(shown_text(track.label)).props(f'title="{track.group}"')
+        with ui.element("div").classes("bars") as bars:
+            ui.html(timeline_svg(head.run.tracks, head.run.seconds), sanitize=False)
+            cursor = ui.element("div").classes("cursor")
+    bars.on(
+        "click",
+        lambda e: head.go_to_time(float(e.args) * head.run.seconds),
+        js_handler="(e) => { const r = e.currentTarget.getBoundingClientRect();"
+        " emit((e.clientX - r.left) / Math.max(1, r.width)); }",
+    )
+
+    def show() -> None:
+        share = head.run.times[head.number] / max(head.run.seconds, 1e-6)
+        cursor.style(f"left:{100 * share:.3f}%")
+        slider.set_value(head.number)
+
+    head.listen(show)
+    show()
+
+
+def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
+    names = ("Now", "Told", "Alerts", "Ask", "Try")
+    with ui.tabs().props("dense align=left no-caps") as tabs:
+        made = {name: ui.tab(name) for name in names}
+    with ui.tab_panels(tabs, value=made["Now"], animated=False).classes("w-full"):
+        with ui.tab_panel(made["Now"]):
+            belief_panel(head)
+        with ui.tab_panel(made["Told"]):
+            events_panel(head)
+        with ui.tab_panel(made["Alerts"]):
+            alerts_panel(head, role)
+        with ui.tab_panel(made["Ask"]):
+            ask_panel(state, head, key)
+        with ui.tab_panel(made["Try"]):
+            try_panel(state, head, key, role)
+
+
+def _keys(head: Playhead) -> None:
+    """Keys for everything that is done often."""
+
+    def pressed(e: events.KeyEventArguments) -> None:
+        if not e.action.keydown or e.modifiers.ctrl or e.modifiers.alt or e.modifiers.meta:
+            return
+        by = 10 if e.modifiers.shift else 1
+        acts: dict[str, Callable[[], object]] = {
+            " ": head.toggle,
+            "ArrowLeft": lambda: head.step(-by),
+            "ArrowRight": lambda: head.step(by),
+            "Home": lambda: head.go(0),
+            "End": lambda: head.go(len(head.run.frames) - 1),
+            "n": head.next_event,
+            "p": lambda: head.next_event(forth=False),
+            "?": lambda: ui.notify(
+                "; ".join(f"{key}: {does}" for key, does in KEYS), multi_line=True
+            ),
+        }
+        if act := acts.get(str(e.key)):
+            act()
+
+    ui.keyboard(on_key=pressed, ignore=["input", "select", "button", "textarea"])
+
+
+def _follow(state: ConsoleState, key: str, head: Playhead) -> None:
+    """Read on in a run that goes on, and stay at its end if the cursor is there."""
+
+    def look() -> None:
+        try:
+            grown: RunView = state.view(key, refresh=True)
+        except VisupError:
+            return
+        if grown is not head.run:
+            at_end = head.number >= len(head.run.frames) - 1
+            head.run = grown
+            if at_end:
+                head.go(len(grown.frames) - 1)
+
+    ui.timer(REFRESH_S, look)

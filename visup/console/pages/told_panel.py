@@ -1,0 +1,132 @@
+"""What was told: every event and every alert with its time; a click goes there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from nicegui import ui
+
+from visup.agent import Alert, Event, Severity
+from visup.agent.model.errors import VisupError
+from visup.console.access import ConsoleRole
+from visup.console.feedback import AlertFeedback, Opinion, read_feedback, say
+from visup.console.pages.frame import clock, shown_text, worded_button
+from visup.console.pages.playhead import Playhead
+from visup.console.recorded_mind import open_at
+from visup.wording import prose, worded_once
+
+MOST_LINES = 400
+"""Events on the page at once; those around the cursor."""
+
+
+def events_panel(head: Playhead) -> None:
+    """Lay out the events; those up to the cursor are marked."""
+    told = worded_once(head.run.events)
+
+    @ui.refreshable
+    def lines() -> None:
+        now = head.run.times[head.number]
+        for event in _around(told, now):
+            last = event.time <= now < event.time + 1.0
+            _line(event.time, event.text, event.severity, head, marked=last)
+        if not told:
+            ui.label("Nothing was told.").classes("dim")
+
+    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Events"'):
+        lines()
+    head.listen(lines.refresh)
+
+
+def _around(told: Sequence[Event], now: float) -> Sequence[Event]:
+    """Events around a time, when there are too many."""
+    if len(told) <= MOST_LINES:
+        return told
+    at = sum(e.time <= now for e in told)
+    begin = min(max(0, at - MOST_LINES // 2), len(told) - MOST_LINES)
+    return told[begin : begin + MOST_LINES]
+
+
+def _line(
+    time: float, text: str, severity: Severity, head: Playhead, *, marked: bool = False
+) -> None:
+    kind = severity.name.lower() + (" now" if marked else "")
+    with ui.element("div").classes(f"line {kind}"):
+        ui.label(clock(time)).classes("when")
+        with ui.element("button").classes("plain said") as button:
+            ui.label(shown_text(prose(text)))
+        button.on("click", lambda: head.go_to_time(time))
+
+
+def alerts_panel(head: Playhead, role: ConsoleRole) -> None:
+    """Lay out the alerts, with what people said of them."""
+    wanted = {"open": False}
+
+    @ui.refreshable
+    def listed() -> None:
+        said = read_feedback(head.run.folder)
+        now = head.run.times[head.number]
+        found = [a for a in head.run.alerts if a.severity > Severity.INFO]
+        if wanted["open"]:
+            found = [a for a in found if open_at(a, now)]
+        for alert in found:
+            _alert(alert, said.get(alert.id), head, role, listed.refresh)
+        if not found:
+            ui.label("No alert is open here." if wanted["open"] else "No alert.").classes("dim")
+
+    def only_open(yes: bool) -> None:
+        wanted["open"] = yes
+        listed.refresh()
+
+    ui.checkbox("only what is open at the cursor", on_change=lambda e: only_open(bool(e.value)))
+    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"'):
+        listed()
+    head.listen(lambda: listed.refresh() if wanted["open"] else None)
+
+
+def _alert(
+    alert: Alert,
+    said: AlertFeedback | None,
+    head: Playhead,
+    role: ConsoleRole,
+    again: Callable[[], object],
+) -> None:
+    _line(alert.opened, alert.cause, alert.severity, head)
+    until = "still open" if alert.closed is None else f"until {clock(alert.closed)}"
+    with ui.row().classes("items-center gap-2 q-pl-xl"):
+        ui.label(f"{alert.kind.replace('_', ' ')}, {until}").classes("dim")
+        if said:
+            note = f": {said.note}" if said.note else ""
+            ui.label(shown_text(f"{said.opinion.value}{note}")).classes("dim")
+        if role is ConsoleRole.OPERATOR:
+            _opinions(alert, head, again)
+
+
+def _opinions(alert: Alert, head: Playhead, again: Callable[[], object]) -> None:
+    """What an operator can say of an alert."""
+
+    def keep(opinion: Opinion, note: str = "") -> None:
+        try:
+            say(head.run.folder, alert, opinion, note)
+        except VisupError as fault:
+            ui.notify(shown_text(str(fault)), type="negative", multi_line=True)
+            return
+        again()
+
+    for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
+        worded_button(opinion.value, partial(keep, opinion))
+    worded_button("mute ...", lambda: _mute(keep)).tooltip("needs a reason")
+
+
+def _mute(keep: Callable[[Opinion, str], None]) -> None:
+    """Ask for the reason."""
+    with ui.dialog() as dialog, ui.card():
+        ui.label("Why is it muted?")
+        reason = ui.input("Reason").props("autofocus")
+
+        def done() -> None:
+            dialog.close()
+            keep(Opinion.MUTED, str(reason.value or ""))
+
+        worded_button("Mute", done, main=True)
+    dialog.open()

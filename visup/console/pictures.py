@@ -1,0 +1,79 @@
+"""The frames of a run that was watched, from its source where that is still there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from threading import Lock
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Mind
+from visup.agent.model.errors import SourceError, VisupError
+from visup.report.annotate import annotate
+from visup.teaching.clip_frames import ClipFrames
+
+GREY = 96
+"""Where the video is gone, outlines are drawn on such a ground, 0 to 255."""
+
+QUALITY = 85
+Picture = NDArray[np.uint8]
+
+
+class RunPictures:
+    """Frames of one source, for any number of pages at once.
+
+    Only a file or folder of this machine is opened, never a camera, a pipe or an address: a run may come
+    from a stranger, and looking at it must not make this machine call anybody.
+
+    Args:
+        source: As the run names it.
+
+    Attributes:
+        problem: Why there are no frames, or empty.
+    """
+
+    def __init__(self, source: str) -> None:
+        self._lock, self._frames = Lock(), None
+        self.problem = ""
+        path = Path(source)
+        if not source or not (path.is_file() or path.is_dir()):
+            self.problem = "The video is not there any more: pictures show outlines alone."
+            return
+        try:
+            self._frames = ClipFrames(source)
+        except VisupError as fault:
+            self.problem = str(fault)
+
+    def frame(self, mind: Mind) -> Picture:
+        """The frame of a moment; a grey one where it cannot be had.
+
+        Returns:
+            (H, W, 3) uint8 BGR, of the size that was watched.
+        """
+        width, height = mind.frame_size
+        if self._frames is not None:
+            try:
+                with self._lock:
+                    found = self._frames.at(mind.frame_index)
+            except SourceError as fault:
+                self.problem = str(fault)
+            else:
+                if found.shape[:2] == (height, width):
+                    return found
+        return np.full((height, width, 3), GREY, np.uint8)
+
+    def drawn(self, mind: Mind, *, plain: bool = False) -> bytes:
+        """A moment as JPEG, with what is believed drawn over it unless it shall be plain."""
+        image = self.frame(mind)
+        return jpeg(image if plain else annotate(image, mind))
+
+
+def jpeg(image: Picture) -> bytes:
+    """An image as a JPEG file.
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+    """
+    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1])

@@ -1,0 +1,111 @@
+"""What was believed at one moment of a recorded run, from the summary that its journal keeps.
+
+Nothing is reasoned again, so it comes at once, however long the run. It knows less than the mind did:
+no relations, no poses, no likelihoods; of what is out of sight only where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from visup.agent import (
+    Alert,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Presence,
+    Region,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Verdict,
+)
+from visup.agent.model.errors import OutputError
+from visup.agent.model.object_beliefs import Candidate
+from visup.agent.model.records import Health, HealthStatus
+
+
+def recorded_mind(
+    told: Mapping[str, Any],
+    seen: Observation,
+    alerts: Iterable[Alert] = (),
+    actors: Mapping[str, tuple[str, ...]] | None = None,
+) -> Mind:
+    """What was believed after one step.
+
+    Args:
+        told: Its summary, as `Recording.step_at` gives it.
+        seen: What was perceived in it.
+        alerts: All alerts of the run; those that were open then are open in it.
+        actors: Actor -> models that stand for it.
+
+    Raises:
+        OutputError: The summary is not as it should be.
+    """
+    try:
+        regions = {r.id: r for r in seen.of("region")}
+        objects = [_belief(o, regions, seen) for o in told["objects"]]
+        return Mind(
+            time=seen.time,
+            frame_index=seen.frame_index,
+            frame_size=seen.frame_size,
+            objects=MappingProxyType({b.id: b for b in objects}),
+            tasks=tuple(_task(t) for t in told["tasks"]),
+            alerts=tuple(a for a in alerts if open_at(a, seen.time)),
+            health=Health(HealthStatus(told["health"]["status"]), str(told["health"]["detail"])),
+            unknown=frozenset(map(str, told["unknown"])),
+            actors=MappingProxyType(dict(actors or {})),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as fault:
+        raise OutputError(
+            f"what was believed in frame {seen.frame_index} cannot be read"
+        ) from fault
+
+
+def open_at(alert: Alert, time: float) -> bool:
+    """Whether an alert was open at a time, seconds."""
+    return alert.opened <= time and (alert.closed is None or time < alert.closed)
+
+
+def _belief(
+    line: Mapping[str, Any], regions: Mapping[int, Region], seen: Observation
+) -> ObjectBelief:
+    presence = Presence(line["presence"])
+    region = regions.get(line["region"]) if presence is Presence.SEEN else None
+    shares = [(str(name), float(share)) for name, share in line["candidates"]]
+    return ObjectBelief(
+        int(line["id"]),
+        region or _outline_lost(line, seen.frame_size),
+        presence,
+        first_seen=seen.time,
+        last_seen=seen.time,
+        confirmed=bool(line["confirmed"]),
+        candidates=tuple(Candidate(name, 0.0, share, share) for name, share in shares),
+        depth=None if line["depth"] is None else float(line["depth"]),
+    )
+
+
+def _outline_lost(line: Mapping[str, Any], size: tuple[int, int]) -> Region:
+    """Where something was last seen: its box, since the outline is not kept."""
+    x, y, w, h = (int(n) for n in line["bbox"])
+    corners = [(x, y), (x + w - 1, y), (x + w - 1, y + h - 1), (x, y + h - 1)]
+    return Region(
+        id=int(line["region"]),
+        bbox=(x, y, w, h),
+        mask=np.zeros((max(0, min(h, size[1])), max(0, min(w, size[0]))), dtype=bool),
+        contour=np.array(corners, np.float32),
+        centroid=(x + w / 2, y + h / 2),
+        area=float(line["area"]),
+        velocity=(float(line["velocity"][0]), float(line["velocity"][1])),
+        cut=bool(line["cut"]),
+    )
+
+
+def _task(line: Mapping[str, Any]) -> TaskBelief:
+    stages = tuple(StageBelief(str(n), Status(s), 0.0) for n, s in line["stages"].items())
+    current = line["current"]
+    return TaskBelief(str(line["task"]), Verdict(line["verdict"]), stages, current)

@@ -1,0 +1,165 @@
+"""One run as the console reads it: moments by time, what was believed in each, its events and alerts."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from threading import Lock
+
+import cv2
+import numpy as np
+
+from visup.agent import Alert, Event, Mind
+from visup.agent.model.errors import OutputError, VisupError
+from visup.api.recorded import open_run
+from visup.console.pictures import RunPictures, jpeg
+from visup.console.recorded_mind import recorded_mind
+from visup.console.tracks import TimelineTrack, tracks_of
+from visup.report.annotate import annotate
+from visup.runs.settings import WatchSettings
+
+KEPT_MINDS = 64
+THUMBNAIL = 224
+"""Width of a small picture, pixels."""
+
+MOST_SHARES = 240
+"""Moments at which the identity of an object is looked up for its curve."""
+
+
+class RunView:
+    """A run, read as far as it was written when it was opened; `refreshed` reads on.
+
+    Args:
+        folder: Of the run.
+
+    Attributes:
+        folder: The same.
+        frames: Numbers of the frames that were judged, in order.
+        times: Their times, seconds.
+
+    Raises:
+        OutputError: It cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._run = open_run(folder)
+        moments = list(self._run.recording.moments())
+        self.frames = [frame for frame, _ in moments]
+        self.times = [time for _, time in moments]
+        self._minds: OrderedDict[int, Mind] = OrderedDict()
+        self._lock = Lock()
+
+    def refreshed(self) -> RunView:
+        """This run, read anew if it has grown."""
+        ends = self._run.recording.first_and_last()
+        if ends is None or (self.frames and ends[1] == self.frames[-1]):
+            return self
+        again = RunView(self.folder)
+        if "pictures" in self.__dict__:
+            again.__dict__["pictures"] = self.pictures
+        return again
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return "ended" in self._run.facts
+
+    @property
+    def verdict(self) -> str | None:
+        """What it came to, or None."""
+        return None if self._run.verdict is None else self._run.verdict.value
+
+    @property
+    def source(self) -> str:
+        """What was watched."""
+        told = self._run.facts.get("source")
+        return told if isinstance(told, str) else ""
+
+    @property
+    def seconds(self) -> float:
+        """Time of the last moment."""
+        return self.times[-1] if self.times else 0.0
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """All events, in order."""
+        return tuple(self._run.events)
+
+    @cached_property
+    def alerts(self) -> tuple[Alert, ...]:
+        """All alerts, as they were last."""
+        return tuple(self._run.alerts)
+
+    @cached_property
+    def tracks(self) -> tuple[TimelineTrack, ...]:
+        """What happened, laid out over time."""
+        return tracks_of(self.events, self.alerts, self.seconds, self.actors)
+
+    @cached_property
+    def pictures(self) -> RunPictures:
+        """Frames of the source."""
+        return RunPictures(self.source)
+
+    @cached_property
+    def settings(self) -> WatchSettings | None:
+        """The settings of the run; None where they cannot be read."""
+        try:
+            return self._run.settings
+        except VisupError:
+            return None
+
+    @property
+    def actors(self) -> Mapping[str, tuple[str, ...]]:
+        """Actor -> models."""
+        return dict(self.settings.actors) if self.settings else {}
+
+    def at(self, time: float) -> int:
+        """Number of the last moment that is not after a time, from 0; the first where all are."""
+        return max(0, bisect_right(self.times, time + 1e-6) - 1)
+
+    def of_frame(self, frame: int) -> int:
+        """Number of the last moment whose frame is not after one."""
+        return max(0, bisect_right(self.frames, frame) - 1)
+
+    def mind(self, number: int) -> Mind:
+        """What was believed at a moment.
+
+        Raises:
+            OutputError: There is no such moment, or it is damaged.
+        """
+        if not 0 <= number < len(self.frames):
+            raise OutputError("nothing was judged in this run yet", where=str(self.folder))
+        with self._lock:
+            if number not in self._minds:
+                told, seen = self._run.recording.step_at(self.frames[number])
+                self._minds[number] = recorded_mind(told, seen, self.alerts, self.actors)
+                while len(self._minds) > KEPT_MINDS:
+                    self._minds.popitem(last=False)
+            return self._minds[number]
+
+    def picture(self, number: int, *, plain: bool = False) -> bytes:
+        """A moment as JPEG."""
+        return self.pictures.drawn(self.mind(number), plain=plain)
+
+    def thumbnail(self) -> bytes:
+        """A small picture of the middle of the run, as JPEG."""
+        image = annotate(self.pictures.frame(mind := self.mind(len(self.frames) // 2)), mind)
+        height = round(image.shape[0] * THUMBNAIL / image.shape[1])
+        size = (THUMBNAIL, max(1, height))
+        return jpeg(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8))
+
+    def shares(self, object_id: int) -> Iterator[tuple[float, Mapping[str, float]]]:
+        """How sure each identity of an object was over time: time, and name -> share of the votes.
+
+        An approximation: it is looked up at a few hundred moments, so that shorter changes do not show.
+        """
+        step = max(1, len(self.frames) // MOST_SHARES)
+        for number in range(0, len(self.frames), step):
+            told, _ = self._run.recording.step_at(self.frames[number])
+            for line in told.get("objects", ()):
+                if line.get("id") == object_id:
+                    yield self.times[number], {str(n): float(s) for n, s in line["candidates"]}

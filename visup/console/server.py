@@ -1,0 +1,102 @@
+"""The console's application: pages, pictures, and the guard before them."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from collections.abc import Callable
+
+import uvicorn
+from fastapi import FastAPI, HTTPException, Request, Response
+from nicegui import ui
+
+from visup.agent.model.errors import SettingsError, VisupError
+from visup.console.access import WHO, Access, AccessGuard, ConsoleRole
+from visup.console.pages.library_page import library_page
+from visup.console.pages.run_page import run_page
+from visup.console.pages.wall_page import wall_page
+from visup.console.state import ConsoleState
+
+FAVICON = "◉"
+_PICTURE = {"Cache-Control": "private, max-age=60"}
+
+
+def build_application(state: ConsoleState, access: Access) -> AccessGuard:
+    """The application; one console a process, since NiceGUI's pages are the process's."""
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
+    _pictures(app, state)
+    _pages(state)
+    ui.run_with(app, title="visup", favicon=FAVICON, dark=None, show_welcome_message=False)
+    return AccessGuard(app, access)
+
+
+def _pictures(app: FastAPI, state: ConsoleState) -> None:
+    """Pictures are drawn in threads, so that a large one does not hold up the pages."""
+
+    @app.get("/picture/{key}/{number}.jpg")
+    def picture(key: str, number: int, plain: bool = False) -> Response:
+        return _jpeg(lambda: state.view(key).picture(number, plain=plain))
+
+    @app.get("/thumbnail/{key}.jpg")
+    def thumbnail(key: str) -> Response:
+        return _jpeg(lambda: state.view(key).thumbnail())
+
+
+def _jpeg(draw: Callable[[], bytes]) -> Response:
+    try:
+        return Response(draw(), media_type="image/jpeg", headers=_PICTURE)
+    except VisupError as fault:
+        raise HTTPException(404, str(fault)) from fault
+
+
+def _pages(state: ConsoleState) -> None:
+    @ui.page("/")
+    def listed() -> None:
+        library_page(state)
+
+    @ui.page("/wall")
+    def wall() -> None:
+        wall_page(state)
+
+    @ui.page("/run/{key}")
+    def one(request: Request, key: str, t: float = 0.0) -> None:
+        run_page(state, key, request.scope.get(WHO, ConsoleRole.VIEWER), t)
+
+
+def serve_console(
+    state: ConsoleState, access: Access, host: str, port: int, ready: Callable[[str], None]
+) -> None:
+    """Serve the console until it is interrupted.
+
+    Args:
+        state: What it shows.
+        access: Who gets in.
+        host: Address to listen at.
+        port: Port; 0 for any that is free.
+        ready: Told the address, with the token, once it listens.
+
+    Raises:
+        SettingsError: It cannot listen there.
+    """
+    application = build_application(state, access)
+    with _listening(host, port) as listening:
+        chosen = listening.getsockname()[1]
+        name = f"[{host}]" if ":" in host else host
+        settings = uvicorn.Config(application, log_level=logging.WARNING, lifespan="on")
+        server = uvicorn.Server(settings)
+        ready(f"http://{name}:{chosen}/?token={access.operator}")
+        server.run(sockets=[listening])
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        made = socket.socket(family, socket.SOCK_STREAM)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind((host, port))
+    except (OSError, OverflowError) as fault:
+        raise SettingsError(
+            f"the console cannot listen at {host}:{port} ({fault})",
+            hint="give another --port, or --port 0 for any that is free",
+        ) from fault
+    return made

@@ -1,0 +1,68 @@
+"""What all pages share: the library, and the runs that are open."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from threading import Lock
+from typing import TypeVar
+
+from visup.console.inquiry import Inquiry
+from visup.console.library import RunLibrary
+from visup.console.run_view import RunView
+
+MOST_VIEWS = 16
+MOST_INQUIRIES = 4
+"""Inquiries hold all minds of a run, so few are kept."""
+
+Kept = TypeVar("Kept")
+
+
+class ConsoleState:
+    """The library, and the runs that are open; safe for many pages at once.
+
+    Args:
+        library: Finds runs.
+    """
+
+    def __init__(self, library: RunLibrary) -> None:
+        self.library = library
+        self._views: OrderedDict[str, RunView] = OrderedDict()
+        self._inquiries: OrderedDict[str, Inquiry] = OrderedDict()
+        self._lock = Lock()
+
+    def view(self, key: str, *, refresh: bool = False) -> RunView:
+        """A run as it is read.
+
+        Args:
+            key: Of the run.
+            refresh: Whether to read on in a run that has grown.
+
+        Raises:
+            OutputError: There is no such run, or it cannot be read.
+        """
+        with self._lock:
+            made = _kept(self._views, key, lambda: RunView(self.library.folder(key)), MOST_VIEWS)
+            if refresh:
+                made = self._views[key] = made.refreshed()
+            return made
+
+    def inquiry(self, key: str) -> Inquiry:
+        """What answers questions about a run.
+
+        Raises:
+            VisupError: There is no such run, or it cannot be reasoned about again.
+        """
+        with self._lock:
+            folder = self.library.folder(key)
+            return _kept(self._inquiries, key, lambda: Inquiry(folder), MOST_INQUIRIES)
+
+
+def _kept(held: OrderedDict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
+    """What is held under a key, made when it is not there; the ones used longest ago go."""
+    if key not in held:
+        held[key] = make()
+    held.move_to_end(key)
+    while len(held) > most:
+        held.popitem(last=False)
+    return held[key]

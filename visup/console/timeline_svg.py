@@ -1,0 +1,79 @@
+"""The timeline as SVG: one row for each track; no text in it, so that it may be stretched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from visup.agent import Severity, Status
+from visup.console.tracks import TimelineTrack, TrackSpan
+from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, css, object_colour
+
+WIDTH = 1000
+ROW = 22
+BAR = 14
+LEAST_WIDTH = 2.0
+"""Of a bar, in units of the picture, so that what was short is seen."""
+
+HEALTH_COLOUR = "#96769e"
+FAINT = {"hidden": 0.35, "active": 0.55, "paused": 0.45}
+"""Opacity of states in which less is known, or nothing happens."""
+
+_STATUS = {s.value: css(STATUS_COLOURS[s]) for s in Status}
+_SEVERITY = {s.name.lower(): css(SEVERITY_COLOURS[s]) for s in Severity}
+
+
+def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float) -> str:
+    """All rows over one axis of time.
+
+    Args:
+        tracks: From top to bottom.
+        seconds: Length of the axis.
+
+    Returns:
+        An SVG element of `ROW` pixels a track, as wide as its place.
+    """
+    height = ROW * max(1, len(tracks))
+    bars = "".join(_row(track, number, max(seconds, 1e-6)) for number, track in enumerate(tracks))
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {height}" preserveAspectRatio="none" width="100%" '
+        f'height="{height}" role="img" aria-label="{escape(in_words(tracks), quote=True)}">{bars}</svg>'
+    )
+
+
+def in_words(tracks: Sequence[TimelineTrack]) -> str:
+    """The same for those who cannot see it."""
+    told = [f"{t.label}: {_spans_in_words(t.spans)}" for t in tracks if t.group != "object"]
+    return "; ".join(told) or "Nothing was told."
+
+
+def _spans_in_words(spans: Sequence[TrackSpan]) -> str:
+    return ", ".join(f"{s.state} {s.start:.1f} to {s.end:.1f} s" for s in spans[:12])
+
+
+def _row(track: TimelineTrack, number: int, seconds: float) -> str:
+    top = number * ROW
+    ground = f'<rect class="row" x="0" y="{top + 1}" width="{WIDTH}" height="{ROW - 2}"/>'
+    return ground + "".join(_bar(track, span, top, seconds) for span in track.spans)
+
+
+def _bar(track: TimelineTrack, span: TrackSpan, top: int, seconds: float) -> str:
+    left = WIDTH * min(1.0, max(0.0, span.start / seconds))
+    wide = max(LEAST_WIDTH, WIDTH * min(1.0, span.end / seconds) - left)
+    told = f"{track.label}: {span.state}, {span.start:.1f} to {span.end:.1f} s. {span.text}"
+    return (
+        f'<rect x="{left:.2f}" y="{top + (ROW - BAR) // 2}" width="{wide:.2f}" height="{BAR}" '
+        f'fill="{colour_of(track, span)}" opacity="{FAINT.get(span.state, 1.0)}">'
+        f"<title>{escape(told)}</title></rect>"
+    )
+
+
+def colour_of(track: TimelineTrack, span: TrackSpan) -> str:
+    """The colour of a bar, as CSS writes it."""
+    if track.group == "stage":
+        return _STATUS[span.state]
+    if track.group == "alert":
+        return _SEVERITY.get(span.state, HEALTH_COLOUR)
+    if track.object_id is not None:
+        return css(object_colour(track.object_id))
+    return HEALTH_COLOUR

@@ -1,0 +1,50 @@
+"""Precision of alerts, from what people said of them in the console."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from visup.agent import Alert
+from visup.agent.model.errors import VisupError
+from visup.api.recorded import open_run
+from visup.console.feedback import AlertFeedback, KindPrecision, precisions, read_feedback
+from visup.console.library import RunLibrary
+from visup.evaluation.figures import Progress, silent
+
+
+def evaluate_feedback(folder: Path, progress: Progress = silent) -> dict[str, Any]:
+    """How alerts were judged, over all runs below a folder.
+
+    Args:
+        folder: Run folders anywhere below it; those that cannot be read are counted, and left out.
+        progress: Shows what is being done.
+
+    Returns:
+        `items` by kind of alert: `alerts`, `right`, `false`, `precision` (None while none was judged);
+        `total` over all, with `runs` and `unreadable`.
+    """
+    entries = RunLibrary([folder]).scan()
+    sound = [e.folder for e in entries if not e.problem]
+    kinds = precisions(_judged(sound, progress))
+    alerts, right, false = (sum(getattr(k, n) for k in kinds) for n in ("alerts", "right", "false"))
+    whole = _figures(KindPrecision("", alerts, right, false))
+    counts = {"runs": len(sound), "unreadable": len(entries) - len(sound)}
+    return {"items": {k.kind: _figures(k) for k in kinds}, "total": {**whole, **counts}}
+
+
+def _judged(
+    folders: list[Path], progress: Progress
+) -> Iterator[tuple[tuple[Alert, ...], Mapping[int, AlertFeedback]]]:
+    for folder in folders:
+        progress(folder.name)
+        try:
+            yield tuple(open_run(folder).alerts), read_feedback(folder)
+        except VisupError:
+            continue
+
+
+def _figures(kind: KindPrecision) -> dict[str, Any]:
+    told = {"alerts": kind.alerts, "right": kind.right, "false": kind.false}
+    return {**told, "precision": kind.precision}
