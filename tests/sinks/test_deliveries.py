@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.clips import moving_disc, write_clip
@@ -32,6 +32,7 @@ ACTS = st.lists(
 )
 
 
+@settings(max_examples=20)
 @given(ACTS)
 def test_every_sink_gets_every_record_in_order_whoever_is_killed(
     tmp_path_factory: pytest.TempPathFactory, acts: list[str]
@@ -157,14 +158,14 @@ def test_alerts_of_a_run_that_was_killed_with_its_sink_down_are_told_once(
         deliveries=tmp_path / "deliveries.sqlite",
         closing_s=0.2,
     )
-    settings = WatchSettings(str(clip), rules=(rules,))
+    watched = WatchSettings(str(clip), rules=(rules,))
 
     def down(sink: JsonLines, record: Mapping[str, Any]) -> None:
         raise OSError("down")
 
     with monkeypatch.context() as broken:
         broken.setattr(JsonLines, "deliver", down)
-        begun = supervised(settings, fresh_folder(run, ""), Audience(), options)
+        begun = supervised(watched, fresh_folder(run, ""), Audience(), options)
         for _ in islice(begun, 30):
             pass
         begun.close()

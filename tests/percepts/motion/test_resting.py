@@ -15,7 +15,7 @@ from visup.percepts.motion.resting import CALM_S, RestingMotion
 from visup.percepts.motion.segmenter import MotionSegmenter
 
 FPS = 5.0
-EMPTY_S = 30
+EMPTY_S = 20
 
 
 def pictures() -> list[NDArray[np.uint8]]:

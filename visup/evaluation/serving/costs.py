@@ -18,7 +18,11 @@ from visup.serving.site.form import CameraTable
 NOISE = 2.0
 """Of each pixel, levels: that of a camera in a lit room."""
 
-SETTLE_S, WATCHED_S = 20.0, 60.0
+SETTLE_S = 12.0
+"""Until nothing is new any more, seconds of the source."""
+
+WATCHED_S, BUSY_S = 60.0, 6.0
+"""Seconds of the source that are measured: where it rests, and where each frame is looked at."""
 
 
 def camera_costs(seed: int = 0) -> dict[str, float]:
@@ -36,22 +40,23 @@ def camera_costs(seed: int = 0) -> dict[str, float]:
     frames = scene(seed)
     rest_s = float(CameraTable.model_fields["rest_s"].default)
     return {
-        "idle_cpu": _share(frames[-1:], rest_s, seed),
-        "idle_cpu_without_rest": _share(frames[-1:], None, seed),
-        "busy_cpu": _share(frames[4 : CROSSING - 4 : 2], rest_s, seed),
+        "idle_cpu": _share(frames[-1:], rest_s, WATCHED_S, seed),
+        "idle_cpu_without_rest": _share(frames[-1:], None, BUSY_S, seed),
+        "busy_cpu": _share(frames[4 : CROSSING - 4 : 2], rest_s, BUSY_S, seed),
     }
 
 
-def _share(pictures: list[NDArray[np.uint8]], rest_s: float | None, seed: int) -> float:
+def _share(
+    pictures: list[NDArray[np.uint8]], rest_s: float | None, watched_s: float, seed: int
+) -> float:
     """Seconds of a processor for a second of the source."""
     agent = build_agent(WatchSettings(source="scene", rest_s=rest_s), live=True)
     ring = FrameRing(8.0, 2**25)
     noise = _noise(pictures[0].shape, seed)
     used = 0.0
-    watched = WATCHED_S if rest_s else WATCHED_S / 6.0
     for number, picture in enumerate(cycle(pictures)):
         now = number / PACE
-        if now >= SETTLE_S + watched:
+        if now >= SETTLE_S + watched_s:
             break
         image = np.clip(picture + noise[number % len(noise)], 0, 255).astype(np.uint8)
         begin = time.process_time()
@@ -59,7 +64,7 @@ def _share(pictures: list[NDArray[np.uint8]], rest_s: float | None, seed: int) -
         ring.add(encoded(image, now))
         used += (time.process_time() - begin) if now >= SETTLE_S else 0.0
     agent.close()
-    return used / watched
+    return used / watched_s
 
 
 def _noise(shape: tuple[int, ...], seed: int) -> list[NDArray[np.int16]]:
