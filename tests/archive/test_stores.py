@@ -35,8 +35,9 @@ def memory() -> str:
 @pytest.fixture(scope="module")
 def bucket() -> Iterator[str]:
     """A bucket of an object store that runs on this machine."""
-    pytest.importorskip("s3fs", reason="s3fs is not installed")
-    server = pytest.importorskip("moto.server", reason="moto's server is not installed")
+    # Not among the libraries for development: moto's server and rtamt want different versions of others.
+    pytest.importorskip("s3fs", reason="s3fs is not installed: pip install s3fs")
+    server = pytest.importorskip("moto.server", reason="no moto: pip install 'moto[server]'")
     running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0)
     running.start()
     host, port = running.get_host_and_port()
