@@ -86,7 +86,7 @@ class AccessGuard:
         given = query.get(PARAMETER, [""])[0]
         role = self._access.role(given or _cookie(headers.get("cookie", "")))
         if fault or role is None:
-            await _refuse(scope, send, fault or _NO_TOKEN)
+            await _refuse(scope, send, fault or _UNKNOWN)
         elif given and scope["type"] == "http":
             await _welcome(scope, send, given)
         else:
@@ -107,7 +107,7 @@ class AccessGuard:
         return ""
 
 
-_NO_TOKEN = "Open the address that `visup console` printed: it holds the token that lets you in."
+_UNKNOWN = "Open the address that `visup console` printed: it holds the token that lets you in."
 
 
 def _headers(given: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:

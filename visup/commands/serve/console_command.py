@@ -15,8 +15,8 @@ from visup.terminal.console import make_console
 if TYPE_CHECKING:
     from visup.console.access import Access
 
-OPERATOR_TOKEN = "VISUP_CONSOLE_TOKEN"
-VIEWER_TOKEN = "VISUP_CONSOLE_VIEWER_TOKEN"
+OPERATOR_VARIABLE = "VISUP_CONSOLE_TOKEN"
+VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
 SHORTEST_TOKEN = 16
 
 
@@ -44,10 +44,10 @@ def console(
         from visup.console.state import ConsoleState
     except ModuleNotFoundError as missing:
         raise ExtraMissingError("the console", "console") from missing
-    if host not in LOOPBACK and OPERATOR_TOKEN not in os.environ:
+    if host not in LOOPBACK and OPERATOR_VARIABLE not in os.environ:
         raise SettingsError(
             f"at {host} others can reach the console",
-            expected=f"a token of your own in {OPERATOR_TOKEN}",
+            expected=f"a token of your own in {OPERATOR_VARIABLE}",
             hint="put a proxy with TLS before it, too: docs/console.md tells how",
         )
     state = ConsoleState(RunLibrary(places))
@@ -67,7 +67,7 @@ def _access(hosts: tuple[str, ...]) -> Access:
     """Who gets in, by tokens of the environment."""
     from visup.console.access import Access
 
-    operator, viewer = (_token(name) for name in (OPERATOR_TOKEN, VIEWER_TOKEN))
+    operator, viewer = (_token(name) for name in (OPERATOR_VARIABLE, VIEWER_VARIABLE))
     hosts = tuple(dict.fromkeys(hosts))
     if operator is None:
         return Access(viewer=viewer, hosts=hosts)

@@ -10,13 +10,15 @@ import subprocess
 import sys
 import tempfile
 import time
-import urllib.request
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from statistics import median
 from typing import Any
+
+import urllib3
+from urllib3.exceptions import HTTPError
 
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent, sums_of
@@ -202,10 +204,9 @@ class Rehearsal:
 
     def _look(self, pid: int) -> None:
         """What the service tells of itself."""
-        with suppress(OSError):
+        with suppress(HTTPError):
             at = f"http://127.0.0.1:{self._monitoring}/metrics"
-            with urllib.request.urlopen(at, timeout=5) as answer:  # it is our own
-                page = answer.read().decode()
+            page = urllib3.request("GET", at, timeout=5.0, retries=False).data.decode()
             for figure, camera, value in _SAMPLE.findall(page):
                 self._figures.setdefault(camera, {})[figure] = float(value)
             frames = self._of_each("visup_frames_seen_total")
