@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import lru_cache
 
 from visup.agent.cycle.own_troubles import OWN_TROUBLES
 from visup.agent.model.did_you_mean import closest, did_you_mean
@@ -367,7 +368,11 @@ def _often(node: MOfN) -> Iterator[Fault]:
 
 def _nearest(word: str, known: Iterable[str]) -> str:
     """All that is known if it is little, else what is spelt most like a word."""
-    names = list(known)
+    return _nearest_of(word, tuple(known))
+
+
+@lru_cache(maxsize=4096)  # each edit that is tried meets all faults of its file anew
+def _nearest_of(word: str, names: tuple[str, ...]) -> str:
     if len(names) <= MOST_LISTED:
         return _listed(names)
     near = get_close_matches(word, names, n=MOST_LISTED, cutoff=0.0)
