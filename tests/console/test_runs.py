@@ -146,6 +146,12 @@ def test_the_playhead_stays_within_the_run_and_jumps_to_what_was_told(
     assert visited == pytest.approx(later + [times[-1]] * (len(times) - len(later)))
     head.next_event(forth=False)
     assert head.run.times[head.number] == pytest.approx(times[-2])
+    asked: list[str] = []
+    head.listen(lambda: asked.append(head.panel), "Told")
+    head.step(-1)
+    assert asked == []
+    head.open_panel("Told")
+    assert asked == ["Told"]
     head.go(0)
     head.toggle()
     for _ in range(80):

@@ -57,7 +57,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
                 worded_button(what, partial(ask, what))
 
     proposed()
-    head.listen(proposed.refresh)
+    head.listen(proposed.refresh, "Ask")
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Answer"'):
         answer = ui.column().classes("w-full gap-0")
 

@@ -47,7 +47,7 @@ def belief_panel(head: Playhead) -> None:
 
     now()
     identity()
-    head.listen(now.refresh)
+    head.listen(now.refresh, "Now")
 
 
 def _part(title: str) -> None:

@@ -25,6 +25,7 @@ class Playhead:
         playing: Whether it moves on by itself.
         speed: Seconds of the run in one second.
         time: Where it is, seconds; while it plays, between two moments.
+        panel: Name of the panel that is open.
     """
 
     run: RunView
@@ -32,11 +33,17 @@ class Playhead:
     playing: bool = False
     speed: float = 1.0
     time: float = 0.0
-    _listeners: list[Listener] = field(default_factory=list)
+    panel: str = ""
+    _listeners: list[tuple[Listener, str | None]] = field(default_factory=list)
 
-    def listen(self, listener: Listener) -> None:
-        """Have something called whenever the place changes."""
-        self._listeners.append(listener)
+    def listen(self, listener: Listener, panel: str | None = None) -> None:
+        """Have something called whenever the place changes; what belongs to a panel, while that is open."""
+        self._listeners.append((listener, panel))
+
+    def open_panel(self, name: str) -> None:
+        """Open another panel: what belongs to it is brought up to the cursor."""
+        self.panel = name
+        self._tell()
 
     def go(self, number: int) -> None:
         """Be at a moment; the nearest one there is."""
@@ -88,5 +95,6 @@ class Playhead:
             self.go_to_time(found)
 
     def _tell(self) -> None:
-        for listener in self._listeners:
-            listener()
+        for listener, panel in self._listeners:
+            if panel in (None, self.panel):
+                listener()

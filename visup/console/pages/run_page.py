@@ -145,6 +145,7 @@ def _timeline(head: Playhead) -> None:
 
 def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     names = ("Now", "Told", "Alerts", "Ask", "Try")
+    head.panel = names[0]
     with ui.tabs().props("dense align=left no-caps") as tabs:
         made = {name: ui.tab(name) for name in names}
     with ui.tab_panels(tabs, value=made["Now"], animated=False).classes("w-full"):
@@ -158,6 +159,7 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
             ask_panel(state, head, key)
         with ui.tab_panel(made["Try"]):
             try_panel(state, head, key, role)
+    tabs.on_value_change(lambda e: head.open_panel(str(e.value)))
 
 
 def _keys(head: Playhead) -> None:

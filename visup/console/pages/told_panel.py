@@ -16,7 +16,7 @@ from visup.console.pages.playhead import Playhead
 from visup.console.recorded_mind import open_at
 from visup.wording import prose, worded_once
 
-MOST_LINES = 400
+MOST_LINES = 200
 """Events on the page at once; those around the cursor."""
 
 
@@ -35,7 +35,7 @@ def events_panel(head: Playhead) -> None:
 
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Events"'):
         lines()
-    head.listen(lines.refresh)
+    head.listen(lines.refresh, "Told")
 
 
 def _around(told: Sequence[Event], now: float) -> Sequence[Event]:
@@ -81,7 +81,7 @@ def alerts_panel(head: Playhead, role: ConsoleRole) -> None:
     ui.checkbox("only what is open at the cursor", on_change=lambda e: only_open(bool(e.value)))
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"'):
         listed()
-    head.listen(lambda: listed.refresh() if wanted["open"] else None)
+    head.listen(lambda: listed.refresh() if wanted["open"] else None, "Alerts")
 
 
 def _alert(
