@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from visup.agent import Mind
 from visup.agent.model.errors import SourceError, VisupError
 from visup.report.annotate import annotate
+from visup.runs.replay_report import GREY
 from visup.teaching.clip_frames import ClipFrames
-
-GREY = 96
-"""Where the video is gone, outlines are drawn on such a ground, 0 to 255."""
 
 QUALITY = 85
 Picture = NDArray[np.uint8]
