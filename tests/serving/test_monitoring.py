@@ -73,7 +73,7 @@ CELL = CameraStatus(
 
 
 def test_the_page_is_what_prometheus_reads() -> None:
-    parser = pytest.importorskip("prometheus_client.parser")
+    parser = pytest.importorskip("prometheus_client.parser", reason="needs the extra `serve`")
     page, kind = metrics_page(site(CELL, CameraStatus("yard", "starting")), "")
     assert kind.startswith("text/plain")
     samples = {

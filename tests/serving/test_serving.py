@@ -145,7 +145,7 @@ def test_who_is_killed_comes_back_and_the_others_never_notice(visup: Call, site:
 
 
 def frames_seen_and_restarts_are_told(service: Service) -> None:
-    pytest.importorskip("prometheus_client")
+    pytest.importorskip("prometheus_client", reason="needs the extra `serve`")
     (address,) = re.findall(r"http://\S+/metrics", service.log)
     with urllib.request.urlopen(address, timeout=5) as answer:
         page = answer.read().decode()

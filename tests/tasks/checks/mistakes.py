@@ -1,4 +1,4 @@
-"""Deliberate mistakes in both languages: conditions of rules, stages, whole rules."""
+"""Deliberate mistakes in both languages: conditions of rules, and stages."""
 
 CONDITIONS = [
     "touching(a, b) or not",
@@ -383,21 +383,4 @@ STAGES = [
     "paramter p is 5 s\n<a> ::= touching(x, y) for p",
     'includ "dock"\n<a> ::= touching(x, y)',
     "on failure of <aa>: coupled(x, y)\n<a> ::= touching(x, y)",
-]
-WHOLE_RULES = [
-    'rul near(a, b): info\n    when touching(a, b)\n    say "{a}"',
-    'rule near(a, b) info\n    when touching(a, b)\n    say "{a}"',
-    'rule near(a, b): info\n    wen touching(a, b)\n    say "{a}"',
-    'rule near(a, b): info\n    when touching(a, b)\n    cooldwn 3 s\n    say "{a}"',
-    'rule near[a, b]: info\n    when touching(a, b)\n    say "{a}"',
-    "rule near(a, b): info when touching(a, b) say {a}",
-    'rule near a, b: info\n    when touching(a, b)\n    say "{a}"',
-    'rule near(a, b): Warning\n    when touching(a, b)\n    say "{a}"',
-    'rule near(a, b): info\n    when touching(a, b)\n    for 3 s\n    say "{a}',
-    'rule near(a, b): info\n    when touching(a, b)\n    unless\n    say "{a}"',
-    'rule near(a, b): info\n    when touching(a, b)\n    unles seen(a)\n    say "{a}"',
-    'rule (a, b): info\n    when touching(a, b)\n    say "{a}"',
-    'rule near(a, b): info\n    touching(a, b)\n    say "{a}"',
-    'rule near(a, b): info\n    when touching(a, b)\n    sya "{a}"',
-    'rule near(a, b): info,\n    when touching(a, b)\n    say "{a}"',
 ]

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from tests.rules.language.test_mistakes import CONDITIONS as MENDED_CONDITIONS
 from tests.rules.language.test_mistakes import RULES as MENDED_RULES
 from tests.rules.language.test_mistakes import errors_of, rule
-from tests.tasks.checks.mistakes import CONDITIONS, STAGES, WHOLE_RULES
+from tests.tasks.checks.mistakes import CONDITIONS, STAGES
 from tests.tasks.checks.test_repairs import TEXTS as MENDED_TASKS
+from tests.tasks.checks.whole_rule_mistakes import WHOLE_RULES
 from visup.agent.model.errors import SourceLocation
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.tasks.checks.diagnose import diagnose
