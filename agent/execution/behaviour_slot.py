@@ -179,7 +179,8 @@ class BehaviourSlot:
         taken = self.limits.clock() - begin
         if self.limits.budgets and seconds is not None and taken > seconds:
             raise RunTimeoutError(f"it took longer than its budget of {duration_text(seconds)}")
-        self.grown_mb += resident_mb() - before
+        # What others kept may be given back while it runs: that must not pay for what it keeps later.
+        self.grown_mb = max(0.0, self.grown_mb + resident_mb() - before)
         most = self.limits.megabytes(self.contract)
         if self.grown_mb > most:
             self.grown_mb = 0.0

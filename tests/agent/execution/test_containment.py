@@ -198,6 +198,21 @@ def test_memory_that_is_kept_is_noticed() -> None:
     assert told[first + 1].state is ReportState.SUSPENDED
 
 
+def test_memory_given_back_by_others_does_not_pay_for_what_is_kept() -> None:
+    others = [np.ones(200 * 2**20, np.uint8)]
+    kept: list[Any] = []
+
+    def hoard(frame: Frame, observation: Observation) -> int:
+        others.clear()
+        if frame.index:
+            kept.append(np.ones(40 * 2**20, np.uint8))
+        return frame.index
+
+    told = reports(Plug(hoard, memory_mb=30.0), Limits(), 2)
+    assert told[0].state is ReportState.RAN
+    assert told[1].state is ReportState.FAILED
+
+
 def test_a_frame_cannot_be_written_to() -> None:
     def scribble(frame: Frame, observation: Observation) -> None:
         frame.image[:] = 0
