@@ -332,6 +332,9 @@ def _task_line(task: TaskBelief) -> dict[str, Any]:
         "verdict": task.verdict.value,
         "current": task.current,
         "stages": {s.stage: s.status.value for s in task.stages},
+        "sure": {s.stage: round(s.confidence, 3) for s in task.stages if s.confidence < 1.0},
+        "next": [[p.stage, round(p.probability, 3)] for p in task.prospects],
+        "success": None if task.success is None else round(task.success, 3),
     }
 
 

@@ -99,9 +99,15 @@ class Recording:
         found = [self._record(record) for _, (record,) in rows]
         return {a["id"]: a for a in found if isinstance(a.get("id"), int)}
 
-    def summaries(self) -> Iterator[dict[str, Any]]:
-        """What was believed after each step, in short, with frame index and time."""
-        rows = self._rows("SELECT frame_index, time, summary FROM steps ORDER BY frame_index")
+    def summaries(self, first: int = 0, last: int = 2**63 - 1) -> Iterator[dict[str, Any]]:
+        """What was believed after each step, in short, with frame index and time.
+
+        Args:
+            first: Number of the first frame that is wanted.
+            last: Number of the last one.
+        """
+        sql = "SELECT frame_index, time, summary FROM steps WHERE frame_index BETWEEN ? AND ?"
+        rows = self._rows(f"{sql} ORDER BY frame_index", (first, last))
         return ({"frame_index": i, "time": t, **self._record(s)} for _, (i, t, s) in rows)
 
     def observations(self, after: int = -1) -> Iterator[Observation]:

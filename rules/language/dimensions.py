@@ -194,7 +194,7 @@ def _base_unit(wanted: Dimension) -> str | None:
 
 
 def _with_unit(node: Comparison, wanted: Dimension) -> str | None:
-    """The comparison with a unit of what is measured, where a plain number is compared."""
+    """The comparison with a unit of what is measured, and with a number where there is none."""
     unit = _base_unit(wanted)
     if unit is None:
         return None
@@ -203,5 +203,5 @@ def _with_unit(node: Comparison, wanted: Dimension) -> str | None:
         for s in (node.left, node.right)
     ]
     if sides == [str(node.left), str(node.right)]:
-        return None
+        return f"write `{sides[0]} {node.operator} 20 {unit}`".replace("20 `", "20`")
     return f"write `{sides[0]} {node.operator} {sides[1]}`"

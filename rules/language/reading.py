@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
+from itertools import chain
 from typing import Any
 
 from lark import Lark, UnexpectedInput
@@ -23,6 +24,7 @@ from visup.rules.language.repair import (
     end_before,
     find_repair,
     place_of,
+    usual_slips,
 )
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
@@ -260,7 +262,9 @@ def _with_edit(
     own = fix_of(block, place, fault.hint)
     if own is not None and tried(own) <= before:
         return fault
-    for repair in edits(place.text, place.column - 1, place.length, EDIT_WORDS):
+    line, begin, length = place.text, place.column - 1, place.length
+    tries = (usual_slips(line, begin, length), edits(line, begin, length, EDIT_WORDS))
+    for repair in chain.from_iterable(tries):
         hint = hint_of(place.text, repair)
         fix = None if hint is None else fix_of(block, place, hint)
         if fix is not None and tried(fix) < before:

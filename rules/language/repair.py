@@ -139,15 +139,30 @@ def end_before(text: str, at: int) -> int:
     return len("\n".join([*lines[:-1], lines[-1].split("#")[0].rstrip()]))
 
 
-def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
-    low, high = text.rfind("\n", 0, max(0, at - 120)) + 1, text.find("\n", at + 160)
-    high = len(text) if high < 0 else high
+def usual_slips(
+    text: str, at: int, length: int, low: int = 0, high: int | None = None
+) -> Iterator[Repair]:
+    """What is usually meant where a frequent slip holds a place, or ends or begins next to it.
+
+    Args:
+        text: It holds a fault.
+        at: Offset of the fault.
+        length: Of the fault.
+        low: Offset from which slips are looked for.
+        high: Offset up to which they are; None for the end of the text.
+    """
+    end = len(text) if high is None else high
     for slip in SLIPS:
-        for match in slip.pattern.finditer(text, low, high):
-            # It holds the place of the error, or ends or begins next to it.
+        for match in slip.pattern.finditer(text, low, end):
             if match.start() - 1 <= at + length and at - 1 <= match.end():
                 new = match.expand(slip.new) if isinstance(slip.new, str) else slip.new(match)
                 yield Repair(match.start(), match.end(), new)
+
+
+def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
+    low, high = text.rfind("\n", 0, max(0, at - 120)) + 1, text.find("\n", at + 160)
+    high = len(text) if high < 0 else high
+    yield from usual_slips(text, at, length, low, high)
     found, before = text[at : at + length], end_before(text, at)
     for word in (found, _word_before(text, before)):
         start = at if word == found else before - len(word)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
+from math import degrees
 
 from visup.agent.model.did_you_mean import closest
 
@@ -24,7 +25,7 @@ class Slip:
 
 
 def _slip(pattern: str, new: str | Callable[[re.Match[str]], str]) -> Slip:
-    return Slip(re.compile(pattern), new)
+    return Slip(re.compile(pattern, re.MULTILINE), new)
 
 
 WORDS_OF_PAIRS = (
@@ -47,7 +48,7 @@ def _some_of(least: int, parts: list[str]) -> str:
 _WORD = re.compile(r"[A-Za-z_]\w*")
 SLIPS = (
     _slip(r"<->|<=>|↔|⇔", "iff"),
-    _slip(r"->|=>|→|⇒", "implies"),
+    _slip(r"-{1,2}>|={1,2}>|→|⇒", "implies"),
     _slip(r"&&|&|∧", "and"),
     _slip(r"\|\||\||∨", "or"),
     _slip(r"!(?!=)\s*|¬", "not "),
@@ -67,6 +68,19 @@ SLIPS = (
     _slip(rf"\b(once|always|eventually|henceforth|since|until|release)\s*\(\s*({_AMOUNT})\s*\)", r"\1[\2]"),
     _slip(rf"({_CALL})\s+(?:for\s+)?at\s+least\s+(\d[\d.]*\s*(?:ms|s|min|h))\b", r"\1 for \2"),
     _slip(r"\bout\s+of\b", "of"),
+    _slip(r"(\d[\d.]*)\s*rad\b(/s)?", lambda m: f"{degrees(float(m[1])):.3g} deg{m[2] or ''}"),
+    _slip(rf"\b(?:count|number|times)\(({_CALL})\)\s*[<>=]+\s*(\d+)", r"\1 in \2 of 10 samples"),
+    _slip(r"\b(?:for|in|within)\s+(\d[\d.]*\s*%)\s+(?=\d)", r"in \1 of "),
+    _slip(rf"\b(once|always|eventually|henceforth)\s+({_AMOUNT})\s+(?=\w)", r"\1[\2] "),
+    _slip(r"(\b\w+\(\w+(?:\s*,\s*\w+)*)\s*(?=[<>=!]=?\s*[\d-])", r"\1) "),
+    _slip(r"\b(?:kind|name|type|class|model)\((\w+)\)\s*(?:==?|\bis\b)\s*\"?([A-Za-z]\w*)\"?",
+          r"named(\1, \2)"),
+    _slip(r"(\b\w+\(\w+(?:\s*,\s*\w+)*)\s+(?=(?:and|or|implies|iff|for|within)\b)", r"\1) "),
+    _slip(r"\b(px|ms|s|deg|%)\s+(\d[\d.]*)(?![\d.]*\s*(?:px|ms|s|deg)\b)", r"\2 \1"),
+    _slip(r"^(?:def|function|fun|fn|alert|alarm|rules)\s+(?=\w+\()", "rule "),
+    _slip(r"^(rule\s+\w+\((\w+)\s*,\s*(\w+)\):\s*\w+)(\s*)(?=say\b)", r"\1\4when touching(\2, \3)\4"),
+    _slip(r"^(\w+\(\w+(?:\s*,\s*\w+)*\)\s*:)", r"rule \1"),
+    _slip(r"^(rule\s[^:\n]*:)(\s*when\b)", r"\1 warning\2"),
     _slip(rf"({_CALL})\s*([<>]=?)\s*({_AMOUNT})\s*(and|or)\s+([<>]=?)\s*({_AMOUNT})",
           r"\1 \2 \3 \4 \1 \5 \6"),
     _slip(r"\b([A-Za-z_]\w*)\s*[\[{]\s*([a-z]\w*(?:\s*,\s*[a-z]\w*)*)\s*[\]}]", r"\1(\2)"),

@@ -39,6 +39,7 @@ from visup.rules.language.dimensions import (
     example_amount,
 )
 from visup.rules.language.keywords import KEYWORDS
+from visup.rules.language.synonyms import synonym
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.qualitative_words import ALLEN_RELATIONS, TPCC_RELATIONS
 from visup.rules.predicates.snapshot import RELATION_NAMES
@@ -94,7 +95,10 @@ class TypeChecker:
 
     def _head(self, rule: Rule) -> Iterator[Fault]:
         if len(set(rule.variables)) < len(rule.variables):
-            yield rule.span, f"a variable of '{rule.name}' is named twice", "distinct names", None
+            what = f"a variable of '{rule.name}' is named twice"
+            given, apart = ", ".join(rule.variables), ", ".join(_distinct(rule.variables, ()))
+            change = f"write `{rule.name}({apart})` in place of `{rule.name}({given})`"
+            yield rule.span, what, "distinct names", change
         for word in (rule.name, *rule.variables):
             if word in KEYWORDS:
                 yield rule.span, f"'{word}' is a reserved word", "another name", None
@@ -244,7 +248,7 @@ class _FormulaChecker:
         table = words if fact else quantities
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
-            hint = did_you_mean(_meant(call.name, table), table)
+            hint = did_you_mean(synonym(call.name, table) or call.name, table)
             if call.name in (quantities if fact else words):
                 hint = self._compared(call) if fact else "it is true or false"
             yield call.span, f"there is no {kind} '{call.name}'", _nearest(call.name, table), hint
@@ -301,25 +305,8 @@ class _FormulaChecker:
             yield call.span, what, None, hint or "rename the variable"
 
 
-SYNONYMS = {"count": "objects", "number": "objects", "iou": "overlap"}
-SYNONYMS |= {"velocity": "speed", "rotation": "spin", "size": "area", "distance": "gap"}
-SYNONYMS |= {"visible": "seen", "present": "seen", "gone": "lost", "contact": "touching"}
-SYNONYMS |= {
-    "near": "close_to",
-    "close": "close_to",
-    "far": "far_from",
-    "approaching": "converging",
-}
-"""Words of other tools and of everyday speech -> the word that is meant."""
 EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
 EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
-
-
-def _meant(name: str, table: Iterable[str]) -> str:
-    """A word that is known, where one is meant by the whole of a name or by a part of it; else the name."""
-    parts = (name, *name.split("_"))
-    meant = (SYNONYMS.get(p, p) for p in parts)
-    return next((m for m in meant if m in table), name)
 
 
 def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:

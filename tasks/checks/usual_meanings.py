@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from visup.agent.model.did_you_mean import closest
 from visup.rules.language.edits import NUMBERS
+from visup.rules.language.synonyms import synonym
+from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
 
 New = str | Callable[[re.Match[str]], str]
@@ -32,18 +34,9 @@ def _usual(codes: str, pattern: str, new: New) -> UsualMeaning:
     return UsualMeaning(tuple(codes.split()), re.compile(pattern), new)
 
 
-SYNONYMS = {
-    "near": "converging", "approach": "converging", "approaching": "converging",
-    "attached": "coupled", "grasp": "coupled", "grasped": "held_by", "holding": "coupled",
-    "hold": "coupled", "above": "on", "upon": "on", "atop": "on", "connected": "coupled",
-    "released": "decoupled", "release": "decoupled",
-    "leaving": "diverging", "retreating": "diverging", "contact": "touching", "visible": "present",
-    "take": "coupled", "grab": "coupled", "pick": "coupled", "lift": "coupled", "carry": "coupled",
-    "bring": "converging", "move": "moving", "goto": "converging", "reach": "converging",
-    "put": "decoupled", "place": "decoupled", "drop": "decoupled", "leave": "diverging",
-    "touch": "touching", "wait": "present", "push": "touching", "insert": "touching",
-    "left": "gone", "away": "gone", "in": "inside", "separate": "apart", "moving_apart": "diverging",
-}  # fmt: skip
+STAGES_MEANT = {"near": "converging", "hold": "coupled", "holding": "coupled", "present": "present",
+                "wait": "present", "come": "converging"}  # fmt: skip
+"""What everyday words mean as a stage, where they mean something else as a condition."""
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
              "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
 KEYWORD = (
@@ -67,8 +60,8 @@ def _listed(word: str, stages: str) -> str:
 
 
 def _action_meant(name: str) -> str:
-    """What everyday speech says, by the whole of a name or a part of it; else the name."""
-    return next((SYNONYMS[p] for p in (name, *name.split("_")) if p in SYNONYMS), name)
+    """The action that everyday speech means; else the name."""
+    return STAGES_MEANT.get(name) or synonym(name, ACTIONS) or name
 
 
 USUAL = (
@@ -107,9 +100,17 @@ USUAL = (
     _usual("E101 E119 E103", r"\b(any\s+\d+)\s*(?=\()", r"\1 of "),
     _usual("E101 E115", rf"\b(for\s+each\s+{NAME}\s+(?:of|in))\s+({NAME}(?:\s*,\s*{NAME})+)\s+", r"\1 (\2) "),
     _usual("E101 E119", r"\bany\s+of\s*(?=\()", "any 1 of "),
+    _usual("E119 E101", rf"\bany\s+(\d+)\s+of\s+({PARTS}(?:\s*,\s*{PARTS})+)", r"any \1 of (\2)"),
+    _usual("E115 E101", rf"\bfor\s+each\s+({NAME})\s+(?={NAME}\()", r"for each new \1 "),
+    _usual("E115 E101", rf"\bfor\s+each\s+of\s+(?={NAME}\s+{NAME}\()", "for each of 2 "),
+    _usual("E102", r":\s*=", "::="),
+    _usual("E109", r"::=\s*$", "::= present(x)"),
+    _usual("E101", rf"\bbetween\s+(\d[\d.]*)\s*(?:s\s*)?(?:and|to)\s+({TIME})", r"after \1 s within \2"),
+    _usual("E101 E119", r"\ball\s+of\s*(?=\()", "any order "),
     _usual("E101 E103",
            r"\b(?:from|in|within)\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|\.\.)\s*([\d.]+\s*[a-z%/]+)",
            r"between \1 and \2"),
+    _usual("E101 E103", rf"\b(\d+)\s+times\s+({PARTS})", r"(\2) at least \1 times at most \1 times"),
     _usual("E127 E134", rf"\brepeat\s+({PARTS})\s+until\s+({PARTS})", r"\1+ \2"),
     _usual("E101 E103 E134", r"\b(?:maximum|max|up\s+to|no\s+more\s+than)\s+(\d+)\s+times?\b",
            r"at most \1 times"),
@@ -229,6 +230,7 @@ USUAL = (
     _usual("E219", rf"\b({NAME})\s+({NAME}),?\s+({NAME})\b", r"\1(\2, \3)"),
     _usual("E219", rf"\b(never|always)\s+({NAME})\s+({NAME})", r"\1 moving(\3)"),
     _usual("E219", rf"\b({NAME})\s+({NAME})\s+({NAME})\b", r"\2(\1, \3)"),
+    _usual("E223", r"\b(px|s|ms|min|deg|m)\b", r"20 \1"),
     _usual("E223", rf"\b(for|within|after|every)\s+{NAME}", r"\1 5 s"),
     _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px"),
     _usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 s"),

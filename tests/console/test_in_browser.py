@@ -120,6 +120,41 @@ def test_one_cursor_moves_picture_timeline_and_belief(browser: Browser, address:
     browser.until("document.body?.innerText.includes('frame 59')")
 
 
+def switch(browser: Browser, name: str) -> None:
+    browser.until(
+        f"[...document.querySelectorAll('.q-checkbox')].some(c => c.innerText.trim() == '{name}')"
+    )
+    browser.value(
+        f"[...document.querySelectorAll('.q-checkbox')].find(c => c.innerText.trim() == '{name}').click()"
+    )
+
+
+def test_relations_lie_over_the_picture_and_a_click_says_who_it_is(
+    browser: Browser, address: str
+) -> None:
+    open_run(browser, address)
+    browser.press("End")
+    shows(browser, "frame 59")
+    shows(browser, "captured")
+    assert browser.value("document.querySelectorAll('svg.flow .box').length") == 2
+    switch(browser, "relations")
+    switch(browser, "trails")
+    browser.until("document.querySelectorAll('.overlay .vector').length == 1")
+    assert browser.value("document.querySelector('.overlay .vector text').textContent") in (
+        "diverging",
+        "converging",
+    )
+    browser.until("!!document.querySelector('.overlay .trail')")
+    knob = "document.querySelectorAll('.overlay .vector circle')[1].getBoundingClientRect()"
+    x, y = browser.value(f"(() => {{ const r = {knob}; return [r.x + 2, r.y + 2]; }})()")
+    browser.click(x, y)
+    browser.until("document.body?.innerText.toUpperCase().includes('WHO IS OBJECT 2')")
+    browser.until("!!document.querySelector('.overlay .chosen')")
+    shows(browser, "0.90")
+    switch(browser, "relations")
+    browser.until("document.querySelectorAll('.overlay .vector').length == 0")
+
+
 def test_why_and_what_if_are_answered(browser: Browser, address: str) -> None:
     open_run(browser, address)
     browser.press("End")

@@ -12,10 +12,10 @@ import pytest
 from tests.archive.recordings import meeting, record
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
-from visup.console.inquiry import Inquiry
 from visup.console.library import RunLibrary, run_key
 from visup.console.pages.playhead import Playhead
 from visup.console.pages.wall_page import latest_by_camera
+from visup.console.reasoning.inquiry import Inquiry
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
 from visup.runs.settings import WatchSettings

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Alert, Event, Severity, Status
-from visup.console.timeline_svg import timeline_svg
+from visup.console.drawing.timeline_svg import timeline_svg
 from visup.console.tracks import PRESENCE, TimelineTrack, tracks_of
 
 TIMES = st.floats(0.0, 50.0)

@@ -1,7 +1,7 @@
 """What was believed at one moment of a recorded run, from the summary that its journal keeps.
 
 Nothing is reasoned again, so it comes at once, however long the run. It knows less than the mind did:
-no relations, no poses, no likelihoods; of what is out of sight only where it was.
+no relations but couplings, no poses, no likelihoods of names; of what is out of sight only where it was.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ import numpy as np
 
 from visup.agent import (
     Alert,
+    Coupling,
     Mind,
     ObjectBelief,
     Observation,
     Presence,
+    Prospect,
     Region,
     StageBelief,
     Status,
@@ -54,6 +56,7 @@ def recorded_mind(
             frame_index=seen.frame_index,
             frame_size=seen.frame_size,
             objects=MappingProxyType({b.id: b for b in objects}),
+            couplings=tuple(_coupling(c) for c in told["couplings"]),
             tasks=tuple(_task(t) for t in told["tasks"]),
             alerts=tuple(a for a in alerts if open_at(a, seen.time)),
             health=Health(HealthStatus(told["health"]["status"]), str(told["health"]["detail"])),
@@ -106,6 +109,22 @@ def _outline_lost(line: Mapping[str, Any], size: tuple[int, int]) -> Region:
 
 
 def _task(line: Mapping[str, Any]) -> TaskBelief:
-    stages = tuple(StageBelief(str(n), Status(s), 0.0) for n, s in line["stages"].items())
-    current = line["current"]
-    return TaskBelief(str(line["task"]), Verdict(line["verdict"]), stages, current)
+    sure = line.get("sure", {})
+    stages = tuple(
+        StageBelief(str(n), Status(s), 0.0, float(sure.get(n, 1.0)))
+        for n, s in line["stages"].items()
+    )
+    success = line.get("success")
+    return TaskBelief(
+        str(line["task"]),
+        Verdict(line["verdict"]),
+        stages,
+        line["current"],
+        prospects=tuple(Prospect(str(n), float(p)) for n, p in line.get("next", ())),
+        success=None if success is None else float(success),
+    )
+
+
+def _coupling(line: Mapping[str, Any]) -> Coupling:
+    a, b = line["objects"]
+    return Coupling((int(a), int(b)), float(line["since"]))

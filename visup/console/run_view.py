@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
@@ -12,18 +13,29 @@ from threading import Lock
 import cv2
 import numpy as np
 
-from visup.agent import Alert, Event, Mind
+from visup.agent import Alert, Event, Hypothesis, Mind, Observation, Zone
 from visup.agent.model.errors import OutputError, VisupError
 from visup.api.recorded import open_run
-from visup.console.pictures import RunPictures, jpeg
+from visup.console.drawing.pictures import RunPictures, jpeg
 from visup.console.recorded_mind import recorded_mind
+from visup.console.run_files import flows_of, zones_of
 from visup.console.tracks import TimelineTrack, tracks_of
 from visup.report.annotate import annotate
 from visup.runs.settings import WatchSettings
+from visup.tasks.tools.diagram import Flow
 
-KEPT_MINDS = 64
+KEPT_MOMENTS = 64
 THUMBNAIL = 224
 """Width of a small picture, pixels."""
+
+TRAIL_S = 4.0
+"""How much of where objects were is drawn, seconds."""
+
+MOST_TRAIL = 60
+"""Moments of a trail at most."""
+
+LOOKED_BACK = 20
+"""Moments back to the last time that somebody looked what an object is."""
 
 MOST_SHARES = 240
 """Moments at which the identity of an object is looked up for its curve."""
@@ -50,7 +62,7 @@ class RunView:
         moments = list(self._run.recording.moments())
         self.frames = [frame for frame, _ in moments]
         self.times = [time for _, time in moments]
-        self._minds: OrderedDict[int, Mind] = OrderedDict()
+        self._moments: OrderedDict[int, tuple[Mind, Observation]] = OrderedDict()
         self._lock = Lock()
 
     def refreshed(self) -> RunView:
@@ -112,6 +124,16 @@ class RunView:
         except VisupError:
             return None
 
+    @cached_property
+    def flows(self) -> Mapping[str, Flow]:
+        """Task -> what follows what in it."""
+        return flows_of(self.settings)
+
+    @cached_property
+    def zones(self) -> tuple[Zone, ...]:
+        """Parts of the scene that its rules could name."""
+        return zones_of(self.settings)
+
     @property
     def actors(self) -> Mapping[str, tuple[str, ...]]:
         """Actor -> models."""
@@ -131,15 +153,43 @@ class RunView:
         Raises:
             OutputError: There is no such moment, or it is damaged.
         """
+        return self._moment(number)[0]
+
+    def _moment(self, number: int) -> tuple[Mind, Observation]:
         if not 0 <= number < len(self.frames):
             raise OutputError("nothing was judged in this run yet", where=str(self.folder))
         with self._lock:
-            if number not in self._minds:
+            if number not in self._moments:
                 told, seen = self._run.recording.step_at(self.frames[number])
-                self._minds[number] = recorded_mind(told, seen, self.alerts, self.actors)
-                while len(self._minds) > KEPT_MINDS:
-                    self._minds.popitem(last=False)
-            return self._minds[number]
+                mind = recorded_mind(told, seen, self.alerts, self.actors)
+                self._moments[number] = replace(mind, zones=self.zones), seen
+                while len(self._moments) > KEPT_MOMENTS:
+                    self._moments.popitem(last=False)
+            return self._moments[number]
+
+    def looks(self, number: int, object_id: int) -> tuple[Hypothesis, ...]:
+        """What an object was last found to look like, the most alike first; empty where nobody looked."""
+        for at in range(number, max(-1, number - LOOKED_BACK), -1):
+            mind, seen = self._moment(at)
+            belief = mind.objects.get(object_id)
+            region = belief.region.id if belief else None
+            found = [h for h in seen.of("hypothesis") if h.region_id == region]
+            if found:
+                return tuple(sorted(found, key=lambda h: -h.similarity))
+        return ()
+
+    def trails(self, number: int) -> Mapping[int, list[tuple[float, float]]]:
+        """Where each object in view was in the seconds before a moment: centres of its boxes, pixels."""
+        begin = self.at(self.times[number] - TRAIL_S)
+        kept = set(self.frames[number : begin : -(1 + (number - begin) // MOST_TRAIL)])
+        found: dict[int, list[tuple[float, float]]] = {}
+        for told in self._run.recording.summaries(self.frames[begin], self.frames[number]):
+            for line in told["objects"] if told["frame_index"] in kept else ():
+                if line["presence"] == "seen" and line["confirmed"]:
+                    x, y, w, h = line["bbox"]
+                    found.setdefault(line["id"], []).append((x + w / 2, y + h / 2))
+        here = {b.id for b in self.mind(number).present()}
+        return {i: points for i, points in found.items() if i in here and len(points) > 1}
 
     def picture(self, number: int, *, plain: bool = False) -> bytes:
         """A moment as JPEG."""

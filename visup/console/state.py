@@ -7,8 +7,8 @@ from collections.abc import Callable
 from threading import Lock
 from typing import TypeVar
 
-from visup.console.inquiry import Inquiry
 from visup.console.library import RunLibrary
+from visup.console.reasoning.inquiry import Inquiry
 from visup.console.run_view import RunView
 
 MOST_VIEWS = 16
@@ -29,7 +29,7 @@ class ConsoleState:
         self.library = library
         self._views: OrderedDict[str, RunView] = OrderedDict()
         self._inquiries: OrderedDict[str, Inquiry] = OrderedDict()
-        self._lock = Lock()
+        self._lock, self._asking = Lock(), Lock()
 
     def view(self, key: str, *, refresh: bool = False) -> RunView:
         """A run as it is read.
@@ -55,6 +55,7 @@ class ConsoleState:
         """
         with self._lock:
             folder = self.library.folder(key)
+        with self._asking:  # tasks, rules and models are loaded: other pages need not wait for that
             return _kept(self._inquiries, key, lambda: Inquiry(folder), MOST_INQUIRIES)
 
 

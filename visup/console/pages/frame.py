@@ -42,6 +42,12 @@ def page_frame(title: str) -> Iterator[None]:
         button("contrast", "Dark or light", lambda: dark.set_value(not dark.value))
 
 
+def part_heading(title: str) -> None:
+    """The heading of a part of a panel."""
+    with ui.element("h2").classes("part"):
+        ui.label(title)
+
+
 def button(icon: str, says: str, act: Callable[[], object]) -> ui.button:
     """A round button with an icon, and words for those who point at it or cannot see it."""
     made = ui.button(icon=icon, on_click=act, color=None)

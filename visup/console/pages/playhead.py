@@ -26,6 +26,9 @@ class Playhead:
         speed: Seconds of the run in one second.
         time: Where it is, seconds; while it plays, between two moments.
         panel: Name of the panel that is open.
+        chosen: The object that was clicked, or None.
+        drawn: Corners of a zone that is being drawn, pixels.
+        pen: Whether clicks on the picture draw.
     """
 
     run: RunView
@@ -34,6 +37,9 @@ class Playhead:
     speed: float = 1.0
     time: float = 0.0
     panel: str = ""
+    chosen: int | None = None
+    drawn: list[tuple[float, float]] = field(default_factory=list)
+    pen: bool = False
     _listeners: list[tuple[Listener, str | None]] = field(default_factory=list)
 
     def listen(self, listener: Listener, panel: str | None = None) -> None:
@@ -43,6 +49,26 @@ class Playhead:
     def open_panel(self, name: str) -> None:
         """Open another panel: what belongs to it is brought up to the cursor."""
         self.panel = name
+        self._tell()
+
+    def point(self, x: float, y: float) -> None:
+        """Click on the picture, pixels: draw a corner, or choose the smallest object there."""
+        if self.pen:
+            self.drawn.append((round(x, 1), round(y, 1)))
+            self._tell()
+            return
+        here = [
+            b
+            for b in self.run.mind(self.number).present()
+            if 0 <= x - b.region.bbox[0] <= b.region.bbox[2]
+            and 0 <= y - b.region.bbox[1] <= b.region.bbox[3]
+        ]
+        smallest = min(here, key=lambda b: b.region.bbox[2] * b.region.bbox[3], default=None)
+        self.choose(None if smallest is None else smallest.id)
+
+    def choose(self, object_id: int | None) -> None:
+        """Look at an object; at none when it was looked at already."""
+        self.chosen = None if self.chosen == object_id else object_id
         self._tell()
 
     def go(self, number: int) -> None:

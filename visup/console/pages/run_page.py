@@ -8,15 +8,16 @@ from nicegui import events, ui
 
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
-from visup.console.pages.ask_panel import ask_panel
-from visup.console.pages.belief_panel import belief_panel
+from visup.console.drawing.timeline_svg import timeline_svg
 from visup.console.pages.frame import button, clock, page_frame, shown_text, verdict_badge
+from visup.console.pages.panels.ask_panel import ask_panel
+from visup.console.pages.panels.belief_panel import belief_panel
+from visup.console.pages.panels.told_panel import alerts_panel, events_panel
+from visup.console.pages.panels.try_panel import try_panel
+from visup.console.pages.picture import RunPicture
 from visup.console.pages.playhead import SPEEDS, TICK_S, Playhead
-from visup.console.pages.told_panel import alerts_panel, events_panel
-from visup.console.pages.try_panel import try_panel
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
-from visup.console.timeline_svg import timeline_svg
 
 REFRESH_S = 2.0
 """How often a page asks whether a run that goes on has grown, seconds."""
@@ -53,7 +54,7 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
         return
     with ui.element("div").classes("run-grid"):
         with ui.element("section").classes("card").props('aria-label="Picture and timeline"'):
-            _picture(head, key)
+            RunPicture(state, head, key)
             _controls(head)
             _timeline(head)
         with ui.element("section").classes("card").props('aria-label="What is believed"'):
@@ -63,28 +64,6 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
     head.go_to_time(begin)
     if not run.ended:
         _follow(state, key, head)
-
-
-def _picture(head: Playhead, key: str) -> None:
-    """The frame with what is believed over it, as it is at the cursor."""
-    image = ui.element("img").classes("picture")
-    image.props["alt"] = "The frame with what is believed drawn over it"
-    shown = {"plain": False}
-
-    def show() -> None:
-        plain = "?plain=1" if shown["plain"] else ""
-        image.props["src"] = f"/picture/{key}/{head.number}.jpg{plain}"
-        image.update()
-
-    def switch(plain: bool) -> None:
-        shown["plain"] = plain
-        show()
-
-    show()
-    head.listen(show)
-    ui.checkbox("the picture alone", on_change=lambda e: switch(bool(e.value))).props("dense")
-    if head.run.pictures.problem:
-        ui.label(head.run.pictures.problem).classes("dim")
 
 
 def _controls(head: Playhead) -> None:

@@ -8,9 +8,9 @@ from nicegui import run, ui
 
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
-from visup.console.inquiry import AlternativeCourse
 from visup.console.pages.frame import clock, shown_text, worded_button
 from visup.console.pages.playhead import Playhead
+from visup.console.reasoning.inquiry import AlternativeCourse
 from visup.console.state import ConsoleState
 from visup.wording import prose
 

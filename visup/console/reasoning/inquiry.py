@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
+from visup.agent import Mind
 from visup.agent.model.errors import SettingsError
 from visup.rules.language.parser import parse_rules
 from visup.runs.replay import TranscriptDiff
@@ -68,6 +69,19 @@ class Inquiry:
             if text.partition(" ")[0] == "not":
                 return self._stepper.why_not(text.removeprefix("not").strip())
             return self._stepper.why(text)
+
+    def mind(self, number: int) -> Mind:
+        """All that was believed after a step, relations too.
+
+        Args:
+            number: Of the step, from 1.
+
+        Raises:
+            VisupError: There is no such step.
+        """
+        with self._lock:
+            self._stepper.go(number)
+            return self._stepper.mind
 
     def what_if(self, number: int, what: str, steps: int) -> AlternativeCourse:
         """How the run would have gone on from a step, had something been otherwise.

@@ -1,0 +1,72 @@
+"""Words of everyday speech and of other tools, and the words of both languages that are meant by them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+_MEANT = (
+    ("touching coupled", "touch contact collide collision hit bump crash meet push insert strike"),
+    ("coupled", "couple attach connect join grasp grab grip pick lift carry take hold dock fasten"),
+    ("held_by coupled", "grasped held carried"),
+    ("decoupled", "release detach drop put place undock separate unfasten"),
+    ("converging", "converge approach bring goto reach come enter"),
+    ("converging close_to", "nearing"),
+    ("close_to converging", "near close adjacent beside"),
+    ("far_from apart", "far distant"),
+    ("diverging", "diverge leave leaving retreat withdraw recede depart moving_apart"),
+    ("moving", "move motion"),
+    ("resting not_moving", "rest still stationary stop stopped static"),
+    ("seen present", "visible present appear shown detected"),
+    ("lost gone", "gone left away disappear vanish absent missing"),
+    ("inside in_zone", "in within contained"),
+    ("in_zone inside", "zone area_of"),
+    ("on", "above upon atop over"),
+    ("gap", "distance dist separation clearance spacing"),
+    ("speed", "velocity rate"),
+    ("closing_speed", "approach_speed closing"),
+    ("spin", "rotation turn rotate angular_speed"),
+    ("area", "size extent"),
+    ("overlap", "iou intersection"),
+    ("objects", "count number"),
+    ("heading", "direction orientation bearing"),
+    ("position_x", "x"),
+    ("position_y", "y"),
+    ("named", "name kind class type label is_a"),
+    ("confidence", "score probability certainty"),
+    ("time_to_contact", "ttc"),
+)
+"""What is meant, the likeliest first, and by which words."""
+
+
+def stem(word: str) -> str:
+    """What a word shares with its other forms: `moves`, `moved` and `moving` give `mov`."""
+    return re.sub(r"(?:ings?|ed|es|s|e)$", "", word.casefold())
+
+
+SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {stem(word): tuple(meant.split()) for meant, said in _MEANT for word in said.split()}
+)
+"""Stem of a word -> what may be meant by it."""
+
+
+def synonym(name: str, known: Iterable[str]) -> str | None:
+    """The known word that is meant by the whole of a name, or by a part of it; None when there is none.
+
+    >>> synonym("moves", ["moving", "gap"]), synonym("distance_to", ["moving", "gap"])
+    ('moving', 'gap')
+
+    Args:
+        name: What was written.
+        known: What there is.
+    """
+    words = tuple(known)
+    forms = {stem(word): word for word in words}
+    for part in dict.fromkeys((name, *name.split("_"))):
+        if stem(part) in forms:
+            return forms[stem(part)]
+        meant = next((w for w in SYNONYMS.get(stem(part), ()) if w in words), None)
+        if meant is not None:
+            return meant
+    return None

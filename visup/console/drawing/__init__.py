@@ -1,0 +1,1 @@
+"""What the console draws: frames, and over time, over the picture and over the task what is believed."""

@@ -1,0 +1,1 @@
+"""The panels beside the picture of a run, one for each tab."""

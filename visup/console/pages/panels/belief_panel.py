@@ -1,0 +1,115 @@
+"""What is believed at the cursor: tasks with their stages, who is there, and who it is that was clicked."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from nicegui import ui
+
+from visup.agent import Mind, ObjectBelief, Presence, TaskBelief
+from visup.agent.model.errors import VisupError
+from visup.console.drawing.flow_svg import flow_svg, percent
+from visup.console.pages.frame import (
+    OTHER_COLOUR,
+    VERDICT_COLOURS,
+    badge,
+    part_heading,
+    shown_text,
+)
+from visup.console.pages.panels.object_panel import Samples, show_object
+from visup.console.pages.playhead import Playhead
+from visup.report.palette import STATUS_COLOURS, css, object_colour
+from visup.rules.wording.sentences import called, spaced
+
+MOST_OBJECTS = 30
+
+
+def belief_panel(head: Playhead) -> None:
+    """Lay out the panel; it follows the cursor."""
+    known: dict[tuple[int, int], Samples] = {}
+
+    @ui.refreshable
+    def now() -> None:
+        try:
+            mind = head.run.mind(head.number)
+        except VisupError as fault:
+            ui.label(shown_text(str(fault)))
+            return
+        _health(mind)
+        for task in mind.tasks:
+            _task(task, head)
+        _objects(mind, head)
+
+    @ui.refreshable
+    def identity() -> None:
+        if (number := head.chosen) is not None:
+            which = number, len(head.run.frames)
+            if which not in known:
+                known.clear()
+                known[which] = list(head.run.shares(number))
+            show_object(head, number, known[which])
+
+    now()
+    identity()
+    head.listen(now.refresh, "Now")
+    head.listen(identity.refresh, "Now")
+
+
+def _health(mind: Mind) -> None:
+    if mind.health.status.value != "ok":
+        with ui.element("div").classes("line critical"):
+            status = mind.health.status.value.replace("_", " ")
+            ui.label(f"camera: {status}  {shown_text(mind.health.detail)}").classes("said")
+    if mind.unknown:
+        ui.label(f"not observed now: {', '.join(sorted(mind.unknown))}").classes("dim")
+
+
+def _task(task: TaskBelief, head: Playhead) -> None:
+    part_heading(f"Task {shown_text(task.task)}")
+    verdict = task.verdict.value
+    with ui.row().classes("gap-2 items-center"):
+        badge(verdict.replace("_", " "), VERDICT_COLOURS.get(verdict, OTHER_COLOUR))
+        if task.success is not None and verdict == "in_progress":
+            ui.label(f"will end well: {percent(task.success)}").classes("dim")
+    flow = head.run.flows.get(task.task)
+    if flow is not None:
+        with (
+            ui.element("div")
+            .classes("flow-place")
+            .props('tabindex=0 role=region aria-label="Course of the task"')
+        ):
+            ui.html(flow_svg(flow, task), sanitize=False)
+        return
+    for stage in task.stages:
+        here = stage.stage == task.current
+        with ui.element("div").classes("line now" if here else "line"):
+            ui.element("span").classes("swatch").style(
+                f"background:{css(STATUS_COLOURS[stage.status])}"
+            )
+            ui.label(shown_text(stage.stage)).classes("said")
+            ui.label(stage.status.value).classes("dim")
+
+
+def _objects(mind: Mind, head: Playhead) -> None:
+    found = sorted(mind.present(), key=lambda b: b.id)[:MOST_OBJECTS]
+    part_heading("In view" if found else "Nothing is in view")
+    for belief in found:
+        with ui.element("div").classes("line now" if belief.id == head.chosen else "line"):
+            colour = css(object_colour(belief.id))
+            ui.element("span").classes("swatch").style(f"background:{colour}")
+            name = ui.element("button").classes("plain said")
+            name.props["aria-label"] = f"who object {belief.id} is"
+            name.on("click", partial(head.choose, belief.id))
+            with name:
+                ui.label(_called(belief, mind))
+            ui.label(_surely(belief)).classes("dim")
+
+
+def _called(belief: ObjectBelief, mind: Mind) -> str:
+    name = spaced(called(mind, belief.name)) if belief.candidates else "not identified"
+    return shown_text(f"{belief.id}  {name}")
+
+
+def _surely(belief: ObjectBelief) -> str:
+    share = percent(belief.strength) if belief.candidates else ""
+    return share if belief.presence is Presence.SEEN else f"{belief.presence.value}  {share}"

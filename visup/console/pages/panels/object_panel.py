@@ -1,0 +1,96 @@
+"""One object that was clicked: what it may be, how alike it looks, and how sure each name was over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from nicegui import ui
+
+from visup.agent import Hypothesis
+from visup.console.drawing.flow_svg import percent
+from visup.console.pages.frame import part_heading, shown_text
+from visup.console.pages.playhead import Playhead
+from visup.report.page.figures import CANDIDATE_COLOURS
+
+MOST_CURVES = 5
+CURVE_HEIGHT = 90
+Samples = Sequence[tuple[float, Mapping[str, float]]]
+
+
+def show_object(head: Playhead, number: int, samples: Samples) -> None:
+    """Lay out what is known of an object at the cursor.
+
+    Args:
+        head: The cursor.
+        number: Of the object.
+        samples: How sure each of its names was over time.
+    """
+    part_heading(f"Who is object {number}")
+    peaks: dict[str, float] = {}
+    for _, shares in samples:
+        for name, share in shares.items():
+            peaks[name] = max(peaks.get(name, 0.0), share)
+    best = sorted(peaks, key=lambda n: (-peaks[n], n))[:MOST_CURVES]
+    looks = head.run.looks(head.number, number)
+    if not best and not looks:
+        ui.label("No model was ever found to look like it.").classes("dim")
+        return
+    belief = head.run.mind(head.number).objects.get(number)
+    now = {c.name: c.share for c in belief.candidates} if belief else {}
+    names = [*best, *(n for n in dict.fromkeys(h.name for h in looks) if n not in best)]
+    _table(names[: len(CANDIDATE_COLOURS)], now, looks)
+    if best:
+        place = head.run.times[head.number] / max(head.run.seconds, 1e-6)
+        ui.html(_curves(samples, best, head.run.seconds, place), sanitize=False).classes("w-full")
+
+
+def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypothesis]) -> None:
+    """Each name with its share of the votes and how alike the best view of it looks."""
+    likest = {h.name: h for h in reversed(looks)}
+    with ui.element("table").classes("candidates"):
+        with ui.element("thead"), ui.element("tr"):
+            for heading in ("", "name", "votes", "similarity", "view"):
+                with ui.element("th").props("scope=col"):
+                    ui.label(heading or "colour").classes("" if heading else "sr-only")
+        with ui.element("tbody"):
+            for name, colour in zip(names, CANDIDATE_COLOURS, strict=False):
+                look = likest.get(name)
+                said = (
+                    name,
+                    percent(now.get(name, 0.0)),
+                    f"{look.similarity:.2f}" if look else "",
+                    str(look.view) if look else "",
+                )
+                with ui.element("tr"):
+                    with ui.element("td"):
+                        ui.element("span").classes("swatch block").style(f"background:{colour}")
+                    for text in said:
+                        with ui.element("td"):
+                            ui.label(shown_text(text))
+
+
+def _curves(samples: Samples, names: Sequence[str], seconds: float, place: float) -> str:
+    """The shares of some names over time with the cursor, as SVG."""
+    lines = "".join(
+        _curve(samples, name, colour, max(seconds, 1e-6))
+        for name, colour in zip(names, CANDIDATE_COLOURS, strict=False)
+    )
+    told = escape(f"Share of the votes over time for {', '.join(names)}", quote=True)
+    x = f"{1000 * place:.1f}"
+    return (
+        f'<svg viewBox="0 0 1000 {CURVE_HEIGHT}" preserveAspectRatio="none" width="100%" '
+        f'height="{CURVE_HEIGHT}" role="img" aria-label="{told}">{lines}'
+        f'<line class="now" x1="{x}" x2="{x}" y1="0" y2="{CURVE_HEIGHT}"/></svg>'
+    )
+
+
+def _curve(samples: Samples, name: str, colour: str, seconds: float) -> str:
+    points = " ".join(
+        f"{1000 * time / seconds:.1f},{(1 - shares.get(name, 0.0)) * (CURVE_HEIGHT - 4) + 2:.1f}"
+        for time, shares in samples
+    )
+    return (
+        f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2" '
+        'vector-effect="non-scaling-stroke"/>'
+    )

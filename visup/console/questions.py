@@ -1,0 +1,28 @@
+"""What a run asked its operator, and had not been told yet at a moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from visup.agent import Event, Question
+
+
+def questions_at(events: Iterable[Event], now: float) -> tuple[Question, ...]:
+    """The questions that waited for an answer at a time, by object.
+
+    A journal does not keep when a question settled by itself; such a one waits to the end here.
+
+    Args:
+        events: Of the run, by time.
+        now: Seconds.
+    """
+    waiting: dict[int, Question] = {}
+    for e in events:
+        if e.time > now or not e.objects:
+            continue
+        if e.kind == "question":
+            names = tuple(map(str, e.data.get("names", ())))
+            waiting[e.objects[0]] = Question(e.objects[0], names, e.time, e.text)
+        elif e.kind in ("answer", "exit"):
+            waiting.pop(e.objects[0], None)
+    return tuple(waiting[number] for number in sorted(waiting))
