@@ -40,6 +40,7 @@ class VideoSource(ABC, Iterator[Frame]):
         notes: Sentences about what had to be assumed.
         ended: How it ended, or None while frames may still come.
         problem: Why it is truncated, one sentence, or None.
+        span: Numbers of the first frame that is given, and of the first that no longer is; None for no end.
 
     Args:
         name: What the user named.
@@ -51,6 +52,7 @@ class VideoSource(ABC, Iterator[Frame]):
     """
 
     live = False
+    span: tuple[int, int | None] = (0, None)
 
     def __init__(
         self,
@@ -73,7 +75,9 @@ class VideoSource(ABC, Iterator[Frame]):
 
     def __next__(self) -> Frame:
         frame = None if self.ended else self._next()
-        if frame is None:
+        while frame is not None and frame.index < self.span[0]:
+            frame = self._next()
+        if frame is None or (self.span[1] is not None and frame.index >= self.span[1]):
             self._end(Ending.COMPLETE)
             raise StopIteration
         return frame

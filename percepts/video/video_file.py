@@ -146,7 +146,7 @@ class VideoFile(VideoSource):
             index, self._read = self._read, self._read + 1
             container_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
             self._last_time = self._clock.time(index, container_s)
-            if index % every:
+            if index % every or (index and index < self.span[0]):
                 continue
             image = take(self._capture)
             if image is not None:

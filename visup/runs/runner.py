@@ -135,7 +135,7 @@ class _Run:
     ) -> None:
         self._faults = RuntimeFaults()
         self._meter, self._roll_over = PhaseMeter(), RollOver(options)
-        self.source = stack.enter_context(open_video(settings))
+        self.source = stack.enter_context(open_video(settings, options.span))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
         self._warnings = () if past else check_cast(settings, self._agent, answered=answered)

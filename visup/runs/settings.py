@@ -288,6 +288,8 @@ class RunOptions:
     """Headers of each request of a webhook."""
     webhook_key: str | None = field(default=None, repr=False)
     """Key by which what webhooks send is signed."""
+    span: tuple[int, int | None] = (0, None)
+    """Numbers of the first frame that is watched, and of the first that no longer is; None for no end."""
     closing_s: float = 5.0
     """How long each sink may take to deliver what is left when the run ends, seconds."""
     evidence: EvidenceOptions | None = None

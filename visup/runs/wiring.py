@@ -64,8 +64,12 @@ compiling loops takes at the first frames after an installation."""
 __all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
 
-def open_video(settings: WatchSettings) -> VideoSource:
+def open_video(settings: WatchSettings, span: tuple[int, int | None] = (0, None)) -> VideoSource:
     """The source of a run, opened.
+
+    Args:
+        settings: Name it.
+        span: Which of its frames are given; see `VideoSource`.
 
     Raises:
         SourceError: It cannot be opened.
@@ -78,6 +82,7 @@ def open_video(settings: WatchSettings) -> VideoSource:
     )
     if settings.every == 1:
         source.every = _every(settings, source.fps)
+    source.span = span
     return source
 
 

@@ -23,7 +23,7 @@ class Attempts:
 
     Attributes:
         lake: Folder of the lake.
-        run: Key of the run.
+        run: Key of the run, or of a piece of it.
     """
 
     lake: Path
@@ -51,6 +51,15 @@ class Attempts:
                 raise OutputError(what, where=str(mark)) from fault
             return True
         return False
+
+    def exhaust(self) -> None:
+        """Leave all marks that may be: it is given up.
+
+        Raises:
+            OutputError: They cannot be written.
+        """
+        while self.begin():
+            pass
 
     def clear(self) -> None:
         """Take all marks away: someone came back, or it is to be tried anew."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from visup.agent.storage.atomic import write_whole
 from visup.agent.storage.file_lock import acquire_lock
 from visup.archive.filling.attempts import forget_interrupted
+from visup.archive.filling.pieces import CHUNKS
 from visup.archive.filling.plan import FailedClip, Plan
 from visup.archive.filling.pool import Pool
 from visup.archive.filling.watching import WORK, ClipOutcome, Watch, watch_into
@@ -87,6 +88,7 @@ def fill(
             if not outcome.failure:
                 rate = rate[0] + sizes[outcome.run], rate[1] + outcome.wall_s
             tell(outcome)
+        shutil.rmtree(lake.path / CHUNKS, ignore_errors=True)  # of clips that failed
     finally:
         with suppress(OSError):  # it is only for estimates
             known = json.dumps({"bytes": rate[0], "seconds": rate[1]})

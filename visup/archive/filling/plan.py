@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from visup.agent.model.errors import VisupError
+from visup.archive.chunks.spans import ChunkSpan, Cutting
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.clips import Clip
 from visup.archive.filling.stores import StoredFile
@@ -26,11 +28,13 @@ class Job:
         settings: With which.
         provenance: What its run is called, and where it comes from.
         bytes: Of the source.
+        spans: The chunks in which it is watched; none where it is not cut.
     """
 
     settings: WatchSettings
     provenance: Provenance
     bytes: int = 0
+    spans: tuple[ChunkSpan, ...] = ()
 
     @property
     def run(self) -> str:
@@ -75,13 +79,19 @@ class Plan:
         return sum(job.bytes for job in self.jobs)
 
 
-def make_plan(lake: Lake | None, clips: Iterable[Clip], settings: WatchSettings) -> Plan:
+def make_plan(
+    lake: Lake | None,
+    clips: Iterable[Clip],
+    settings: WatchSettings,
+    cutting: Cutting | None = None,
+) -> Plan:
     """Find out which runs are missing.
 
     Args:
         lake: Where to; None where there is none yet.
         clips: What is to be watched.
         settings: Those of all clips, but for what each says itself.
+        cutting: How long clips are cut; None for not at all.
 
     Raises:
         VisupError: A file that the settings name cannot be read.
@@ -96,7 +106,7 @@ def make_plan(lake: Lake | None, clips: Iterable[Clip], settings: WatchSettings)
         if about not in hashes:
             hashes[about] = settings_hash(own)
         try:
-            job = _job(clip, own, hashes[about])
+            job = _job(clip, own, hashes[about], cutting)
         except VisupError as fault:
             reason = str(fault).removeprefix(f"{clip.source}: ")
             failed.append(FailedClip(str(clip.source), reason))
@@ -149,11 +159,14 @@ def check_settings(jobs: Sequence[Job]) -> Iterator[str]:
             agent.close()
 
 
-def _job(clip: Clip, settings: WatchSettings, by: str) -> Job:
+def _job(clip: Clip, settings: WatchSettings, by: str, cutting: Cutting | None) -> Job:
     content, made, size = _facts(clip.source)
     taken = made if clip.taken is None else clip.taken
+    spans = cutting.spans(settings) if cutting and isinstance(clip.source, Path) else ()
+    if cutting and spans:  # what is seen may be another by a little
+        by = hashlib.sha256(f"{by}\n{cutting}".encode()).hexdigest()
     key = run_key(content, by)
-    return Job(settings, Provenance(key, content, by, taken, clip.labels), size)
+    return Job(settings, Provenance(key, content, by, taken, clip.labels), size, spans)
 
 
 def _facts(source: Path | StoredFile) -> tuple[str, float | None, int]:

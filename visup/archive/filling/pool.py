@@ -19,9 +19,10 @@ from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import SettingsError
 from visup.archive.extra import imported
 from visup.archive.filling.attempts import Attempts
-from visup.archive.filling.plan import FailedClip, Job, put_aside
+from visup.archive.filling.pieces import ClipPiece, PieceBook, given_up, watch_piece
+from visup.archive.filling.plan import FailedClip, Job
 from visup.archive.filling.pool_settings import PoolSettings
-from visup.archive.filling.watching import ClipOutcome, Watch, watch_into, watch_job
+from visup.archive.filling.watching import ClipOutcome, Watch, watch_into
 from visup.archive.lake import Lake
 
 WAITING_PER_WORKER = 3
@@ -47,7 +48,7 @@ class Pool:
     ) -> Iterator[ClipOutcome]:
         """Run jobs and give what becomes of each, in the order in which they end."""
         if self.client is None:
-            return (watch_job(lake, job, watch) for job in jobs)
+            return _here(lake, jobs, watch)
         return _on_dask(self.client, lake, jobs, watch)
 
 
@@ -97,7 +98,7 @@ def _loaded_once(distributed: Any) -> Iterator[None]:
         return
     with imported("dask").config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
         server = distributed.utils.get_mp_context()
-        server.set_forkserver_preload(["distributed", watch_job.__module__, "visup.runs.wiring"])
+        server.set_forkserver_preload(["distributed", watch_piece.__module__, "visup.runs.wiring"])
         yield
 
 
@@ -124,41 +125,54 @@ def _connected(distributed: Any, address: str) -> Any:
         ) from fault
 
 
+def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
+    book = PieceBook(jobs)
+    while piece := book.next():
+        if outcome := book.done(piece, watch_piece(lake, piece, watch)):
+            yield outcome
+
+
 def _on_dask(client: Any, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
     distributed = imported("distributed")
-    waiting, running = list(reversed(jobs)), dict[Any, tuple[Job, int]]()
+    book, running = PieceBook(jobs), dict[Any, tuple[ClipPiece, int]]()
     completed = distributed.as_completed(raise_errors=False)
 
-    def submit(job: Job, again: int = 0) -> None:
-        key = f"visup-{job.run}-{again}"
+    def submit(piece: ClipPiece | None, again: int = 0) -> None:
+        if piece is None:
+            return
         future = client.submit(
-            watch_job, Lake(lake.path.absolute()), job, watch, key=key, pure=False
+            watch_piece,
+            Lake(lake.path.absolute()),
+            piece,
+            watch,
+            key=f"visup-{piece.key}-{again}",
+            pure=False,
         )
-        running[future] = job, again
+        running[future] = piece, again
         completed.add(future)
 
-    workers = len(client.ncores())
-    for _ in range(min(len(waiting), max(1, workers) * WAITING_PER_WORKER)):
-        submit(waiting.pop())
+    for _ in range(max(1, len(client.ncores())) * WAITING_PER_WORKER):
+        submit(book.next())
     for future in completed:
-        job, again = running.pop(future)
-        outcome = _outcome(lake, job, future, again)
+        piece, again = running.pop(future)
+        outcome = _outcome(lake, piece, future, again)
         if outcome is None:
-            submit(job, again + 1)
+            submit(piece, again + 1)
             continue
-        if waiting:
-            submit(waiting.pop())
-        yield outcome
+        finished = book.done(piece, outcome)
+        submit(book.next())
+        if finished:
+            yield finished
 
 
-def _outcome(lake: Lake, job: Job, future: Any, again: int) -> ClipOutcome | None:
-    """What became of a job; None when it is to be handed over once more."""
-    source = job.settings.source
+def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutcome | None:
+    """What became of a piece; None when it is to be handed over once more."""
+    run, source = piece.job.run, piece.job.settings.source
     if future.status == "finished":
         found: ClipOutcome = future.result()
         return found
-    if Attempts(lake.path, job.run).exhausted:
-        return ClipOutcome(job.run, source, failure=put_aside(job))
+    if Attempts(lake.path, piece.key).exhausted:
+        return given_up(lake, piece)
     if future.status != "error":
         raise SettingsError(
             "the scheduler was lost",
@@ -166,5 +180,5 @@ def _outcome(lake: Lake, job: Job, future: Any, again: int) -> ClipOutcome | Non
         )
     if again >= MOST_RESUBMISSIONS:
         reason = f"its workers were lost {again} times ({error_line(future.exception())})"
-        return ClipOutcome(job.run, source, failure=FailedClip(source, reason))
+        return ClipOutcome(run, source, failure=FailedClip(source, reason))
     return None

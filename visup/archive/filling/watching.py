@@ -49,17 +49,24 @@ class ClipOutcome:
     failure: FailedClip | None = None
 
 
-Watch = Callable[[WatchSettings, Path], None]
-"""Watches a source and records the run in a folder."""
+Watch = Callable[..., None]
+"""Watches a source and records the run in a folder; with a third argument only that span of it."""
 
 
-def watch_into(settings: WatchSettings, folder: Path) -> None:
+def watch_into(
+    settings: WatchSettings, folder: Path, span: tuple[int, int | None] = (0, None)
+) -> None:
     """Watch a source and record the run in a folder: the journal alone.
+
+    Args:
+        settings: Of the run.
+        folder: A folder that is there.
+        span: Which frames; see `VideoSource`.
 
     Raises:
         VisupError: It cannot be watched, or not all of it could be recorded.
     """
-    options = RunOptions(video=False, report=False, state_every_s=0.0)
+    options = RunOptions(video=False, report=False, state_every_s=0.0, span=span)
     result = supervise(settings, folder, options=options)
     if not result.recorded:
         raise OutputError(

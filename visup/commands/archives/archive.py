@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.archive.chunks.spans import SHORTEST_CHUNK_S, Cutting
 from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.parallel import Workers
 from visup.commands.options import REPLAYED, Given, SettingsFile, takes
@@ -50,7 +51,7 @@ FILLED = (
     "preset",
     "attention",
     *("workers", "scheduler", "memory_gb"),
-    *("plan", "retry"),
+    *("plan", "retry", "chunk"),
 )
 """Settings of all clips; those of live sources, and of one clip alone, are left out."""
 
@@ -70,6 +71,19 @@ class FillOptions:
 
     plan: Annotated[bool, Option("Only say what would be done.", "--plan")] = False
     retry: Annotated[bool, Option("Try clips again that were put aside.", "--retry")] = False
+    chunk: Annotated[
+        float | None,
+        Option(
+            "Cut longer clips into chunks of so many seconds, which are watched beside each other.",
+            metavar="SECONDS",
+            at_least=SHORTEST_CHUNK_S,
+        ),
+    ] = None
+
+    @property
+    def cutting(self) -> Cutting | None:
+        """How long clips are cut; None for not at all."""
+        return None if self.chunk is None else Cutting(self.chunk)
 
 
 @app.command("run")
@@ -106,12 +120,14 @@ def run(
     clips = clips_of(sources)
     if options.plan:
         there = Lake.open(into) if (into / MARK).exists() else None
-        _print_plan(console, into, make_plan(there, clips, settings), pool.processes)
+        _print_plan(
+            console, into, make_plan(there, clips, settings, options.cutting), pool.processes
+        )
         return
     lake = Lake.create(into)
     with only_filler(lake):
         begin_anew(lake, retry=options.retry)
-        todo = make_plan(lake, clips, settings)
+        todo = make_plan(lake, clips, settings, options.cutting)
         _print_plan(console, into, todo, pool.processes)
         result = _filled(console, lake, todo, pool)
         compact_if_worth_it(lake)
@@ -344,6 +360,8 @@ def _print_plan(console: Console, into: Path, plan: Plan, workers: int) -> None:
     from visup.archive.filling.filling import estimated_s
 
     said = [f"{len(plan.jobs)} to watch ({plan.bytes / 1e6:.0f} MB)"]
+    cut = [len(job.spans) for job in plan.jobs if job.spans]
+    said += [f"{len(cut)} of them in {sum(cut)} chunks"] if cut else []
     said += [f"{plan.present} in the lake already"] if plan.present else []
     said += [f"{plan.same} the same as others"] if plan.same else []
     said += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []

@@ -10,6 +10,7 @@ from typing import Any
 
 from visup.agent.model.errors import SettingsError
 from visup.archive.lake import Lake
+from visup.evaluation.archive.chunking import compare_chunks
 from visup.evaluation.archive.exactness import compare_find
 from visup.evaluation.archive.kills import compare_killed
 from visup.evaluation.archive.large_lake import time_large_lake
@@ -18,6 +19,7 @@ from visup.evaluation.archive.scheduling import measure_scheduler
 from visup.evaluation.archive.throughput import measure_throughput
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.files import mission_folders
+from visup.evaluation.missions.runner import mission_database
 
 ROWS_PER_RUN = 1_000
 
@@ -36,6 +38,7 @@ class ArchiveSizes:
         rounds: How often that is.
         jobs: Of the scheduler.
         workers: Of the scheduler.
+        watched: Missions that are watched unbroken and in chunks.
     """
 
     formulas: int = 50
@@ -47,6 +50,7 @@ class ArchiveSizes:
     rounds: int = 1
     jobs: int = 1_000
     workers: int = 100
+    watched: int = 1
 
 
 @dataclass(slots=True)
@@ -56,6 +60,7 @@ class _Evaluation:
     seed: int
     place: Path
     progress: Progress
+    models: Path | None = None
     small: Lake | None = None
 
     def recorded(self) -> Lake:
@@ -89,6 +94,13 @@ class _Evaluation:
     def scheduler(self) -> Mapping[str, Any]:
         return measure_scheduler(self.sizes.workers, self.sizes.jobs, self.progress)
 
+    def chunks(self) -> Mapping[str, Any]:
+        place, folder = self.place / "chunks", self.missions[0].parent
+        place.mkdir()
+        missions = self.missions[: self.sizes.watched]
+        models = self.models or mission_database(folder, missions, place, self.progress)
+        return compare_chunks(place, missions, models, self.progress)
+
 
 PARTS: Mapping[str, Callable[[_Evaluation], Mapping[str, Any]]] = {
     "exact": _Evaluation.exact,
@@ -96,6 +108,7 @@ PARTS: Mapping[str, Callable[[_Evaluation], Mapping[str, Any]]] = {
     "large": _Evaluation.large,
     "throughput": _Evaluation.throughput,
     "scheduler": _Evaluation.scheduler,
+    "chunks": _Evaluation.chunks,
 }
 
 
@@ -104,6 +117,7 @@ def evaluate_archive(
     *,
     part: Sequence[str] | None = None,
     seed: int = 23,
+    models: Path | None = None,
     progress: Progress = silent,
     **sizes: int,
 ) -> dict[str, Any]:
@@ -113,6 +127,7 @@ def evaluate_archive(
         folder: Missions, of which lakes are made.
         part: Which parts, of `PARTS`; all if none.
         seed: Of all that is drawn.
+        models: Model database; by default one is built as for `visup eval missions`.
         progress: Shows what is being done.
         sizes: How much is done, as of `ArchiveSizes`.
 
@@ -129,7 +144,7 @@ def evaluate_archive(
         )
     missions = mission_folders(folder)
     with tempfile.TemporaryDirectory() as scratch:
-        made = _Evaluation(missions, ArchiveSizes(**sizes), seed, Path(scratch), progress)
+        made = _Evaluation(missions, ArchiveSizes(**sizes), seed, Path(scratch), progress, models)
         items = {name: dict(PARTS[name](made)) for name in wanted}
     return {"items": items, "total": {"different": sum(_different(i) for i in items.values())}}
 

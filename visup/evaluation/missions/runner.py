@@ -62,7 +62,7 @@ def evaluate_missions(
     """
     missions = mission_folders(folder)
     with tempfile.TemporaryDirectory() as scratch:
-        database = models or _database(folder, missions, Path(scratch), progress)
+        database = models or mission_database(folder, missions, Path(scratch), progress)
         items: dict[str, dict[str, Any]] = {}
         for mission in missions:
             items[mission.name] = _evaluate(mission, database, limit)
@@ -70,7 +70,9 @@ def evaluate_missions(
     return {"total": mission_total(list(items.values())), "items": items}
 
 
-def _database(folder: Path, missions: Sequence[Path], scratch: Path, progress: Progress) -> Path:
+def mission_database(
+    folder: Path, missions: Sequence[Path], scratch: Path, progress: Progress
+) -> Path:
     """A model database from the meshes and silhouettes that stand beside the missions."""
     from visup.percepts.shape.building.database_builder import build_database, read_silhouettes
 
@@ -103,15 +105,20 @@ def _evaluate(mission: Path, database: Path, limit: int | None) -> dict[str, Any
     return _scores(truth, truths, record, overlaps)
 
 
-def _supervise(mission: Path, database: Path, limit: int | None) -> MissionRecorder:
+def mission_settings(mission: Path, database: Path) -> WatchSettings:
+    """The settings with which a mission is watched, from its `mission.json`."""
     told = read_json(mission / "mission.json")
-    settings = WatchSettings(
+    return WatchSettings(
         source=str(mission / "video.mp4"),
         tasks=(str(told["task"]),),
         models=database,
         actors={a: (m,) for a, m in told["actors"].items()},
         fov_vertical_deg=told.get("fov_vertical_deg"),
     )
+
+
+def _supervise(mission: Path, database: Path, limit: int | None) -> MissionRecorder:
+    settings = mission_settings(mission, database)
     record = MissionRecorder()
     agent = build_agent(settings, observers=(record,))
     begin = time.perf_counter()

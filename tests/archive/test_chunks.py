@@ -1,0 +1,221 @@
+"""Chunks of a long video, watched beside each other: stitched they are the run that was never cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.archive.recordings import meeting, record
+from tests.archive.watches import clips, scripted
+from tests.cli import Call, caller
+from tests.clips import moving_disc, write_clip
+from visup.agent import Observation
+from visup.agent.storage.journal_reader import Recording
+from visup.archive.chunks.region_matching import RegionNumbers
+from visup.archive.chunks.spans import ChunkSpan, Cutting, chunk_spans
+from visup.archive.chunks.stitching import stitched
+from visup.archive.filling.attempts import Attempts
+from visup.archive.filling.clips import Clip
+from visup.archive.filling.filling import FillResult, begin_anew, fill, only_filler
+from visup.archive.filling.plan import Plan, make_plan
+from visup.archive.filling.pool import Pool
+from visup.archive.filling.watching import watch_into
+from visup.archive.lake import Lake
+from visup.archive.schema import TABLES
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import open_video, reasoning_agent
+
+pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
+
+WHOLE = tuple(meeting(50))
+DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
+
+
+def cut(spans: Sequence[ChunkSpan], numbers: Sequence[Sequence[int]]) -> list[list[Observation]]:
+    """The meeting as chunks see it, each of which calls the regions by numbers of its own."""
+    chunks = []
+    for span, own in zip(spans, numbers, strict=True):
+        named = RegionNumbers(dict(enumerate(own, 1)))
+        inside = WHOLE[span.begin : span.end]
+        chunks.append([named.renumbered(o) for o in inside])
+    return chunks
+
+
+def events(observations: Sequence[Observation]) -> list[object]:
+    agent = reasoning_agent(DOCK)
+    return [agent.reason(o).events for o in observations]
+
+
+@pytest.fixture(scope="module")
+def told() -> list[object]:
+    """What is told of the meeting that was never cut."""
+    return events(WHOLE)
+
+
+@given(frames=st.integers(0, 5000), length=st.integers(1, 400), warm_up=st.integers(0, 60))
+def test_chunks_look_at_every_frame(frames: int, length: int, warm_up: int) -> None:
+    spans = chunk_spans(frames, length, warm_up)
+    assert (spans[0].begin, spans[-1].end) == (0, None)
+    for one, other in pairwise(spans):
+        assert one.end is not None
+        assert one.begin <= other.begin <= one.end
+        assert one.end - other.begin == 2 * warm_up or other.begin == 0
+        assert one.end - warm_up - (one.begin + warm_up) <= 2 * length
+
+
+@settings(deadline=None, max_examples=5)
+@given(
+    edges=st.tuples(st.integers(12, 20), st.integers(26, 40)),
+    numbers=st.tuples(*[st.permutations([1, 2, 3, 7])] * 2),
+)
+def test_what_is_cut_and_stitched_gives_the_same_events(
+    told: list[object], edges: tuple[int, int], numbers: tuple[list[int], list[int]]
+) -> None:
+    a, b = edges
+    spans = [ChunkSpan(0, a + 6), ChunkSpan(a - 6, b + 6), ChunkSpan(b - 6, None)]
+    chunks = cut(spans, [[1, 2, 3], *numbers])
+    found = list(stitched([iter(c) for c in chunks]))
+    assert [o.frame_index for o in found] == [o.frame_index for o in WHOLE]
+    assert [[r.id for r in o.of("region")] for o in found] == [
+        [r.id for r in o.of("region")] for o in WHOLE
+    ]
+    assert events(found) == told
+
+
+def test_what_only_the_later_chunk_sees_gets_a_number_that_nobody_had() -> None:
+    old = WHOLE[:30]
+    new = WHOLE[20:]
+    only_one = [
+        replace(
+            o,
+            reports=tuple(
+                replace(r, percepts=tuple(p for p in r.percepts if _about(p.value) == 1))
+                for r in o.reports
+            ),
+        )
+        for o in old
+    ]
+    found = list(stitched([iter(only_one), iter(new)]))
+    assert {r.id for o in found for r in o.of("region")} == {1, 2, 3}
+    assert {h.region_id for o in found for h in o.of("hypothesis")} <= {1, 2, 3}
+    assert [o.frame_index for o in found] == list(range(len(WHOLE)))
+
+
+def _about(value: object) -> object:
+    return getattr(value, "region_id", getattr(value, "id", None))
+
+
+def test_a_later_chunk_without_a_frame_is_passed_over() -> None:
+    found = list(stitched([iter(WHOLE[:20]), iter(WHOLE[14:]), iter(())]))
+    assert [o.frame_index for o in found] == list(range(len(WHOLE)))
+
+
+def test_a_span_of_a_video_gives_those_frames_at_their_times(tmp_path: Path) -> None:
+    path = write_clip(tmp_path / "disc.avi", moving_disc(12))
+    with open_video(WatchSettings(str(path))) as source:
+        whole = [(f.index, f.time, f.image.tobytes()) for f in source]
+    with open_video(WatchSettings(str(path)), (5, 9)) as source:
+        assert [(f.index, f.time, f.image.tobytes()) for f in source] == whole[5:9]
+
+
+def chunked(settings: WatchSettings, folder: Path, span: tuple[int, int | None]) -> None:
+    """A chunk of the meeting that `scripted` sees whole."""
+    if Path(settings.source).read_text().startswith("half") and span[0]:
+        raise RuntimeError("the fuse blew")
+    shift = float(Path(settings.source).read_text().removeprefix("half"))
+    record(folder, tuple(meeting(12, shift=shift))[slice(*span)], settings)
+
+
+def filled(lake: Lake, some: list[Clip], watch: object = chunked) -> FillResult:
+    plan = make_plan(lake, some, WatchSettings(""))
+    spans = chunk_spans(12, 6, 3)
+    jobs = tuple(replace(job, spans=spans) for job in plan.jobs)
+    return fill(lake, Plan(jobs, plan.present), Pool(), lambda outcome: None, watch)  # type: ignore[arg-type]
+
+
+def rows(lake: Lake) -> dict[str, list[object]]:
+    return {name: list(lake.rows(name)) for name in TABLES}
+
+
+def test_a_lake_of_chunks_is_that_of_whole_clips(tmp_path: Path) -> None:
+    some = clips(tmp_path / "clips", "1", "2")
+    lake, whole = Lake.create(tmp_path / "lake"), Lake.create(tmp_path / "whole")
+    assert filled(lake, some).added == 2
+    fill(whole, make_plan(whole, some, WatchSettings("")), Pool(), lambda outcome: None, scripted)
+    assert rows(lake) == rows(whole)
+    assert not (lake.path / "chunks").exists()
+
+
+def test_chunks_that_are_watched_are_not_watched_again(tmp_path: Path) -> None:
+    some, lake = clips(tmp_path / "clips", "1"), Lake.create(tmp_path / "lake")
+    begun = list[tuple[int, int | None]]()
+
+    class Killed(BaseException):
+        """The worker dies."""
+
+    def watch(settings: WatchSettings, folder: Path, span: tuple[int, int | None]) -> None:
+        begun.append(span)
+        if len(begun) == 2:
+            raise Killed
+        chunked(settings, folder, span)
+
+    for _ in range(2):
+        with only_filler(lake):
+            begin_anew(lake, retry=False)
+            try:
+                filled(lake, some, watch)
+            except Killed:
+                assert lake.runs() == []
+    assert len(lake.runs()) == 1
+    assert begun == [(0, 9), (3, None), (3, None)]
+
+
+def test_a_chunk_that_fails_fails_its_clip_alone(tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    result = filled(lake, clips(tmp_path / "clips", "half1", "2"))
+    assert (result.added, [f.reason for f in result.failed]) == (
+        1,
+        ["visup has a fault: RuntimeError: the fuse blew"],
+    )
+
+
+def test_a_chunk_that_ends_two_workers_puts_its_clip_aside(tmp_path: Path) -> None:
+    some, lake = clips(tmp_path / "clips", "1"), Lake.create(tmp_path / "lake")
+    (job,) = make_plan(lake, some, WatchSettings("")).jobs
+    Attempts(lake.path, f"{job.run}-1").exhaust()
+    result = filled(lake, some)
+    assert [f.put_aside for f in result.failed] == [True]
+    assert [f.put_aside for f in make_plan(lake, some, WatchSettings("")).failed] == [True]
+
+
+def test_a_video_is_watched_in_chunks(tmp_path: Path) -> None:
+    path = write_clip(tmp_path / "disc.avi", moving_disc(50))
+    lake, cutting = Lake.create(tmp_path / "lake"), Cutting(1.0, 0.2)
+    some = [Clip(path, taken=0.0)]
+    plan = make_plan(lake, some, WatchSettings(""), cutting)
+    assert plan.jobs[0].spans == (ChunkSpan(0, 30), ChunkSpan(20, None))
+    assert plan.jobs[0].run != make_plan(lake, some, WatchSettings("")).jobs[0].run
+    result = fill(lake, plan, Pool(), lambda outcome: None, watch_into)
+    assert (result.failed, result.added) == ([], 1)
+    (run,) = lake.rows("runs")
+    assert (run["steps"], run["ended"], run["source"]) == (50, "complete", str(path))
+    recording = Recording.open(lake.folder_of(run["run"]))
+    assert recording.facts()["chunks"] == 2
+    assert make_plan(lake, some, WatchSettings(""), cutting).present == 1
+    assert make_plan(lake, some, WatchSettings(""), Cutting(60.0)).jobs[0].spans == ()
+
+
+def test_chunks_that_are_all_warm_up_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    visup: Call = caller(monkeypatch, capfd)
+    write_clip(tmp_path / "disc.avi", moving_disc(20))
+    words = ("archive", "run", tmp_path / "disc.avi", "--into", tmp_path / "lake", "--plan")
+    assert visup(*words, "--chunk", 5).code == 2
+    assert "1 to watch" in visup(*words, "--chunk", 60).out

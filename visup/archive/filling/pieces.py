@@ -1,0 +1,134 @@
+"""What one worker does at a time: a clip, a chunk of a long one, or the stitching of its chunks.
+
+Chunks that are watched stay in the lake until their run is, so that whoever is stopped goes on with those
+that are missing.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from visup.agent.storage.journal_reader import JOURNAL
+from visup.archive.chunks.stitching import stitch_into
+from visup.archive.filling.attempts import Attempts
+from visup.archive.filling.plan import FailedClip, Job, put_aside
+from visup.archive.filling.watching import WORK, ClipOutcome, Watch, reason_of, watch_job
+from visup.archive.lake import Lake
+
+CHUNKS = "chunks"
+"""Folder of a lake in which chunks wait until all of their clip are watched."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipPiece:
+    """What one worker does at a time.
+
+    Attributes:
+        job: Of which clip.
+        chunk: Number of the chunk that is watched; None for all of the clip, or its stitching.
+    """
+
+    job: Job
+    chunk: int | None = None
+
+    @property
+    def key(self) -> str:
+        """What tells it apart."""
+        return self.job.run if self.chunk is None else f"{self.job.run}-{self.chunk}"
+
+    def folder(self, lake: Path) -> Path:
+        """Where the chunk waits, or all chunks of the clip."""
+        folder = lake / CHUNKS / self.job.run
+        return folder if self.chunk is None else folder / f"{self.chunk:04}"
+
+
+class PieceBook:
+    """Which pieces are to be done, and what becomes of their clips.
+
+    Args:
+        jobs: Clips, in the order in which they are begun.
+    """
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        self._waiting = [p for job in reversed(jobs) for p in reversed(_first_pieces(job))]
+        self._left = {job.run: len(job.spans) for job in jobs}
+        self._took: dict[str, float] = {job.run: 0.0 for job in jobs}
+
+    def next(self) -> ClipPiece | None:
+        """What is to be handed over next; None when nothing is waiting."""
+        return self._waiting.pop() if self._waiting else None
+
+    def done(self, piece: ClipPiece, outcome: ClipOutcome) -> ClipOutcome | None:
+        """Take note of a piece that is through; what became of its clip, when that is known by this."""
+        run = piece.job.run
+        if run not in self._left:  # another chunk has failed
+            return None
+        self._took[run] += outcome.wall_s
+        if outcome.failure or piece.chunk is None:
+            del self._left[run]
+            self._waiting = [p for p in self._waiting if p.job.run != run]
+            return replace(outcome, wall_s=self._took[run])
+        self._left[run] -= 1
+        if not self._left[run]:
+            self._waiting.append(ClipPiece(piece.job))
+        return None
+
+
+def watch_piece(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
+    """Do a piece; whatever is wrong with the clip is told, and raises nothing.
+
+    Args:
+        lake: Where to.
+        piece: What.
+        watch: How clips are watched, and chunks of them.
+    """
+    if piece.chunk is not None:
+        return _watch_chunk(lake, piece, piece.chunk, watch)
+    if not piece.job.spans:
+        return watch_job(lake, piece.job, watch)
+    journals = sorted(piece.folder(lake.path).glob(f"*/{JOURNAL}"))
+    outcome = watch_job(lake, piece.job, partial(stitch_into, journals=journals))
+    if not outcome.failure:
+        shutil.rmtree(piece.folder(lake.path), ignore_errors=True)
+    return outcome
+
+
+def given_up(lake: Lake, piece: ClipPiece) -> ClipOutcome:
+    """What becomes of a clip of which a piece has ended its workers."""
+    Attempts(lake.path, piece.job.run).exhaust()
+    return ClipOutcome(piece.job.run, piece.job.settings.source, failure=put_aside(piece.job))
+
+
+def _first_pieces(job: Job) -> list[ClipPiece]:
+    """What can be done of a clip at once."""
+    return [ClipPiece(job, n) for n in range(len(job.spans))] or [ClipPiece(job)]
+
+
+def _watch_chunk(lake: Lake, piece: ClipPiece, chunk: int, watch: Watch) -> ClipOutcome:
+    begun, job = time.monotonic(), piece.job
+    source, target = job.settings.source, piece.folder(lake.path)
+    if target.exists():  # since before all was stopped
+        return ClipOutcome(job.run, source)
+    attempts = Attempts(lake.path, piece.key)
+    folder = lake.path / WORK / f"{piece.key}-{os.getpid()}"
+    try:
+        if not attempts.begin():
+            return given_up(lake, piece)
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        watch(job.settings, folder, job.spans[chunk].frames)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder.rename(target)
+    except Exception as fault:
+        attempts.clear()
+        return ClipOutcome(job.run, source, failure=FailedClip(source, reason_of(fault, source)))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    attempts.clear()
+    return ClipOutcome(job.run, source, wall_s=time.monotonic() - begun)

@@ -1,0 +1,141 @@
+"""What it costs to cut a video into chunks: the events against those of the same video watched unbroken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from visup.agent import Region
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.step import Step
+from visup.archive.chunks.region_matching import RegionMatcher
+from visup.archive.chunks.spans import Cutting
+from visup.archive.filling.clips import Clip
+from visup.archive.filling.filling import fill
+from visup.archive.filling.plan import make_plan
+from visup.archive.filling.pool import Pool
+from visup.archive.filling.watching import ClipOutcome
+from visup.archive.lake import Lake
+from visup.evaluation.figures import Progress
+from visup.evaluation.missions.runner import mission_settings
+from visup.evaluation.missions.scores import EVENT_TOLERANCE_S, precision_recall_f1
+from visup.runs.replay import Line, Transcript, replay
+from visup.runs.wiring import open_video
+
+CHUNKS = 3
+Beliefs = Mapping[int, Sequence[Region]]
+"""Frame -> objects in sight, as regions with the ids of the objects."""
+
+
+def compare_chunks(
+    place: Path, missions: Sequence[Path], database: Path, progress: Progress
+) -> dict[str, Any]:
+    """Watch missions unbroken and cut in three.
+
+    Args:
+        place: A folder for the lakes.
+        missions: Folders with `mission.json` and `video.mp4`.
+        database: Of the models.
+        progress: Shows what is being done.
+
+    Returns:
+        `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`;
+        `verdicts` that differ; `longer`, by how much more frames are looked at in chunks, a share; `worst`
+        mission by F1.
+    """
+    scores: dict[str, tuple[int, int, int]] = {}
+    verdicts, looked, frames = 0, 0, 0
+    for mission in missions:
+        settings = mission_settings(mission, database)
+        with open_video(settings) as source:
+            count, fps = source.frame_count or 0, source.fps
+        cutting = Cutting(count / fps / CHUNKS)
+        spans = cutting.spans(settings)
+        looked += sum((s.end or count) - s.begin for s in spans)
+        frames += count
+        told = []
+        for name, how in (("whole", None), ("cut", cutting)):
+            progress(f"{mission.name}, {name}")
+            lake = Lake.create(place / f"{mission.name}-{name}")
+            clip = Clip(mission / "video.mp4", taken=0.0)
+            plan = make_plan(lake, [clip], settings, how)
+            fill(lake, plan, Pool(), _silent)
+            told.append(_told(lake))
+        (one, seen), (other, seen_again) = told
+        scores[mission.name] = matching_events(
+            one.events, other.events, same_objects(seen, seen_again)
+        )
+        verdicts += one.verdict != other.verdict
+        right, excess, missed = scores[mission.name]
+        progress(f"{mission.name}: {right} events alike, {excess} in excess, {missed} missed")
+    total = [sum(s[k] for s in scores.values()) for k in range(3)]
+    return {
+        "missions": len(missions),
+        "events": total[0] + total[2],
+        "excess": total[1],
+        "missed": total[2],
+        "event_f1": precision_recall_f1(*total)[2],
+        "verdicts": verdicts,
+        "longer": looked / max(1, frames) - 1.0,
+        "worst": min(scores, key=lambda m: precision_recall_f1(*scores[m])[2], default=None),
+    }
+
+
+def matching_events(
+    whole: Iterable[Line], cut: Iterable[Line], same: Mapping[int, int]
+) -> tuple[int, int, int]:
+    """How many events of a run in chunks are those of the unbroken one, in excess, missed.
+
+    They are the same when kind, objects and what the details name agree, within a second; each counts once.
+
+    Args:
+        whole: Events of the unbroken run.
+        cut: Those of the other.
+        same: Object of the other -> that of the unbroken run.
+    """
+    real, said = list(whole), list(cut)
+    left = set(range(len(real)))
+    for event in said:
+        near = [
+            (abs(real[n]["time"] - event["time"]), n)
+            for n in left
+            if _about(real[n], {}) == _about(event, same)
+        ]
+        if near and min(near)[0] <= EVENT_TOLERANCE_S:
+            left.discard(min(near)[1])
+    right = len(real) - len(left)
+    return right, len(said) - right, len(left)
+
+
+def same_objects(whole: Beliefs, cut: Beliefs) -> dict[int, int]:
+    """Object of the run in chunks -> that of the unbroken one, by where they are believed to be."""
+    matcher = RegionMatcher()
+    for frame in whole.keys() & cut.keys():
+        matcher.add(whole[frame], cut[frame])
+    return matcher.same()
+
+
+def _about(event: Line, same: Mapping[int, int]) -> tuple[Any, ...]:
+    named = {k: v for k, v in event["data"].items() if isinstance(v, str)}
+    objects = tuple(same.get(o, -o) for o in event["objects"]) if same else tuple(event["objects"])
+    return event["kind"], objects, tuple(sorted(named.items()))
+
+
+def _told(lake: Lake) -> tuple[Transcript, Beliefs]:
+    """What the run of a lake told, and where its objects were believed to be."""
+    seen: dict[int, list[Region]] = {}
+
+    def look(step: Step) -> None:
+        seen[step.frame_index] = [
+            replace(b.region, id=b.id)
+            for b in step.mind.objects.values()
+            if b.last_seen == step.time
+        ]
+
+    (run,) = lake.runs()
+    return replay(*lake.recorded(run), tell=look), seen
+
+
+def _silent(outcome: ClipOutcome) -> None:
+    """Nothing is told of a clip."""
