@@ -176,6 +176,29 @@ def test_why_and_what_if_are_answered(browser: Browser, address: str) -> None:
     shows(browser, "there is no object 99")
 
 
+def test_it_stops_at_breakpoints_and_goes_through_the_phases_of_a_step(
+    browser: Browser, address: str
+) -> None:
+    open_run(browser, address)
+    tab(browser, "Steps")
+    press(browser, "Go on")
+    shows(browser, "alert: ")
+    browser.until("!document.body?.innerText.includes('frame 0')")
+    field = "document.querySelector('input[aria-label=\"Where to stop\"]')"
+    browser.value(f"{field}.focus()")
+    browser.type("when gap(")
+    browser.press("Enter")
+    shows(browser, "when gap(")
+    press(browser, "Go on")
+    browser.until("document.querySelector('[role=status]')?.innerText.includes('ends too early')")
+    for phase in ("perceive", "update", "cogitate"):
+        press(browser, "Next phase")
+        browser.until(
+            f"[...document.querySelectorAll('.phase')].some(p => p.innerText == '{phase}')"
+        )
+    assert violations(browser) == []
+
+
 def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
     browser: Browser, address: str, folder: Path
 ) -> None:
@@ -187,7 +210,7 @@ def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
     open_run(browser, address)
     tab(browser, "Alerts")
     press(browser, "false alarm")
-    shows(browser, "false alarm")
+    browser.until("!!document.querySelector('.opinion')")
     end = [f.opinion for f in read_feedback(folder / "evening").values()]
     assert end == ["false alarm"]
 
