@@ -34,6 +34,7 @@ from visup.tasks.learning.order import (
 )
 from visup.tasks.learning.periods import Period, course_of, periods_of
 from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
+from visup.tasks.learning.rests import Rest, rests_of
 from visup.tasks.learning.traces import RunTrace, Symbol
 
 STAGE_NAMES = {
@@ -87,6 +88,7 @@ class _Draft:
         forbidden: Symbols that must never be.
         holding: Whether what runs end with must hold for a while.
         periods: The loops that keep a rhythm.
+        rests: Who must not be pushed about.
     """
 
     name: str
@@ -98,6 +100,7 @@ class _Draft:
     forbidden: list[Symbol] = field(default_factory=list)
     holding: bool = True
     periods: dict[Loop, Period] = field(default_factory=dict)
+    rests: tuple[Rest, ...] = ()
 
     def text(self) -> str:
         """The task file."""
@@ -105,11 +108,13 @@ class _Draft:
         lines = [f"# {self.name}: learned from {_runs(len(self.runs))}"]
         lines.append(f"<{self.name}> ::= {_course(self.plan, names)}")
         lines += [self._stage(o, name) for o, name in names.items()]
-        lines += [str(self.declared[a]) for a in self._actors() if a in self.declared]
+        lines += [str(self.declared[a]) for a in self.actors() if a in self.declared]
         lines += [f"never {_action(s)}  # in no good run, and in a bad one" for s in self.forbidden]
+        lines += [rest.invariant(_all(len(self.runs))) for rest in self.rests]
         return "\n".join(lines) + "\n"
 
-    def _actors(self) -> list[str]:
+    def actors(self) -> list[str]:
+        """Who plays in it."""
         symbols = [s for o in leaves_of(self.plan) for s in _symbols(o[0])]
         return sorted({a for _, actors in (*symbols, *self.forbidden) for a in actors})
 
@@ -203,6 +208,7 @@ def learn_task(
     plan = plan_of(folded, core, partial(_at_once, rows))
     periods = periods_of(times, rows)
     draft = _Draft(name, plan, times, good, rows, declared or {}, periods=periods)
+    draft.rests = tuple(rests_of(good, draft.actors()))
     results = _tried(draft, dropped)
     told = {r.name: _judge(draft, r) for r in bad}
     for run in bad:
@@ -220,6 +226,9 @@ def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
         task = parse_task(draft.text())
         found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
         refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
+        if any(j.verdict is Verdict.FAILED for j in refused) and draft.rests:
+            draft.rests = ()
+            continue
         if refused and draft.periods:
             draft.periods = {}
             continue
@@ -345,6 +354,10 @@ def _who(item: Item) -> str:
 
 def _said(occurrence: Occurrence) -> str:
     return _action(occurrence[0])
+
+
+def _all(count: int) -> str:
+    return f"{count} of {_runs(count)}"
 
 
 def _runs(count: int) -> str:

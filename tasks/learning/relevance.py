@@ -15,8 +15,10 @@ from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Symbol
 
 Pair = tuple[str, ...]
 MEETINGS = ("touching", "coupled")
-LET_GO_S = 0.6
+LET_GO_S = 1.0
 """What is carried meets others no longer than so long after it was let go."""
+MOSTLY = 0.5
+"""A pair only comes along where its meetings do in more than that share of the runs."""
 CLOSE_S = 2.0
 """An approach may end so long before its meeting; relations are judged with delays."""
 MUCH_LESS = 0.9
@@ -78,8 +80,7 @@ def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
     What is coupled to the same thing moves and meets as that does. An approach counts when it leads to a
     meeting, a parting when it ends one. Where nobody ever meets all counts.
     """
-    order = pairs_by_weight(runs)
-    met = [meetings_of(run, order) for run in runs]
+    met = meetings_of(runs, pairs_by_weight(runs))
     if not any(met):
         return [[CourseEvent(h, h.begin) for h in run.happenings] for run in runs]
     words = _words(met)
@@ -141,9 +142,15 @@ def _events(
         if approach is not None and not _held_elsewhere(meeting, begin, meetings):
             yield CourseEvent(approach, begin)
         yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
-        if not lasts:
+        if not lasts and (action == "coupled" or _parts(run, pair, end)):
             parting = "decoupled" if action == "coupled" else "apart"
             yield CourseEvent(Happening((parting, pair), end, run.end), end)
+
+
+def _parts(run: RunTrace, pair: Pair, end: float) -> bool:
+    """Whether two go apart when their contact ends: that of two at rest only ceases to be seen."""
+    parting = (h for h in run.happenings if h.symbol == ("diverging", pair))
+    return any(h.begin <= end + CLOSE_S and h.end >= end - CLOSE_S for h in parting)
 
 
 def _held_elsewhere(meeting: Meeting, at: float, meetings: Sequence[Meeting]) -> bool:
@@ -188,16 +195,26 @@ def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
     return sorted(seconds, key=cmp_to_key(compared))
 
 
-def meetings_of(run: RunTrace, pairs: Sequence[Pair]) -> list[Meeting]:
-    """All meetings of a run but those of what is only carried along.
+def meetings_of(runs: Sequence[RunTrace], pairs: Sequence[Pair]) -> list[list[Meeting]]:
+    """All meetings of each run but those of what is only carried along.
+
+    A pair is carried along in all runs or in none: which of two ends first when one lets go is chance.
 
     Args:
-        run: The run.
+        runs: The runs.
         pairs: All pairs; of several that meet through each other the first one is let be.
     """
-    real = [h for h in run.happenings if h.symbol[0] in MEETINGS]
+    real = [[h for h in run.happenings if h.symbol[0] in MEETINGS] for run in runs]
     for pair in pairs:
-        real = [h for h in real if h.symbol[1] != pair or not _carried(h, real)]
+        along = [{h for h in row if h.symbol[1] == pair and _carried(h, row)} for row in real]
+        meet = sum(any(h.symbol[1] == pair for h in row) for row in real)
+        if sum(map(bool, along)) > MOSTLY * meet:
+            real = [[h for h in row if h not in out] for row, out in zip(real, along, strict=True)]
+    return [_meetings(row) for row in real]
+
+
+def _meetings(real: Sequence[Happening]) -> list[Meeting]:
+    """What happens between the same two with short breaks is one meeting."""
     found: list[list[Happening]] = []
     for h in real:
         of_pair = [g for g in found if g[0].symbol[1] == h.symbol[1]]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
 from visup.agent import Mind, Presence, Truth
 from visup.rules.formula.truth import YES
+from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import moving
 from visup.rules.wording.sentences import believed_name
@@ -19,6 +20,8 @@ Symbol = tuple[str, tuple[str, ...]]
 OF_PAIRS = ("converging", "diverging", "touching", "coupled")
 BREAK_S = 1.0
 """What ceases for less long goes on: relations flicker."""
+SUSTAINED_S = 0.2
+"""As fast as somebody moves for so long, it does move; an outline may jump."""
 LEAST_S = {"converging": 0.6, "diverging": 0.6, "touching": 0.2, "coupled": 0.4, "decoupled": 0.2}
 """What lasts less long is noise."""
 
@@ -50,6 +53,8 @@ class RunTrace:
         minds: What was believed, moment by moment.
         always: Actors that were in the scene from their first sight to the end.
         moved_s: For how long each moved, seconds.
+        fastest: How fast each moved at most, for `SUSTAINED_S`, px/s.
+        diagonal: Of the image, pixels.
     """
 
     name: str
@@ -59,6 +64,8 @@ class RunTrace:
     minds: tuple[Mind, ...] = field(repr=False, default=())
     always: frozenset[str] = frozenset()
     moved_s: Mapping[str, float] = field(default_factory=dict)
+    fastest: Mapping[str, float] = field(default_factory=dict)
+    diagonal: float = 0.0
 
 
 def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
@@ -73,11 +80,14 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
     gone: set[str] = set()
     named: set[str] = set()
     moved: dict[str, float] = {}
+    speeds: dict[str, list[tuple[float, float]]] = {}
     before = kept[0].time if kept else 0.0
     for mind in kept:
         names = names_of(mind)
-        for name in _movers(mind, names):
-            moved[name] = moved.get(name, 0.0) + mind.time - before
+        for name, speed, moves in _motions(mind, names):
+            moved[name] = moved.get(name, 0.0) + (mind.time - before if moves else 0.0)
+            if speed is not None:
+                speeds.setdefault(name, []).append((mind.time, speed))
         before = mind.time
         named |= set(names.values())
         gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
@@ -94,13 +104,30 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         kept,
         frozenset(named - gone),
         moved,
+        {name: _sustained(row) for name, row in speeds.items()},
+        image_diagonal(kept[0].frame_size) if kept else 0.0,
     )
 
 
-def _movers(mind: Mind, names: dict[int, str]) -> Iterator[str]:
+def _motions(mind: Mind, names: dict[int, str]) -> Iterator[tuple[str, float | None, bool]]:
+    """Of each object its speed, px/s, where it is seen, and whether that counts as moving."""
     facts = Snapshot(mind)
-    codes = moving(facts)
-    return (names[i] for i, row in facts.row.items() if i in names and codes[row] == YES)
+    codes, speeds = moving(facts), facts.one("speed")
+    for number, row in facts.row.items():
+        if number in names:
+            seen = mind.objects[number].last_seen == mind.time and speeds[row] == speeds[row]
+            yield names[number], float(speeds[row]) if seen else None, codes[row] == YES
+
+
+def _sustained(speeds: Sequence[tuple[float, float]]) -> float:
+    """The highest speed that was kept up for `SUSTAINED_S`, px/s, of times and speeds."""
+    long, most, begin = SUSTAINED_S - 1e-9, 0.0, 0
+    for end, (now, _) in enumerate(speeds):
+        while begin < end and now - speeds[begin + 1][0] >= long:
+            begin += 1
+        if now - speeds[begin][0] >= long:
+            most = max(most, min(speed for _, speed in speeds[begin : end + 1]))
+    return most
 
 
 def names_of(mind: Mind) -> dict[int, str]:

@@ -33,8 +33,9 @@ def record(
     settings: WatchSettings | None = None,
     *,
     ended: str | None = "complete",
+    **facts: str,
 ) -> list[Step]:
-    """Record a run and give its steps."""
+    """Record a run and give its steps; further facts are noted as they are."""
     folder.mkdir(parents=True, exist_ok=True)
     settings = settings or WatchSettings("clip.mp4")
     agent, journal = reasoning_agent(settings), Journal(folder / JOURNAL)
@@ -46,7 +47,7 @@ def record(
         steps.append(agent.reason(perceived))
         journal.record(steps[-1])
     verdict = final_verdict(agent.mind).value if agent.mind.tasks else None
-    journal.note(verdict=verdict, steps=len(steps))
+    journal.note(verdict=verdict, steps=len(steps), **facts)
     if ended:
         journal.note(ended=ended)
     journal.close()

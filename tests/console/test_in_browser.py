@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 
 from tests.archive.recordings import meeting, record
+from tests.console.evidence_files import keep_evidence
 from tests.console.test_runs import SETTINGS
 from tests.teaching.browser import Browser, found_browser
+from visup.api.recorded import open_run as open_run_of
 from visup.console.feedback import read_feedback
 
 OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
@@ -24,6 +26,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("library")
     record(folder / "evening", meeting(), SETTINGS)
     record(folder / "<b>morning", meeting(30), SETTINGS)
+    record(folder / "yard-run", meeting(), SETTINGS, ended=None, camera="yard")
+    for name in ("evening", "yard-run"):
+        for alert in open_run_of(folder / name).alerts:
+            keep_evidence(folder / name, alert.id)
     return folder
 
 
@@ -58,7 +64,7 @@ LISTEN = (
 def open_run(browser: Browser, address: str, token: str = OPERATOR) -> None:
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     browser.open(f"{address}?token={token}")
-    browser.until("document.querySelectorAll('.runs tbody a').length == 2")
+    browser.until("document.querySelectorAll('.runs tbody a').length == 3")
     browser.value(
         "[...document.querySelectorAll('.runs a')].find(a => a.innerText == 'evening').click()"
     )
@@ -88,7 +94,7 @@ def shows(browser: Browser, text: str) -> None:
 def test_a_run_is_found_and_opened(browser: Browser, address: str) -> None:
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     browser.open(f"{address}?token={OPERATOR}")
-    browser.until("document.querySelectorAll('.runs tbody tr').length == 2")
+    browser.until("document.querySelectorAll('.runs tbody tr').length == 3")
     shows(browser, "<b>morning")
     assert "token" not in browser.value("location.href")
     browser.value("document.querySelector('input[aria-label=\"Search runs\"]').focus()")
@@ -186,6 +192,29 @@ def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
     assert end == ["false alarm"]
 
 
+def test_the_wall_shows_alerts_with_pictures_and_keeps_who_saw_them(
+    browser: Browser, address: str, folder: Path
+) -> None:
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+    browser.open(f"{address}wall?token={VIEWER}")
+    loaded = "document.querySelector('.evidence img')?.naturalWidth > 0"
+    browser.until(loaded)
+    assert not browser.value("document.body?.innerText.includes('false alarm')")
+    browser.open(f"{address}wall?token={OPERATOR}")
+    browser.until(loaded)
+    assert violations(browser) == []
+    browser.value("document.querySelector('button.evidence').click()")
+    browser.until("document.querySelector('.evidence-large video')?.readyState > 1")
+    press(browser, "Close")
+    browser.until("!document.querySelector('.evidence-large')")
+    press(browser, "seen")
+    browser.until("!!document.querySelector('.opinion')")
+    assert [f.opinion for f in read_feedback(folder / "yard-run").values()] == ["seen"]
+    browser.value("document.querySelector('input[aria-label=\"Search alerts\"]').focus()")
+    browser.type("nowhere")
+    shows(browser, "No such alert.")
+
+
 def violations(browser: Browser) -> list[str]:
     """What axe-core calls serious or critical on the page as it is."""
     browser.until("document.getAnimations().every(a => a.playState == 'finished')")
@@ -203,7 +232,7 @@ def violations(browser: Browser) -> list[str]:
 
 def test_everybody_can_use_it(browser: Browser, address: str) -> None:
     browser.open(f"{address}?token={OPERATOR}")
-    browser.until("document.querySelectorAll('.runs tbody a').length == 2")
+    browser.until("document.querySelectorAll('.runs tbody a').length == 3")
     assert violations(browser) == []
     open_run(browser, address)
     for name, text in (
@@ -233,4 +262,5 @@ def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) ->
         open_run(browser, address)
         assert browser.value("document.documentElement.scrollWidth") <= 390
         browser.value("document.querySelector('a[href=\"/wall\"]').click()")
-        shows(browser, "No camera is watched")
+        shows(browser, "the picture of alert")
+        assert browser.value("document.documentElement.scrollWidth") <= 390

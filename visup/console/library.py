@@ -68,6 +68,7 @@ class RunLibrary:
 
     places: Sequence[Path]
     _known: dict[str, Path] = field(default_factory=dict)
+    _over: dict[str, RunEntry] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for place in self.places:
@@ -82,8 +83,18 @@ class RunLibrary:
     def scan(self) -> tuple[RunEntry, ...]:
         """All runs there are now, the latest first; a new one is known from then on."""
         self._known = {run_key(run): run for place in self.places for run in _runs_below(place)}
-        found = [entry_of(key, run) for key, run in self._known.items()]
+        found = [self._entry(key, run) for key, run in self._known.items()]
         return tuple(sorted(found, key=lambda e: (-e.written, e.name)))
+
+    def _entry(self, key: str, run: Path) -> RunEntry:
+        """What the list says of a run; one that is over is read again only when it was written to."""
+        held = self._over.get(key)
+        if held is not None and held.written == _written(run):
+            return held
+        entry = entry_of(key, run)
+        if entry.ended:
+            self._over[key] = entry
+        return entry
 
     def folder(self, key: str) -> Path:
         """The folder of a run.
@@ -99,6 +110,13 @@ class RunLibrary:
             raise OutputError(
                 "this run is not there (any more)", hint="open the list anew"
             ) from None
+
+
+def _written(run: Path) -> float | None:
+    try:
+        return Recording(run / JOURNAL).written()
+    except (VisupError, OSError):
+        return None
 
 
 def run_key(folder: Path) -> str:

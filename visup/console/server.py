@@ -5,20 +5,24 @@ from __future__ import annotations
 import logging
 import socket
 from collections.abc import Callable
+from typing import Literal
 
 import uvicorn
 from fastapi import FastAPI, HTTPException, Request, Response
+from fastapi.responses import FileResponse
 from nicegui import ui
 
 from visup.agent.model.errors import SettingsError, VisupError
 from visup.console.access import WHO, Access, AccessGuard, ConsoleRole
+from visup.console.evidence import evidence_of
 from visup.console.pages.library_page import library_page
 from visup.console.pages.run_page import run_page
 from visup.console.pages.wall_page import wall_page
 from visup.console.state import ConsoleState
 
 FAVICON = "◉"
-_PICTURE = {"Cache-Control": "private, max-age=60"}
+_PICTURE = {"Cache-Control": "private, max-age=60", "X-Content-Type-Options": "nosniff"}
+_KINDS = {"jpg": "image/jpeg", "webm": "video/webm"}
 
 
 def build_application(state: ConsoleState, access: Access) -> AccessGuard:
@@ -41,6 +45,17 @@ def _pictures(app: FastAPI, state: ConsoleState) -> None:
     def thumbnail(key: str) -> Response:
         return _jpeg(lambda: state.view(key).thumbnail())
 
+    @app.get("/evidence/{key}/{alert}.{kind}")
+    def evidence(key: str, alert: int, kind: Literal["jpg", "webm"]) -> Response:
+        try:
+            kept = evidence_of(state.library.folder(key), alert)
+        except VisupError as fault:
+            raise HTTPException(404, str(fault)) from fault
+        path = kept.snapshot if kind == "jpg" else kept.clip
+        if path is None:
+            raise HTTPException(404, "There is no such picture or clip (any more).")
+        return FileResponse(path, media_type=_KINDS[kind], headers=_PICTURE)
+
 
 def _jpeg(draw: Callable[[], bytes]) -> Response:
     try:
@@ -55,12 +70,17 @@ def _pages(state: ConsoleState) -> None:
         library_page(state)
 
     @ui.page("/wall")
-    def wall() -> None:
-        wall_page(state)
+    def wall(request: Request) -> None:
+        wall_page(state, _role(request))
 
     @ui.page("/run/{key}")
     def one(request: Request, key: str, t: float = 0.0) -> None:
-        run_page(state, key, request.scope.get(WHO, ConsoleRole.VIEWER), t)
+        run_page(state, key, _role(request), t)
+
+
+def _role(request: Request) -> ConsoleRole:
+    role: ConsoleRole = request.scope.get(WHO, ConsoleRole.VIEWER)
+    return role
 
 
 def serve_console(

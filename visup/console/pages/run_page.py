@@ -133,7 +133,7 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
         with ui.tab_panel(made["Told"]):
             events_panel(head)
         with ui.tab_panel(made["Alerts"]):
-            alerts_panel(head, role)
+            alerts_panel(head, key, role)
         with ui.tab_panel(made["Ask"]):
             ask_panel(state, head, key)
         with ui.tab_panel(made["Try"]):

@@ -1,20 +1,26 @@
-"""All cameras at once: the latest run of each, how it stands, and what is wrong."""
+"""All cameras at once: the latest run of each, how it stands, and the alerts of all of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 from nicegui import ui
 
 from visup.agent import Mind, Severity
 from visup.agent.model.errors import VisupError
+from visup.console.access import ConsoleRole
+from visup.console.evidence import latest_snapshot
 from visup.console.library import RunEntry
-from visup.console.pages.frame import clock, page_frame, shown_text, verdict_badge
+from visup.console.pages.alert_row import AlertRow, show_alert
+from visup.console.pages.frame import clock, page_frame, part_heading, shown_text, verdict_badge
+from visup.console.pages.wall_alerts import STATES, AlertFilter, alert_rows
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
 
 REFRESH_S = 2.0
 MOST_TILES = 36
+MOST_ROWS = 60
 
 
 def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
@@ -28,22 +34,67 @@ def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
     return [chosen[name] for name in sorted(chosen)]
 
 
-def wall_page(state: ConsoleState) -> None:
-    """Lay out the wall; it looks anew every few seconds."""
+def wall_page(state: ConsoleState, role: ConsoleRole) -> None:
+    """Lay out the wall; it looks anew every few seconds, and draws anew what has changed."""
     with page_frame("Cameras"):
         pass
+    shown: list[object] = [None, None]
+    wanted = AlertFilter()
 
     @ui.refreshable
-    def tiles() -> None:
-        found = latest_by_camera(state.library.scan())[:MOST_TILES]
+    def tiles(found: Sequence[RunEntry] = ()) -> None:
         with ui.element("div").classes("wall"):
             for entry in found:
                 _tile(state, entry)
         if not found:
             ui.label("No camera is watched, and no run goes on.").classes("card w-full")
 
+    @ui.refreshable
+    def alerts(rows: Sequence[AlertRow] = ()) -> None:
+        for row in rows[:MOST_ROWS]:
+            moment = f"/run/{row.key}?t={row.alert.opened:.2f}"
+            show_alert(row, role, partial(ui.navigate.to, moment), look)
+        if not rows:
+            ui.label("No such alert.").classes("dim")
+
+    def look() -> None:
+        found = latest_by_camera(state.library.scan())[:MOST_TILES]
+        if shown[0] != (now := [(e.key, e.written, e.ended) for e in found]):
+            shown[0] = now
+            tiles.refresh(found)
+        rows = alert_rows(state, found, wanted)
+        if shown[1] != (told := [(r.key, r.alert, r.said) for r in rows]):
+            shown[1] = told
+            alerts.refresh(rows)
+
     tiles()
-    ui.timer(REFRESH_S, tiles.refresh)
+    with ui.element("section").classes("card w-full").props('aria-label="Alerts of all cameras"'):
+        part_heading("Alerts")
+        _filter(wanted, look)
+        with (
+            ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"')
+        ):
+            alerts()
+    look()
+    ui.timer(REFRESH_S, look)
+
+
+def _filter(wanted: AlertFilter, look: Callable[[], None]) -> None:
+    def changed(name: str, value: object) -> None:
+        setattr(wanted, name, value)
+        look()
+
+    with ui.row().classes("items-center gap-3"):
+        ui.select(
+            STATES, value=wanted.state, on_change=lambda e: changed("state", str(e.value))
+        ).props('dense outlined options-dense aria-label="Which alerts"')
+        ui.input(
+            placeholder="camera, kind, words",
+            on_change=lambda e: changed("words", str(e.value or "")),
+        ).props('dense outlined clearable aria-label="Search alerts"')
+        ui.checkbox("only critical", on_change=lambda e: changed("critical", bool(e.value))).props(
+            "dense size=xs"
+        )
 
 
 def _tile(state: ConsoleState, entry: RunEntry) -> None:
@@ -56,14 +107,26 @@ def _tile(state: ConsoleState, entry: RunEntry) -> None:
         except VisupError as fault:
             ui.label(shown_text(str(fault))).classes("dim")
             return
+        _latest_picture(run, entry)
         _stand(run, mind, entry)
 
 
-def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
-    """Picture, verdict, stage and open alerts."""
+def _latest_picture(run: RunView, entry: RunEntry) -> None:
+    """The last frame; of a camera, which only its own process sees, the latest picture of an alert."""
     picture = ui.element("img").classes("picture")
-    picture.props["src"] = f"/picture/{entry.key}/{len(run.frames) - 1}.jpg"
     picture.props["alt"] = ""
+    number = latest_snapshot(run.folder) if run.pictures.problem else None
+    if number is None:
+        picture.props["src"] = f"/picture/{entry.key}/{len(run.frames) - 1}.jpg"
+        return
+    picture.props["src"] = f"/evidence/{entry.key}/{number}.jpg"
+    opened = next((a.opened for a in run.alerts if a.id == number), None)
+    when = "" if opened is None else f", {clock(opened)}"
+    ui.label(f"the picture of alert {number}{when}").classes("dim")
+
+
+def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
+    """Verdict, stage and open alerts."""
     with ui.element("div").classes("line"):
         ui.link(
             shown_text(entry.camera or entry.name), f"/run/{entry.key}?t={mind.time:.2f}"
@@ -73,7 +136,9 @@ def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
     for task in mind.tasks:
         status = next((s.status.value for s in task.stages if s.stage == task.current), "")
         ui.label(shown_text(f"{task.task}: {task.current or 'over'} {status}")).classes("dim")
-    for alert in mind.alerts:
-        if alert.severity > Severity.INFO:
-            with ui.element("div").classes(f"line {alert.severity.name.lower()}"):
-                ui.label(shown_text(alert.cause)).classes("said")
+    opened = [a for a in mind.alerts if a.severity > Severity.INFO]
+    if opened:
+        kind = max(a.severity for a in opened).name.lower()
+        with ui.element("div").classes(f"line {kind}"):
+            many = f"{len(opened)} alerts are open" if len(opened) > 1 else "1 alert is open"
+            ui.label(many).classes("said")

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from nicegui import ui
 
-from visup.agent import Alert, Event, Severity
-from visup.agent.model.errors import VisupError
+from visup.agent import Event, Severity
 from visup.console.access import ConsoleRole
-from visup.console.feedback import AlertFeedback, Opinion, read_feedback, say
-from visup.console.pages.frame import clock, shown_text, worded_button
+from visup.console.feedback import read_feedback
+from visup.console.pages.alert_row import AlertRow, show_alert
+from visup.console.pages.frame import clock, shown_text
 from visup.console.pages.playhead import Playhead
 from visup.console.recorded_mind import open_at
 from visup.wording import prose, worded_once
@@ -58,7 +58,7 @@ def _line(
         button.on("click", lambda: head.go_to_time(time))
 
 
-def alerts_panel(head: Playhead, role: ConsoleRole) -> None:
+def alerts_panel(head: Playhead, key: str, role: ConsoleRole) -> None:
     """Lay out the alerts, with what people said of them."""
     wanted = {"open": False}
 
@@ -70,7 +70,8 @@ def alerts_panel(head: Playhead, role: ConsoleRole) -> None:
         if wanted["open"]:
             found = [a for a in found if open_at(a, now)]
         for alert in found:
-            _alert(alert, said.get(alert.id), head, role, listed.refresh)
+            row = AlertRow(key, head.run, alert, said.get(alert.id))
+            show_alert(row, role, partial(head.go_to_time, alert.opened), listed.refresh)
         if not found:
             ui.label("No alert is open here." if wanted["open"] else "No alert.").classes("dim")
 
@@ -82,51 +83,3 @@ def alerts_panel(head: Playhead, role: ConsoleRole) -> None:
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"'):
         listed()
     head.listen(lambda: listed.refresh() if wanted["open"] else None, "Alerts")
-
-
-def _alert(
-    alert: Alert,
-    said: AlertFeedback | None,
-    head: Playhead,
-    role: ConsoleRole,
-    again: Callable[[], object],
-) -> None:
-    _line(alert.opened, alert.cause, alert.severity, head)
-    until = "still open" if alert.closed is None else f"until {clock(alert.closed)}"
-    with ui.row().classes("items-center gap-2 q-pl-xl"):
-        ui.label(f"{alert.kind.replace('_', ' ')}, {until}").classes("dim")
-        if said:
-            note = f": {said.note}" if said.note else ""
-            ui.label(shown_text(f"{said.opinion.value}{note}")).classes("dim")
-        if role is ConsoleRole.OPERATOR:
-            _opinions(alert, head, again)
-
-
-def _opinions(alert: Alert, head: Playhead, again: Callable[[], object]) -> None:
-    """What an operator can say of an alert."""
-
-    def keep(opinion: Opinion, note: str = "") -> None:
-        try:
-            say(head.run.folder, alert, opinion, note)
-        except VisupError as fault:
-            ui.notify(shown_text(str(fault)), type="negative", multi_line=True)
-            return
-        again()
-
-    for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
-        worded_button(opinion.value, partial(keep, opinion))
-    worded_button("mute ...", lambda: _mute(keep)).tooltip("needs a reason")
-
-
-def _mute(keep: Callable[[Opinion, str], None]) -> None:
-    """Ask for the reason."""
-    with ui.dialog() as dialog, ui.card():
-        ui.label("Why is it muted?")
-        reason = ui.input("Reason").props("autofocus")
-
-        def done() -> None:
-            dialog.close()
-            keep(Opinion.MUTED, str(reason.value or ""))
-
-        worded_button("Mute", done, main=True)
-    dialog.open()

@@ -1,0 +1,58 @@
+"""The alerts of all cameras in one list, the latest first: filtered, looked at, said to be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from visup.agent import Severity
+from visup.agent.model.errors import VisupError
+from visup.console.feedback import read_feedback
+from visup.console.library import RunEntry
+from visup.console.pages.alert_row import AlertRow
+from visup.console.state import ConsoleState
+
+STATES = {"open": "open", "unseen": "nobody has seen", "all": "all"}
+
+
+@dataclass(slots=True)
+class AlertFilter:
+    """Which alerts are wanted.
+
+    Attributes:
+        state: One of `STATES`.
+        words: That stand in the camera, the kind or the sentence.
+        critical: Whether only critical ones.
+    """
+
+    state: str = "open"
+    words: str = ""
+    critical: bool = False
+
+    def wants(self, row: AlertRow) -> bool:
+        """Whether a row is shown."""
+        alert = row.alert
+        text = f"{row.camera} {alert.kind} {alert.cause}".replace("_", " ").casefold()
+        words = self.words.replace("_", " ").casefold().split()
+        least = Severity.CRITICAL if self.critical else Severity.WARNING
+        state = {"open": alert.closed is None, "unseen": row.said is None}.get(self.state, True)
+        return state and alert.severity >= least and all(word in text for word in words)
+
+
+def alert_rows(
+    state: ConsoleState, entries: Iterable[RunEntry], wanted: AlertFilter
+) -> list[AlertRow]:
+    """The alerts of some runs that are wanted, the gravest and then the latest first."""
+    found: list[AlertRow] = []
+    for entry in entries:
+        try:
+            run = state.view(entry.key)
+            said = read_feedback(run.folder)
+            found += [
+                AlertRow(entry.key, run, a, said.get(a.id), entry.camera or entry.name)
+                for a in run.alerts
+            ]
+        except (VisupError, OSError):
+            continue
+    rows = [row for row in found if wanted.wants(row)]
+    return sorted(rows, key=lambda r: (-r.alert.severity, -r.alert.opened, r.key))
