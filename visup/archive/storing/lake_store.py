@@ -1,8 +1,9 @@
 """A lake in a store, of which there is a copy on this machine.
 
 The files of a run never change, so that a file which is there is as it should be. A run is committed in
-the store as it is here: by the file of its row in `runs`, which is written after all others of it. Partitions come
-before `joined.json`, which names them. Journals are brought here when a run is opened, and not before.
+the store as it is here: by the file of its row in `runs`, which is written after all others of it.
+Partitions come before `joined.json`, which names them. Journals are brought here when a run is opened, and
+not before.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from pathlib import Path
 from visup.agent.model.errors import OutputError
 from visup.archive.filling.stores import is_url
 from visup.archive.filling.watching import ClipOutcome
+from visup.archive.joining.compacting import compact_if_worth_it
 from visup.archive.lake import MARK, Lake
 from visup.archive.storing.lake_store import LakeStore
 
@@ -74,6 +75,17 @@ def _pulled(store: LakeStore, copy: Path) -> Lake:
     copy.mkdir(parents=True, exist_ok=True)
     store.pull(copy)
     return Lake(Lake.open(copy).path, store.fetch)
+
+
+def settle(lake: Lake, store: LakeStore | None) -> None:
+    """What is done once a lake is filled: files are joined where that is worth it, and all is in the store.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    compact_if_worth_it(lake)
+    if store:
+        store.push(lake)
 
 
 def pushed(

@@ -110,8 +110,7 @@ def run(
     from visup.archive.filling.clips import clips_of
     from visup.archive.filling.filling import begin_anew, only_filler
     from visup.archive.filling.plan import make_plan
-    from visup.archive.joining.compacting import compact_if_worth_it
-    from visup.archive.storing.places import create_lake, is_lake, open_lake, store_of
+    from visup.archive.storing.places import create_lake, is_lake, open_lake, settle, store_of
     from visup.terminal.console import make_console
 
     console, pool, options = make_console(), PoolSettings(**where), FillOptions(**wanted)
@@ -129,9 +128,7 @@ def run(
         todo = make_plan(lake, clips, settings, options.cutting)
         _print_plan(console, into, todo, pool.processes)
         result = _filled(console, lake, todo, pool, store)
-        compact_if_worth_it(lake)
-        if store:
-            store.push(lake)
+        settle(lake, store)
     for text in _closing(result):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if result.failed else 0)
