@@ -206,10 +206,11 @@ def meetings_of(runs: Sequence[RunTrace], pairs: Sequence[Pair]) -> list[list[Me
     """
     real = [[h for h in run.happenings if h.symbol[0] in MEETINGS] for run in runs]
     for pair in pairs:
-        along = [{h for h in row if h.symbol[1] == pair and _carried(h, row)} for row in real]
         meet = sum(any(h.symbol[1] == pair for h in row) for row in real)
-        if sum(map(bool, along)) > MOSTLY * meet:
-            real = [[h for h in row if h not in out] for row, out in zip(real, along, strict=True)]
+        along = sum(any(h.symbol[1] == pair and _carried(h, row, 1) for h in row) for row in real)
+        if along > MOSTLY * meet:
+            # Nearly so in the others, then, is so in them too.
+            real = [[h for h in r if h.symbol[1] != pair or not _carried(h, r, 2)] for r in real]
     return [_meetings(row) for row in real]
 
 
@@ -234,14 +235,14 @@ def _meeting(spells: Sequence[Happening]) -> Meeting:
     )
 
 
-def _carried(meeting: Happening, meetings: Sequence[Happening]) -> bool:
+def _carried(meeting: Happening, meetings: Sequence[Happening], slack: int) -> bool:
     """Whether two meet only through a third thing, which one holds and which meets the other.
 
-    It then ends as soon as that is let go.
+    It then ends as soon as that is let go, or so many times `LET_GO_S` later.
     """
     overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
     for held in overlap:
-        if held.symbol[0] != "coupled" or meeting.end > held.end + LET_GO_S:
+        if held.symbol[0] != "coupled" or meeting.end > held.end + slack * LET_GO_S:
             continue
         for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
             if a not in held.symbol[1] or b in held.symbol[1]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import heapq
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,9 +71,11 @@ class Lake:
 
     Attributes:
         path: Its folder.
+        fetch: Brings the journal of a run into its folder, of a lake that is kept elsewhere; or None.
     """
 
     path: Path
+    fetch: Callable[[str, Path], None] | None = None
 
     @classmethod
     def open(cls, path: Path) -> Lake:
@@ -198,6 +200,8 @@ class Lake:
             OutputError: They are not there, or damaged.
         """
         folder = self.folder_of(run)
+        if self.fetch:
+            self.fetch(run, folder)
         recording = Recording.open(folder)
         settings = recorded_settings(recording.facts(), str(recording.path))
         return recording, with_inputs(settings, folder)

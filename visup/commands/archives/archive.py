@@ -12,6 +12,7 @@ import typer
 from visup.archive.chunks.spans import SHORTEST_CHUNK_S, Cutting
 from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.parallel import Workers
+from visup.commands.archives.lake_argument import Into, LakePlace
 from visup.commands.options import REPLAYED, Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import Option, WatchSettings
@@ -27,11 +28,9 @@ if TYPE_CHECKING:
     from visup.archive.filling.watching import ClipOutcome
     from visup.archive.lake import Lake
     from visup.archive.replaying import RunChanges
+    from visup.archive.storing.lake_store import LakeStore
     from visup.evaluation.archive.calibrating import Reliability
 
-Into = Annotated[
-    Path, typer.Option("--into", metavar="LAKE", help="The lake; made when it is not there.")
-]
 FILLED = (
     "tasks",
     "models",
@@ -111,26 +110,25 @@ def run(
     from visup.archive.filling.clips import clips_of
     from visup.archive.filling.filling import begin_anew, only_filler
     from visup.archive.filling.plan import make_plan
-    from visup.archive.joining.compacting import compact_if_worth_it
-    from visup.archive.lake import MARK, Lake
+    from visup.archive.storing.places import create_lake, is_lake, open_lake, settle, store_of
     from visup.terminal.console import make_console
 
     console, pool, options = make_console(), PoolSettings(**where), FillOptions(**wanted)
     settings = watch_settings("", setting, settings_file)
     clips = clips_of(sources)
     if options.plan:
-        there = Lake.open(into) if (into / MARK).exists() else None
+        there = open_lake(into) if is_lake(into) else None
         _print_plan(
             console, into, make_plan(there, clips, settings, options.cutting), pool.processes
         )
         return
-    lake = Lake.create(into)
+    lake, store = create_lake(into), store_of(into)
     with only_filler(lake):
         begin_anew(lake, retry=options.retry)
         todo = make_plan(lake, clips, settings, options.cutting)
         _print_plan(console, into, todo, pool.processes)
-        result = _filled(console, lake, todo, pool)
-        compact_if_worth_it(lake)
+        result = _filled(console, lake, todo, pool, store)
+        settle(lake, store)
     for text in _closing(result):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if result.failed else 0)
@@ -149,10 +147,10 @@ def add(
     """
     from visup.agent.model.errors import VisupError
     from visup.archive.adding import add_run
-    from visup.archive.lake import Lake
+    from visup.archive.storing.places import create_lake, store_of
     from visup.terminal.console import complain, echo
 
-    lake, failed = Lake.create(into), 0
+    lake, store, failed = create_lake(into), store_of(into), 0
     for folder in runs:
         try:
             key, added = add_run(lake, folder)
@@ -161,12 +159,14 @@ def add(
             failed += 1
         else:
             echo(f"{key}  {folder}" if added else f"{key}  {folder} was there already")
+    if store:
+        store.push(lake)
     raise typer.Exit(1 if failed else 0)
 
 
 @app.command("compact")
 def compact(
-    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    lake: LakePlace,
     now: Annotated[
         bool,
         typer.Option("--now", help="Remove what is replaced at once; when nobody asks the lake."),
@@ -178,12 +178,14 @@ def compact(
     """
     from visup.archive.filling.filling import only_filler
     from visup.archive.joining import compacting
-    from visup.archive.lake import Lake
+    from visup.archive.storing.places import open_lake, store_of
     from visup.terminal.console import echo
 
-    found = Lake.open(lake)
+    found, store = open_lake(lake), store_of(lake)
     with only_filler(found):
         done = compacting.compact(found, grace_s=0.0 if now else compacting.GRACE_S)
+        if store:
+            store.push(found)
     ending = "" if done.partitions == 1 else "s"
     said = f"Joined: {done.joined} runs; the lake has {done.partitions} partition{ending}."
     gone = f" Files that were replaced went, of {done.tidied} runs." if done.tidied else ""
@@ -192,7 +194,7 @@ def compact(
 
 @app.command("calibrate")
 def calibrate(
-    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    lake: LakePlace,
     truth: Annotated[
         Path,
         typer.Option(metavar="FILE", help="What is true: source,verdict,objects,stages (CSV)."),
@@ -201,11 +203,11 @@ def calibrate(
 ) -> None:
     """Say how much confidences are worth: how often what was said so surely was right."""
     from visup.archive.asking.database import open_database
-    from visup.archive.lake import Lake
+    from visup.archive.storing.places import open_lake
     from visup.evaluation.archive.calibrating import read_truth, reliabilities
     from visup.terminal.console import echo_json, make_console
 
-    with open_database(Lake.open(lake)) as database:
+    with open_database(open_lake(lake)) as database:
         found = reliabilities(database, read_truth(truth))
     if as_json:
         echo_json([asdict(one) for one in found])
@@ -230,23 +232,24 @@ def _reliability_table(one: Reliability) -> Table:
 
 @app.command("report")
 def report(
-    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    lake: LakePlace,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The page (default: report.html in the lake)."),
+        typer.Option(metavar="FILE", help="The page (default: report.html in the lake's folder)."),
     ] = None,
 ) -> None:
     """Write a page about all runs: durations of stages by week and actor, drifts, how runs fail."""
     from visup.archive.asking.database import open_database
-    from visup.archive.lake import Lake
+    from visup.archive.filling.stores import is_url
     from visup.archive.reporting.page import write_lake_page
     from visup.archive.reporting.statistics import lake_statistics
+    from visup.archive.storing.places import open_lake
     from visup.terminal.console import echo
 
-    path = out or lake / "report.html"
-    with open_database(Lake.open(lake)) as database:
+    path = out or Path("" if is_url(lake) else lake) / "report.html"
+    with open_database(open_lake(lake)) as database:
         found = lake_statistics(database)
-    write_lake_page(found, lake, path)
+    write_lake_page(found, Path(lake), path)
     echo(f"{path}: {found.runs} runs")
 
 
@@ -255,17 +258,17 @@ def report(
 def replay(
     setting: Given,
     wanted: Given,
-    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    lake: LakePlace,
 ) -> None:
     """Reason again about all runs of a lake, with other rules, tasks or actors, and say what changes.
 
     Exit code: 0 when nothing changes, 1 when something does, 2 on bad input.
     """
-    from visup.archive.lake import Lake
     from visup.archive.replaying import ChangeSummary, changes
+    from visup.archive.storing.places import open_lake
     from visup.terminal.console import make_console
 
-    console, summary, found = make_console(), ChangeSummary(), Lake.open(lake)
+    console, summary, found = make_console(), ChangeSummary(), open_lake(lake)
     for one in changes(found, found.runs(), **wanted, **setting):
         summary.take(one)
         if one.diff:
@@ -285,11 +288,14 @@ def _changed(one: RunChanges) -> str:
     return f"{one.clip}: {'; '.join(said) or 'other events'} ({one.folder})"
 
 
-def _filled(console: Console, lake: Lake, plan: Plan, where: PoolSettings) -> FillResult:
+def _filled(
+    console: Console, lake: Lake, plan: Plan, where: PoolSettings, store: LakeStore | None
+) -> FillResult:
     """Watch what is missing, and tell of each clip."""
     from visup.archive.filling.filling import FillResult, fill
     from visup.archive.filling.plan import check_settings
     from visup.archive.filling.pool import open_pool
+    from visup.archive.storing.places import pushed
 
     for failed in plan.failed:
         _tell_failure(console, failed)
@@ -301,7 +307,7 @@ def _filled(console: Console, lake: Lake, plan: Plan, where: PoolSettings) -> Fi
         with open_pool(where) as pool, _progress(console, plan) as told:
             if pool.dashboard:
                 console.print(f"Dashboard: {pool.dashboard}", soft_wrap=True, markup=False)
-            return fill(lake, plan, pool, told)
+            return fill(lake, plan, pool, pushed(store, lake, told))
     except KeyboardInterrupt:
         console.print("Stopped. The same command goes on from here.")
         raise typer.Exit(130) from None
@@ -356,8 +362,9 @@ def _tell_failure(console: Console, failed: FailedClip) -> None:
     console.print(text, style="yellow", soft_wrap=True, markup=False)
 
 
-def _print_plan(console: Console, into: Path, plan: Plan, workers: int) -> None:
+def _print_plan(console: Console, into: str, plan: Plan, workers: int) -> None:
     from visup.archive.filling.filling import estimated_s
+    from visup.archive.storing.places import copy_of
 
     said = [f"{len(plan.jobs)} to watch ({plan.bytes / 1e6:.0f} MB)"]
     cut = [len(job.spans) for job in plan.jobs if job.spans]
@@ -365,7 +372,7 @@ def _print_plan(console: Console, into: Path, plan: Plan, workers: int) -> None:
     said += [f"{plan.present} in the lake already"] if plan.present else []
     said += [f"{plan.same} the same as others"] if plan.same else []
     said += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
-    seconds = estimated_s(into, plan.bytes, workers)
+    seconds = estimated_s(copy_of(into), plan.bytes, workers)
     if plan.jobs and seconds is not None:
         said.append(f"about {_duration(seconds)} on {max(1, workers)} worker(s)")
     console.print(f"Clips: {', '.join(said)}.", soft_wrap=True, markup=False)

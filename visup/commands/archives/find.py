@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from visup.archive.parallel import Workers
+from visup.commands.archives.lake_argument import LakePlace
 from visup.commands.options import Given, takes
 from visup.runs.settings import Option
 
@@ -44,7 +45,7 @@ class FindOptions:
 @takes(FindOptions)
 def find(
     wanted: Given,
-    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    lake: LakePlace,
     what: Annotated[
         str,
         typer.Argument(
@@ -61,10 +62,10 @@ def find(
     from visup.archive.asking.database import open_database
     from visup.archive.finding.search import find as look
     from visup.archive.finding.search import read_search
-    from visup.archive.lake import Lake
+    from visup.archive.storing.places import open_lake
     from visup.terminal.console import make_console
 
-    options, found, console = FindOptions(**wanted), Lake.open(lake), make_console()
+    options, found, console = FindOptions(**wanted), open_lake(lake), make_console()
     search, runs = read_search(what, unknown=options.unknown), found.runs()
     with open_database(found) as database:
         possible = runs if options.scan_all else search.possible_runs(database)

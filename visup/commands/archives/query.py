@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.commands.archives.lake_argument import LakePlace
 from visup.commands.options import Given, takes
 from visup.runs.settings import Option
 
@@ -42,7 +43,7 @@ class AnswerOptions:
 @takes(AnswerOptions)
 def query(
     wanted: Given,
-    lake: Annotated[Path, typer.Argument(metavar="LAKE", help="A lake of `visup archive`.")],
+    lake: LakePlace,
     sql: Annotated[
         str | None, typer.Argument(metavar="SQL", help="One SELECT, in the SQL of DuckDB.")
     ] = None,
@@ -53,7 +54,7 @@ def query(
     """
     from visup.archive.asking.answers import answer_rows, as_csv, format_of, write_answer
     from visup.archive.asking.database import open_database
-    from visup.archive.lake import Lake
+    from visup.archive.storing.places import open_lake
     from visup.terminal.console import echo, echo_json, make_console
 
     options = AnswerOptions(**wanted)
@@ -61,7 +62,7 @@ def query(
         raise typer.BadParameter("ask something, or see --examples", param_hint="SQL")
     form = format_of(options.form, options.out)
     console = make_console(whole=True)
-    with open_database(Lake.open(lake), options.memory_gb) as database:
+    with open_database(open_lake(lake), options.memory_gb) as database:
         if options.tables:
             _show_tables(console, database)
         if options.examples:

@@ -1,0 +1,67 @@
+"""Who must not be pushed about, and who is only carried along."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.tasks.learning.relevance import relevant
+from visup.tasks.learning.rests import LEAST_ALLOWED, REST, TIMES_SEEN, rests_of
+from visup.tasks.learning.traces import Happening, RunTrace, _sustained
+
+DIAGONAL = 600.0
+SPEEDS = st.floats(0.0, 60.0)
+
+
+def run(*happenings: Happening, **fastest: float) -> RunTrace:
+    return RunTrace("run", happenings, 0.0, 12.0, fastest=fastest, diagonal=DIAGONAL)
+
+
+@given(st.lists(st.tuples(SPEEDS, SPEEDS), min_size=1, max_size=4))
+def test_who_never_moves_fast_rests_and_is_allowed_what_was_seen_and_more(
+    speeds: list[tuple[float, float]],
+) -> None:
+    runs = [run(table=t, arm=a) for t, a in speeds]
+    found = {r.actor: r for r in rests_of(runs, {"table", "arm", "lid"})}
+    for name, seen in zip(("table", "arm"), zip(*speeds, strict=True), strict=True):
+        assert (name in found) == (max(seen) <= REST * DIAGONAL)
+        if name in found:
+            assert found[name].allowed >= max(LEAST_ALLOWED * DIAGONAL, TIMES_SEEN * max(seen))
+    assert "lid" not in found  # nobody saw it in every run
+
+
+@given(st.lists(st.floats(0.0, 100.0), min_size=1, max_size=40))
+def test_a_speed_that_one_frame_shows_is_not_kept_up(speeds: list[float]) -> None:
+    rows = [(k / 15, s) for k, s in enumerate(speeds)]
+    dumb = [min(speeds[k : k + 4]) for k in range(len(speeds) - 3)]
+    assert _sustained(rows) == max(dumb, default=0.0)
+
+
+def carried(let_go: float, gone: float) -> RunTrace:
+    """A gripper brings a part to a fixture; in the image it touches the fixture itself for a while longer."""
+    return run(
+        Happening(("converging", ("gripper", "part")), 1.0, 2.0),
+        Happening(("touching", ("gripper", "part")), 2.0, let_go),
+        Happening(("coupled", ("gripper", "part")), 3.0, let_go),
+        Happening(("touching", ("fixture", "gripper")), 7.0, gone),
+        Happening(("touching", ("fixture", "part")), 7.0, gone - 0.1),
+        Happening(("diverging", ("gripper", "part")), let_go, 12.0),
+    )
+
+
+def test_who_is_carried_along_is_the_same_in_all_runs() -> None:
+    rows = relevant([carried(9.0, 9.4), carried(9.0, 9.9), carried(9.0, 10.1)])
+    symbols = [{e.symbol for e in row} for row in rows]
+    assert all(row == symbols[0] for row in symbols)
+    (met,) = ({s[1] for s in symbols[0] if s[0] == "touching"},)
+    assert len(met) == 1
+
+
+def test_a_contact_of_two_at_rest_that_ceases_to_be_seen_is_no_parting() -> None:
+    rows = relevant([carried(9.0, 9.4), carried(9.0, 9.5)])
+    assert not any(e.symbol[0] == "apart" for row in rows for e in row)
+    away = Happening(("diverging", ("fixture", "part")), 9.5, 12.0)
+    parted = [RunTrace("run", (*r.happenings, away), 0.0, 12.0) for r in (carried(9.0, 9.4),) * 2]
+    symbols = [e.symbol for row in relevant(parted) for e in row]
+    pair = next(s[1] for s in symbols if s[0] == "touching")
+    assert (("apart", pair) in symbols) == (pair == ("fixture", "part"))
