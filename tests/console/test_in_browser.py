@@ -283,7 +283,9 @@ def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) ->
             mobile=True,
         )
         open_run(browser, address)
-        browser.until("document.fonts.status == 'loaded'")  # an icon without its font is a long word
+        browser.until(
+            "document.fonts.status == 'loaded'"
+        )  # an icon without its font is a long word
         browser.until("document.documentElement.scrollWidth <= 390")
         browser.value("document.querySelector('a[href=\"/wall\"]').click()")
         shows(browser, "the picture of alert")

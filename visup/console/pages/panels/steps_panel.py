@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from functools import partial
 
 from nicegui import run, ui
+from nicegui.events import ValueChangeEventArguments
 
 from visup.agent.contract.phases import Phase
 from visup.agent.model.errors import VisupError
@@ -28,154 +28,133 @@ PHASES = {
 }
 
 
-@dataclass(slots=True)
-class BreakpointList:
-    """The breakpoints of a page, and whether a search goes on.
-
-    Attributes:
-        words: Condition -> whether it is looked at.
-        searching: Whether a search goes on.
-        left: Whether the page was left, or the search given up.
-    """
-
-    words: dict[str, bool] = field(default_factory=lambda: {"alert": True})
-    searching: bool = False
-    left: bool = False
-
-    @property
-    def active(self) -> list[str]:
-        """Those that are looked at."""
-        return [w for w, on in self.words.items() if on]
-
-
 def steps_panel(state: ConsoleState, head: Playhead, key: str) -> None:
     """Lay out the panel."""
-    stops = BreakpointList()
-    ui.context.client.on_disconnect(lambda: setattr(stops, "left", True))
-    ui.context.client.on_connect(lambda: setattr(stops, "left", False))
-    _breakpoints(state, head, key, stops)
-    _inside(state, head, key)
+    _Breakpoints(state, head, key)
+    _PhaseWalk(state, head, key)
 
 
-def _breakpoints(state: ConsoleState, head: Playhead, key: str, stops: BreakpointList) -> None:
-    async def go_on() -> None:
-        if stops.searching:
-            stops.left = True
-            return
-        stops.searching, stops.left, begin = True, False, head.number
-        said.set_text("reasoning on ... (press again to stop)")
-        try:
-            asked = stops.active
-            found = await run.io_bound(
-                lambda: state.inquiry(key).next_stop(begin + 1, asked, lambda: stops.left)
-            )
-            if found is not None:
-                _arrive(found, head, said)
-        except VisupError as fault:
-            said.set_text(shown_text(str(fault)))
-        finally:
-            stops.searching = False
+class _Breakpoints:
+    """Where to stop, and the search for the next place."""
 
-    def add(words: str) -> None:
-        if text := " ".join(words.split())[:LONGEST]:
-            stops.words[text] = True
-            listed.refresh()
+    def __init__(self, state: ConsoleState, head: Playhead, key: str) -> None:
+        self._state, self._head, self._key = state, head, key
+        self._words: dict[str, bool] = {"alert": True}
+        self._searching = self._left = False
+        ui.context.client.on_disconnect(partial(setattr, self, "_left", True))
+        part_heading("Stop at")
+        self._entry()
+        self._listed()
+        with ui.row().classes("items-center gap-2"):
+            worded_button("Go on", self._go_on, main=True)
+            self._said = ui.label().classes("why").props("role=status")
+
+    def _entry(self) -> None:
+        with ui.row().classes("w-full items-center no-wrap"):
+            known = [f"event {kind}" for kind in EVENT_KINDS]
+            typed = ui.input(placeholder=EXAMPLE, autocomplete=[*known, *_stages(self._head)])
+            typed.props('dense outlined aria-label="Where to stop"').classes("grow")
+            typed.on("keydown.enter", partial(self._add, typed))
+            worded_button("Add", partial(self._add, typed))
+
+    def _add(self, typed: ui.input) -> None:
+        if text := " ".join(str(typed.value or "").split())[:LONGEST]:
+            self._words[text] = True
+            self._listed.refresh()
         typed.set_value("")
 
-    part_heading("Stop at")
-    with ui.row().classes("w-full items-center no-wrap"):
-        known = [f"event {kind}" for kind in EVENT_KINDS]
-        typed = ui.input(placeholder=EXAMPLE, autocomplete=[*known, *_stages(head)])
-        typed.props('dense outlined aria-label="Where to stop"').classes("grow")
-        typed.on("keydown.enter", lambda: add(str(typed.value or "")))
-        worded_button("Add", lambda: add(str(typed.value or "")))
+    @ui.refreshable_method
+    def _listed(self) -> None:
+        for words, on in self._words.items():
+            with ui.element("div").classes("line"):
+                box = ui.checkbox(shown_text(words), value=on).props("dense size=xs")
+                box.classes("said").on_value_change(partial(self._switch, words))
+                button("close", f"Delete {shown_text(words)}", partial(self._delete, words))
 
-    @ui.refreshable
-    def listed() -> None:
-        for words in stops.words:
-            _breakpoint(words, stops, listed.refresh)
+    def _switch(self, words: str, e: ValueChangeEventArguments[bool]) -> None:
+        self._words[words] = bool(e.value)
 
-    listed()
-    with ui.row().classes("items-center gap-2"):
-        worded_button("Go on", go_on, main=True)
-        said = ui.label().classes("why").props("role=status")
+    def _delete(self, words: str) -> None:
+        self._words.pop(words, None)
+        self._listed.refresh()
 
+    async def _go_on(self) -> None:
+        if self._searching:
+            self._left = True
+            return
+        self._searching, self._left = True, False
+        self._said.set_text("reasoning on ... (press again to stop)")
+        begin, asked = self._head.number, [w for w, on in self._words.items() if on]
+        try:
+            found = await run.io_bound(self._search, begin, asked)
+            if found is not None:  # else the console is being stopped
+                self._arrive(found)
+        except VisupError as fault:
+            self._said.set_text(shown_text(str(fault)))
+        finally:
+            self._searching = False
 
-def _arrive(found: FoundStop, head: Playhead, said: ui.label) -> None:
-    if found.reasons:
-        head.go(found.number - 1)
-        when = clock(head.run.times[head.number])
-        said.set_text(shown_text(f"{when}  {'; '.join(map(prose, found.reasons))}"))
-    elif found.ended:
-        said.set_text("Nothing of it happens up to the end.")
-    else:
-        said.set_text("Given up.")
+    def _search(self, begin: int, asked: list[str]) -> FoundStop:
+        inquiry = self._state.inquiry(self._key)
+        return inquiry.next_stop(begin + 1, asked, lambda: self._left)
+
+    def _arrive(self, found: FoundStop) -> None:
+        if found.reasons:
+            self._head.go(found.number - 1)
+            when = clock(self._head.run.times[self._head.number])
+            self._said.set_text(shown_text(f"{when}  {'; '.join(map(prose, found.reasons))}"))
+        elif found.ended:
+            self._said.set_text("Nothing of it happens up to the end.")
+        else:
+            self._said.set_text("Given up.")
 
 
 def _stages(head: Playhead) -> list[str]:
     return [f"stage {s.stage}" for t in head.run.mind(head.number).tasks for s in t.stages]
 
 
-def _breakpoint(words: str, stops: BreakpointList, again: Callable[[], object]) -> None:
-    def switch(on: bool) -> None:
-        stops.words[words] = on
+class _PhaseWalk:
+    """The phases of the step at the cursor, one after the other, and on into the next step."""
 
-    def delete() -> None:
-        stops.words.pop(words, None)
-        again()
+    def __init__(self, state: ConsoleState, head: Playhead, key: str) -> None:
+        self._state, self._head, self._key = state, head, key
+        self._records: tuple[PhaseRecord, ...] = ()
+        self._number, self._shown = -1, 0
+        part_heading("Inside the step")
+        with ui.row().classes("items-center gap-2"):
+            worded_button("Next phase", self._forth, main=True)
+            ui.label("of the frame at the cursor, then of the next one").classes("dim")
+        region = ui.element("div").classes("scroll")
+        with region.props('tabindex=0 role=region aria-label="Phases"'):
+            self._phases()
+        head.listen(self._moved, "Steps")
 
-    with ui.element("div").classes("line"):
-        box = ui.checkbox(
-            shown_text(words), value=stops.words[words], on_change=lambda e: switch(bool(e.value))
-        )
-        box.props("dense size=xs").classes("said")
-        button("close", f"Delete {shown_text(words)}", delete)
-
-
-def _inside(state: ConsoleState, head: Playhead, key: str) -> None:
-    """The phases of the step at the cursor, one after the other."""
-    at = {"phase": -1}
-    known: dict[int, tuple[PhaseRecord, ...]] = {}
-
-    async def forth() -> None:
-        number = head.number
-        if number not in known:
+    async def _forth(self) -> None:
+        if self._number == self._head.number and self._shown >= len(self._records):
+            self._head.step(1)
+        if self._number != (number := self._head.number):
             try:
-                records = await run.io_bound(lambda: state.inquiry(key).phases(number + 1))
+                records = await run.io_bound(self._look, number)
             except VisupError as fault:
                 ui.notify(shown_text(str(fault)), type="negative", multi_line=True)
                 return
-            known.clear()
-            known[number] = records or ()
-        at["phase"] += 1
-        if at["phase"] < len(known[number]):
-            shown.refresh()
-        else:
-            at["phase"] = -1
-            head.step(1)
-            shown.refresh()
-            if head.number != number:
-                await forth()
+            self._records, self._number, self._shown = records or (), number, 0
+        self._shown += 1
+        self._phases.refresh()
 
-    def moved() -> None:
-        if head.number not in known:
-            at["phase"] = -1
-        shown.refresh()
+    def _look(self, number: int) -> tuple[PhaseRecord, ...]:
+        return self._state.inquiry(self._key).phases(number + 1)
 
-    part_heading("Inside the step")
-    with ui.row().classes("items-center gap-2"):
-        worded_button("Next phase", forth, main=True)
-        ui.label("of the frame at the cursor, then of the next one").classes("dim")
+    def _moved(self) -> None:
+        if self._head.number != self._number:
+            self._shown = 0
+        self._phases.refresh()
 
-    @ui.refreshable
-    def shown() -> None:
-        records = known.get(head.number, ())
-        for number, record in enumerate(records[: at["phase"] + 1]):
-            _phase(record, last=number == at["phase"])
-
-    with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Phases"'):
-        shown()
-    head.listen(moved, "Steps")
+    @ui.refreshable_method
+    def _phases(self) -> None:
+        records = self._records[: self._shown] if self._number == self._head.number else ()
+        for number, record in enumerate(records, 1):
+            _phase(record, last=number == self._shown)
 
 
 def _phase(record: PhaseRecord, *, last: bool) -> None:
