@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from tests.archive.recordings import meeting, record
 from tests.cli import Call, caller
+from tests.paths import ROOT
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.archive.adding import add_run
 from visup.archive.lake import Lake
@@ -112,6 +113,13 @@ def test_what_was_fitted_is_read_by_watch(tmp_path: Path) -> None:
             agent.reason(seen)
         sure.append(agent.mind.objects[2].confidence)
     assert sure[1] < sure[0]
+
+
+def test_the_settings_of_the_page_are_some(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "archives.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "s.toml").write_text(text)
+    assert watch_settings("clip.mp4", {}, tmp_path / "s.toml").vote_evidence == 1.874
 
 
 @pytest.mark.parametrize(
