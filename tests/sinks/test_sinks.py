@@ -196,6 +196,7 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     ("wanted", "package", "extra"),
     [
         ("mqtt:localhost/alerts", "paho", "mqtt"),
+        ("notify:mailto://a:b@c.example", "apprise", "serve"),
         ("otel:console", "opentelemetry", "otel"),
         ("rerun:x.rrd", "rerun", "rerun"),
     ],

@@ -22,7 +22,8 @@ MOST_STEPS = 64
 """Whole steps that may wait, with their frames: some tens of megabytes."""
 
 KINDS = (
-    "jsonl:-, file:PATH, webhook:URL, mqtt:HOST[:PORT]/TOPIC, otel:console, otel:otlp, rerun:FILE"
+    "jsonl:-, file:PATH, webhook:URL, mqtt:HOST[:PORT]/TOPIC, notify:ADDRESS, otel:console, otel:otlp, "
+    "rerun:FILE"
 )
 
 
@@ -140,6 +141,12 @@ def _otel(wanted: str, place: str) -> Sink:
     return Telemetry(place)
 
 
+def _notification(wanted: str, place: str) -> Sink:
+    from visup.sinks.notification import Notification
+
+    return Notification(place)
+
+
 def _rerun(wanted: str, place: str) -> Sink:
     from visup.sinks.rerun import Rerun
 
@@ -150,6 +157,7 @@ _MAKERS: dict[str, Callable[[str, str], Sink]] = {
     "jsonl": _jsonl,
     "file": lambda wanted, place: to_file(wanted, Path(place)),
     "mqtt": _mqtt,
+    "notify": _notification,
     "otel": _otel,
     "rerun": _rerun,
 }

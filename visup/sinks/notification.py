@@ -1,0 +1,82 @@
+"""Alerts by mail and chat, in words; needs `visup[serve]` (Apprise, licensed BSD 2-clause)."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import ExtraMissingError, SettingsError
+from visup.sinks.webhook import DeliveryError
+
+EXPECTED = "an address that Apprise knows, such as mailto://USER:PASSWORD@HOST or slack://..."
+
+
+class Notification:
+    """Sends each record as a short message, with the picture of the alert where there is one.
+
+    Args:
+        address: Of Apprise: `mailto://...`, `slack://...`, `tgram://...` and a hundred more. Nearly all
+            hold a password or token, so that none is ever shown.
+
+    Raises:
+        SettingsError: Apprise knows no such address.
+        ExtraMissingError: Apprise is not installed.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            import apprise
+        except ModuleNotFoundError as missing:
+            raise ExtraMissingError("a sink for mail and chat", "serve") from missing
+        scheme = address.partition("://")[0]
+        self.name = f"notify:{scheme}"
+        # Its log names addresses; what went wrong is told once, without them.
+        logging.getLogger("apprise").setLevel(logging.CRITICAL)
+        self._service = apprise.Apprise()
+        if "://" not in address or not self._service.add(address):
+            raise SettingsError(f"--sink notify:{scheme}://...", expected=EXPECTED)
+
+    def deliver(self, record: Mapping[str, Any]) -> None:
+        """Send one record.
+
+        Raises:
+            DeliveryError: It was not taken.
+        """
+        picture = record.get("snapshot")
+        there = isinstance(picture, str) and Path(picture).is_file()
+        taken = self._service.notify(
+            title=title_of(record), body=body_of(record), attach=picture if there else None
+        )
+        if not taken:
+            raise DeliveryError("the message was not taken")
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+def title_of(record: Mapping[str, Any]) -> str:
+    """What a message is headed by: which camera, and how grave it is."""
+    who = record.get("camera") or record.get("source", "visup")
+    if record.get("record") == "alert":
+        over = "over: " if record.get("state") == "closed" else ""
+        return f"{who}: {over}{record.get('severity', 'alert')}"
+    if record.get("record") == "verdict":
+        return f"{who}: the run has ended"
+    return f"{who}: notice"
+
+
+def body_of(record: Mapping[str, Any]) -> str:
+    """What a message says: the sentence, when it was, where more is to be seen."""
+    kind = record.get("record")
+    said = record.get("text") if kind == "notice" else record.get("cause")
+    if kind == "verdict":
+        said = f"Verdict: {record.get('verdict') or 'none'}, after {record.get('steps')} steps."
+    lines = [str(said)]
+    if "at" in record:
+        lines.append(f"At {record['at']}.")
+    for word, key in (("Picture", "snapshot"), ("Clip", "clip")):
+        if key in record:
+            lines.append(f"{word}: {record[key]}")
+    return "\n".join(lines)
