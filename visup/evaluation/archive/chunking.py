@@ -20,11 +20,13 @@ from visup.archive.filling.watching import ClipOutcome
 from visup.archive.lake import Lake
 from visup.evaluation.figures import Progress
 from visup.evaluation.missions.runner import mission_settings
-from visup.evaluation.missions.scores import EVENT_TOLERANCE_S, precision_recall_f1
+from visup.evaluation.missions.scores import EVENT_TOLERANCE_S, SCORED_EVENTS, precision_recall_f1
 from visup.runs.replay import Line, Transcript, replay
 from visup.runs.wiring import open_video
 
 CHUNKS = 3
+EventCounts = tuple[int, int, int]
+"""Events alike, in excess, missed."""
 Beliefs = Mapping[int, Sequence[Region]]
 """Frame -> objects in sight, as regions with the ids of the objects."""
 
@@ -41,18 +43,20 @@ def compare_chunks(
         progress: Shows what is being done.
 
     Returns:
-        `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`;
+        `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`,
+        `scored_f1` of the kinds by which missions are scored;
         `verdicts` that differ; `longer`, by how much more frames are looked at in chunks, a share; `worst`
         mission by F1.
     """
     found = [_compared(place, mission, database, progress) for mission in missions]
-    right, excess, missed = (sum(one.counts[k] for one in found) for k in range(3))
+    right, excess, missed = _sums(one.counts for one in found)
     return {
         "missions": len(missions),
         "events": right + missed,
         "excess": excess,
         "missed": missed,
         "event_f1": precision_recall_f1(right, excess, missed)[2],
+        "scored_f1": precision_recall_f1(*_sums(one.scored for one in found))[2],
         "verdicts": sum(one.verdicts[0] != one.verdicts[1] for one in found),
         "longer": sum(one.looked for one in found) / sum(one.frames for one in found) - 1.0,
         "worst": min(found, key=lambda one: precision_recall_f1(*one.counts)[2]).mission,
@@ -66,13 +70,15 @@ class _Compared:
     Attributes:
         mission: Its name.
         counts: Events alike, in excess, missed.
+        scored: The same of the kinds by which missions are scored.
         verdicts: Of both.
         frames: Of the video.
         looked: How many frames the chunks have looked at, together.
     """
 
     mission: str
-    counts: tuple[int, int, int]
+    counts: EventCounts
+    scored: EventCounts
     verdicts: tuple[str | None, str | None]
     frames: int
     looked: int
@@ -90,16 +96,18 @@ def _compared(place: Path, mission: Path, database: Path, progress: Progress) ->
         fill(lake, plan, Pool(), _silent)
         lakes.append(lake)
     (one, seen), (other, seen_again) = map(_told, lakes)
-    counts = matching_events(one.events, other.events, same_objects(seen, seen_again))
+    same = same_objects(seen, seen_again)
+    counts = matching_events(one.events, other.events, same)
     progress(f"{mission.name}: {counts[0]} events alike, {counts[1]} in excess, {counts[2]} missed")
     spans = lakes[1].recorded(lakes[1].runs()[0])[0].facts()["chunks"]
     looked = sum(last - first + 1 for first, last in spans)
-    return _Compared(mission.name, counts, (one.verdict, other.verdict), frames, looked)
+    scored = matching_events(_scored(one.events), _scored(other.events), same)
+    return _Compared(mission.name, counts, scored, (one.verdict, other.verdict), frames, looked)
 
 
 def matching_events(
     whole: Iterable[Line], cut: Iterable[Line], same: Mapping[int, int]
-) -> tuple[int, int, int]:
+) -> EventCounts:
     """How many events of a run in chunks are those of the unbroken one, in excess, missed.
 
     They are the same when kind, objects and what the details name agree, within a second; each counts once.
@@ -121,6 +129,15 @@ def matching_events(
             left.discard(min(near)[1])
     right = len(real) - len(left)
     return right, len(said) - right, len(left)
+
+
+def _scored(events: Iterable[Line]) -> list[Line]:
+    return [e for e in events if e["kind"] in SCORED_EVENTS]
+
+
+def _sums(counts: Iterable[EventCounts]) -> EventCounts:
+    right, excess, missed = map(sum, zip(*counts, strict=True))
+    return right, excess, missed
 
 
 def same_objects(whole: Beliefs, cut: Beliefs) -> dict[int, int]:
