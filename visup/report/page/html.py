@@ -14,13 +14,22 @@ from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.storage.atomic import write_whole
 from visup.report.page import sections
 from visup.report.page.distance_figures import distance_figures
-from visup.report.page.figures import Figure, presence_figure, stage_figure, vote_figures
+from visup.report.page.downloads import downloads
+from visup.report.page.figures import (
+    Figure,
+    likelihood_figures,
+    presence_figure,
+    stage_figure,
+    vote_figures,
+)
+from visup.report.page.lives import lives
+from visup.report.page.player import player
 from visup.report.page.summary import title_of, verdict_words
 from visup.report.page.task_trees import courses
 from visup.report.records import RunData
 from visup.wording import printable, prose
 
-SCRIPTS = ("figures.js", "report.js")
+SCRIPTS = ("figures.js", "report.js", "cursor.js", "filters.js")
 
 
 def write_report(run: RunData, path: Path) -> None:
@@ -59,8 +68,8 @@ def report_page(run: RunData) -> str:
         ExtraMissingError: The run has figures, and Plotly is not installed.
     """
     stages, presence = stage_figure(run), presence_figure(run)
-    distances, votes = distance_figures(run), vote_figures(run)
-    drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
+    distances, votes, likely = distance_figures(run), vote_figures(run), likelihood_figures(run)
+    drawn = [f for f in (stages, presence, *distances, *likely, *votes) if f is not None]
     own = files("visup.report.page")
     plotly = plotly_source() if drawn else ""
     script = "".join((own / name).read_text(encoding="utf-8") for name in SCRIPTS)
@@ -73,15 +82,20 @@ def report_page(run: RunData) -> str:
         "notices": sections.notices(run),
         "hero": sections.hero(run),
         "narrative": sections.narrative(run),
+        "player": player(run),
+        "alert_filter": sections.alert_filter(run),
         "alerts": sections.alerts(run),
+        "lives": lives(run),
         "key_frames": sections.key_frames(run),
         "tasks": sections.tasks(run),
         "courses": courses(run),
         "stages": sections.figures([stages], "No stage was followed."),
         "presence": sections.figures([presence], "No object was followed."),
         "distances": sections.figures(distances, "No two objects were in view together."),
+        "likelihoods": sections.figures(likely, "No object was identified."),
         "votes": sections.figures(votes, "No object was identified."),
         "similarity": sections.similarity(run),
+        "downloads": downloads(run),
         "facts": sections.run_facts(run),
         "figures": embedded(drawn),
     }
