@@ -83,14 +83,35 @@ def read_settings(path: Path) -> Values:
     Raises:
         SettingsError: The file is missing, is not TOML, or holds something else.
     """
+    return behaviour_tables(read_toml(path), path)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file, as it is.
+
+    Raises:
+        SettingsError: The file is missing, or is not TOML.
+    """
     try:
-        document = tomllib.loads(read_text_file(path))
+        return tomllib.loads(read_text_file(path))
     except OSError as fault:
         raise SettingsError(f"cannot be read: {fault.strerror}", where=str(path)) from fault
     except (ValueError, RecursionError) as fault:
         raise SettingsError(f"it is not TOML: {fault}", where=str(path)) from fault
-    tables = document.pop("behaviours", {})
-    strange = next(iter(document), None)
+
+
+def behaviour_tables(document: Mapping[str, Any], path: Path) -> Values:
+    """The tables `[behaviours.NAME]` of a settings file.
+
+    Args:
+        document: The file, without what else is known in it.
+        path: Of the file.
+
+    Raises:
+        SettingsError: It holds something else.
+    """
+    tables = document.get("behaviours", {})
+    strange = next((key for key in document if key != "behaviours"), None)
     if strange is not None:
         raise SettingsError(
             f"'{strange}' is unknown", where=str(path), expected="tables [behaviours.NAME]"

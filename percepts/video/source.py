@@ -77,8 +77,11 @@ class VideoSource(ABC, Iterator[Frame]):
         frame = None if self.ended else self._next()
         while frame is not None and frame.index < self.span[0]:
             frame = self._next()
-        if frame is None or (self.span[1] is not None and frame.index >= self.span[1]):
+        if frame is None:
             self._end(Ending.COMPLETE)
+            raise StopIteration
+        if self.span[1] is not None and frame.index >= self.span[1]:
+            self._end(Ending.STOPPED)
             raise StopIteration
         return frame
 

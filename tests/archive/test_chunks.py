@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,8 +16,11 @@ from tests.archive.watches import clips, scripted
 from tests.cli import Call, caller
 from tests.clips import moving_disc, write_clip
 from visup.agent import Observation
+from visup.agent.storage.codec import to_document
 from visup.agent.storage.journal_reader import Recording
+from visup.archive.chunks.extending import extend_chunk
 from visup.archive.chunks.region_matching import RegionNumbers
+from visup.archive.chunks.seams import find_parts
 from visup.archive.chunks.spans import ChunkSpan, Cutting, chunk_spans
 from visup.archive.chunks.stitching import stitched
 from visup.archive.filling.attempts import Attempts
@@ -37,14 +40,45 @@ WHOLE = tuple(meeting(50))
 DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
 
 
-def cut(spans: Sequence[ChunkSpan], numbers: Sequence[Sequence[int]]) -> list[list[Observation]]:
-    """The meeting as chunks see it, each of which calls the regions by numbers of its own."""
-    chunks = []
-    for span, own in zip(spans, numbers, strict=True):
-        named = RegionNumbers(dict(enumerate(own, 1)))
-        inside = WHOLE[span.begin : span.end]
-        chunks.append([named.renumbered(o) for o in inside])
-    return chunks
+@dataclass(frozen=True, slots=True)
+class Perceived(Recording):
+    """A chunk whose recording is a list."""
+
+    path: Path = Path("nowhere")
+    seen: list[Observation] = field(default_factory=list)
+
+    def observations(self, after: int = -1) -> Iterator[Observation]:
+        return (o for o in list(self.seen) if o.frame_index > after)
+
+    def first_and_last(self) -> tuple[int, int] | None:
+        return (self.seen[0].frame_index, self.seen[-1].frame_index) if self.seen else None
+
+
+def chunk(begin: int, end: int | None, own: Sequence[int] = (1, 2, 3)) -> Perceived:
+    """The meeting as a chunk sees it, which calls the regions by numbers of its own."""
+    named = RegionNumbers(dict(enumerate(own, 1)))
+    return Perceived(seen=[named.renumbered(o) for o in WHOLE[begin:end]])
+
+
+def without(observation: Observation, region: int) -> Observation:
+    """The same, but for one region that was not seen."""
+    reports = tuple(
+        replace(r, percepts=tuple(p for p in r.percepts if _about(p.value) != region))
+        for r in observation.reports
+    )
+    return replace(observation, reports=reports)
+
+
+def _about(value: object) -> object:
+    return getattr(value, "region_id", getattr(value, "id", None))
+
+
+def refused(chunk: Recording, end: int) -> None:
+    raise AssertionError("nothing is to be watched on")
+
+
+def ids(observations: Iterable[Observation]) -> list[list[int]]:
+    return [[r.id for r in o.of("region")] for o in observations]
 
 
 def events(observations: Sequence[Observation]) -> list[object]:
@@ -78,42 +112,68 @@ def test_what_is_cut_and_stitched_gives_the_same_events(
     told: list[object], edges: tuple[int, int], numbers: tuple[list[int], list[int]]
 ) -> None:
     a, b = edges
-    spans = [ChunkSpan(0, a + 6), ChunkSpan(a - 6, b + 6), ChunkSpan(b - 6, None)]
-    chunks = cut(spans, [[1, 2, 3], *numbers])
-    found = list(stitched([iter(c) for c in chunks]))
-    assert [o.frame_index for o in found] == [o.frame_index for o in WHOLE]
-    assert [[r.id for r in o.of("region")] for o in found] == [
-        [r.id for r in o.of("region")] for o in WHOLE
-    ]
+    chunks = [chunk(0, a + 6), chunk(a - 6, b + 6, numbers[0]), chunk(b - 6, None, numbers[1])]
+    found = list(stitched(find_parts(chunks, refused)))
+    assert [o.frame_index for o in found] == list(range(len(WHOLE)))
+    assert ids(found) == ids(WHOLE)
     assert events(found) == told
 
 
+def test_a_chunk_is_watched_on_until_both_see_alike() -> None:
+    old, new = chunk(0, 20), chunk(10, None, (2, 1, 3))
+    new.seen[:15] = [without(o, 1) for o in new.seen[:15]]  # until frame 25
+    asked = list[int]()
+
+    def extend(on: Recording, end: int) -> None:
+        asked.append(end)
+        old.seen.extend(WHOLE[len(old.seen) : end])
+
+    parts = find_parts([old, new], extend)
+    assert asked == [70]  # five seconds on
+    assert parts[1].first >= 25
+    assert ids(stitched(parts)) == ids(WHOLE)
+
+
+def test_two_that_never_agree_are_stitched_after_a_while_and_of_others_the_first_goes_on() -> None:
+    old, end = chunk(0, 20), len(WHOLE)
+
+    def extend(on: Recording, end: int) -> None:
+        old.seen.extend(WHOLE[len(old.seen) : end])
+
+    never = Perceived(seen=[without(o, 1) for o in WHOLE[10:]])
+    (only,) = find_parts([old, never], extend)
+    assert (only.chunk, len(old.seen)) == (old, end)
+    stays = chunk(0, 20)
+    parts = find_parts([stays, never], lambda on, end: None)
+    assert 15 <= parts[1].first < 20
+    found = list(stitched(parts))
+    assert [o.frame_index for o in found] == list(range(end))
+    assert ids(found)[:15] == ids(WHOLE)[:15]
+
+
 def test_what_only_the_later_chunk_sees_gets_a_number_that_nobody_had() -> None:
-    old = WHOLE[:30]
-    new = WHOLE[20:]
-    only_one = [
-        replace(
-            o,
-            reports=tuple(
-                replace(r, percepts=tuple(p for p in r.percepts if _about(p.value) == 1))
-                for r in o.reports
-            ),
-        )
-        for o in old
-    ]
-    found = list(stitched([iter(only_one), iter(new)]))
+    old = Perceived(seen=[without(without(o, 2), 3) for o in WHOLE[:30]])
+    found = list(stitched(find_parts([old, chunk(20, None)], lambda on, end: None)))
     assert {r.id for o in found for r in o.of("region")} == {1, 2, 3}
     assert {h.region_id for o in found for h in o.of("hypothesis")} <= {1, 2, 3}
-    assert [o.frame_index for o in found] == list(range(len(WHOLE)))
-
-
-def _about(value: object) -> object:
-    return getattr(value, "region_id", getattr(value, "id", None))
 
 
 def test_a_later_chunk_without_a_frame_is_passed_over() -> None:
-    found = list(stitched([iter(WHOLE[:20]), iter(WHOLE[14:]), iter(())]))
+    found = list(stitched(find_parts([chunk(0, 20), chunk(14, None), Perceived()], refused)))
     assert [o.frame_index for o in found] == list(range(len(WHOLE)))
+
+
+def test_a_chunk_that_is_watched_on_is_as_one_that_was_watched_at_once(tmp_path: Path) -> None:
+    clip = WatchSettings(str(write_clip(tmp_path / "disc.avi", moving_disc(24))))
+    for name, end in (("cut", 16), ("whole", 22)):
+        (tmp_path / name).mkdir()
+        watch_into(clip, tmp_path / name, (4, end))
+    one, other = (Recording.open(tmp_path / name) for name in ("cut", "whole"))
+    extend_chunk(clip, one, 22)
+    assert one.first_and_last() == other.first_and_last() == (4, 21)
+    assert [to_document(o) for o in one.observations()] == [
+        to_document(o) for o in other.observations()
+    ]
 
 
 def test_a_span_of_a_video_gives_those_frames_at_their_times(tmp_path: Path) -> None:
@@ -206,7 +266,7 @@ def test_a_video_is_watched_in_chunks(tmp_path: Path) -> None:
     (run,) = lake.rows("runs")
     assert (run["steps"], run["ended"], run["source"]) == (50, "complete", str(path))
     recording = Recording.open(lake.folder_of(run["run"]))
-    assert recording.facts()["chunks"] == 2
+    assert [first for first, _ in recording.facts()["chunks"]] == [0, 20]
     assert make_plan(lake, some, WatchSettings(""), cutting).present == 1
     assert make_plan(lake, some, WatchSettings(""), Cutting(60.0)).jobs[0].spans == ()
 

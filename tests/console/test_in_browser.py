@@ -17,6 +17,7 @@ from tests.console.test_runs import SETTINGS
 from tests.teaching.browser import Browser, found_browser
 from visup.api.recorded import open_run as open_run_of
 from visup.console.feedback import read_feedback
+from visup.runs.inputs.zones import load_zones
 
 OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
 
@@ -38,6 +39,9 @@ def address(folder: Path) -> Iterator[str]:
     found_browser()
     tokens = {"VISUP_CONSOLE_TOKEN": OPERATOR, "VISUP_CONSOLE_VIEWER_TOKEN": VIEWER}
     command = [sys.executable, "-m", "visup.cli", "console", str(folder), "--port", "0"]
+    saved = folder.parent / "saved"
+    saved.mkdir(exist_ok=True)
+    command += ["--save-to", str(saved)]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True, env={**os.environ, **tokens}
     ) as process:
@@ -176,6 +180,83 @@ def test_why_and_what_if_are_answered(browser: Browser, address: str) -> None:
     shows(browser, "there is no object 99")
 
 
+def test_it_stops_at_breakpoints_and_goes_through_the_phases_of_a_step(
+    browser: Browser, address: str
+) -> None:
+    open_run(browser, address)
+    tab(browser, "Steps")
+    press(browser, "Go on")
+    shows(browser, "alert: ")
+    browser.until("!document.body?.innerText.includes('frame 0')")
+    field = "document.querySelector('input[aria-label=\"Where to stop\"]')"
+    browser.value(f"{field}.focus()")
+    browser.type("when gap(")
+    browser.press("Enter")
+    shows(browser, "when gap(")
+    press(browser, "Go on")
+    browser.until("document.querySelector('[role=status]')?.innerText.includes('ends too early')")
+    for phase in ("perceive", "update", "cogitate"):
+        press(browser, "Next phase")
+        browser.until(
+            f"[...document.querySelectorAll('.phase')].some(p => p.innerText == '{phase}')"
+        )
+    assert violations(browser) == []
+
+
+def choose(browser: Browser, label: str, option: str) -> None:
+    x, y = browser.value(
+        f"(() => {{ const r = document.querySelector('[aria-label=\"{label}\"]').closest('.q-field')"
+        ".getBoundingClientRect(); return [r.x + 20, r.y + r.height / 2]; })()"
+    )
+    browser.click(x, y)
+    item = f"[...document.querySelectorAll('.q-item')].find(i => i.innerText.trim() == '{option}')"
+    browser.until(f"!!{item}")
+    browser.value(f"{item}.click()")
+
+
+def test_a_task_is_written_checked_tried_and_a_zone_is_drawn_and_saved(
+    browser: Browser, address: str, folder: Path
+) -> None:
+    open_run(browser, address)
+    tab(browser, "Write")
+    browser.until("document.querySelector('.cm-content')?.getAttribute('aria-label') == 'Text'")
+    browser.value("document.querySelector('.cm-content').focus()")
+    browser.type("<go> ::= convrging(arm, satellite)")
+    browser.until("!!document.querySelector('.cm-line.fault-line')")
+    shows(browser, "converging")
+    browser.value("document.activeElement.blur()")  # its cursor blinks for ever
+    assert violations(browser) == []
+    browser.value("document.querySelector('.cm-content').focus()")
+    browser.value("document.execCommand('selectAll')")
+    browser.type("<go> ::= converging(arm, satellite)")
+    shows(browser, "No mistakes.")
+    press(browser, "Try it on this run")
+    shows(browser, "verdict:")
+    browser.value("document.querySelector('.cm-content').focus()")
+    browser.value("document.execCommand('selectAll')")
+    browser.press("Backspace")
+    choose(browser, "What is written", "zones")
+    shows(browser, "Click the corners")
+    browser.value("document.querySelector('.q-toggle').click()")
+    x, y, w, h = browser.value(
+        "(() => { const r = document.querySelector('svg.overlay').getBoundingClientRect();"
+        "return [r.x, r.y, r.width, r.height]; })()"
+    )
+    for count, (u, v) in enumerate(((0.4, 0.3), (0.6, 0.3), (0.5, 0.7)), 1):
+        browser.click(x + u * w, y + v * h)
+        browser.until(f"document.querySelectorAll('.overlay .corner').length == {count}")
+    browser.value("document.querySelector('[aria-label=\"Name of the zone\"]').focus()")
+    browser.type("dock")
+    press(browser, "Add zone")
+    shows(browser, "[[zone]]")
+    browser.value("document.querySelector('[aria-label=\"Name of the file\"]').focus()")
+    browser.type("mine")
+    press(browser, "Save")
+    shows(browser, "saved as mine.toml")
+    (zone,) = load_zones(folder.parent / "saved" / "mine.toml")
+    assert (zone.name, len(zone.polygon)) == ("dock", 3)
+
+
 def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
     browser: Browser, address: str, folder: Path
 ) -> None:
@@ -187,7 +268,7 @@ def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
     open_run(browser, address)
     tab(browser, "Alerts")
     press(browser, "false alarm")
-    shows(browser, "false alarm")
+    browser.until("!!document.querySelector('.opinion')")
     end = [f.opinion for f in read_feedback(folder / "evening").values()]
     assert end == ["false alarm"]
 
@@ -260,7 +341,10 @@ def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) ->
             mobile=True,
         )
         open_run(browser, address)
-        assert browser.value("document.documentElement.scrollWidth") <= 390
+        browser.until(
+            "document.fonts.status == 'loaded'"
+        )  # an icon without its font is a long word
+        browser.until("document.documentElement.scrollWidth <= 390")
         browser.value("document.querySelector('a[href=\"/wall\"]').click()")
         shows(browser, "the picture of alert")
         assert browser.value("document.documentElement.scrollWidth") <= 390

@@ -101,10 +101,12 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
         SettingsError: One is not as it should be.
     """
     if settings_file:
-        from visup.agent.plugins.settings import merge_settings, read_settings
+        from visup.agent.plugins.settings import merge_settings
+        from visup.runs.inputs.settings_file import read_settings_file
 
-        own = given.get("plugin_settings", {})
-        given = {**given, "plugin_settings": merge_settings(read_settings(settings_file), own)}
+        told = read_settings_file(settings_file)
+        merged = merge_settings(told["plugin_settings"], given.get("plugin_settings", {}))
+        given = {**told, **given, "plugin_settings": merged}
     return WatchSettings(source, **given)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
+from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
@@ -23,10 +24,11 @@ class ConsoleState:
 
     Args:
         library: Finds runs.
+        save_to: Folder into which operators may save what they write; None for nowhere.
     """
 
-    def __init__(self, library: RunLibrary) -> None:
-        self.library = library
+    def __init__(self, library: RunLibrary, save_to: Path | None = None) -> None:
+        self.library, self.save_to = library, save_to
         self._views: OrderedDict[str, RunView] = OrderedDict()
         self._inquiries: OrderedDict[str, Inquiry] = OrderedDict()
         self._lock, self._asking = Lock(), Lock()

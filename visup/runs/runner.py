@@ -338,7 +338,7 @@ class _Run:
     def result(self) -> RunResult:
         """Close the books."""
         if self._checkpoints:
-            if self._stopped and self._last:
+            if self._last and (self._stopped or self._options.span[1] is not None):
                 self._checkpoints.keep(self._agent, self._last, recorder_state(self._recorder))
             self._checkpoints.close()
         mind = self._agent.mind

@@ -15,6 +15,8 @@ from visup.agent.model.errors import SettingsError
 
 VIEWS_AT_END = ("unknown", "weak", "strong")
 """What may become of rules that are not decided when a run ends; as of `visup.rules`."""
+LARGEST_EVIDENCE = 20.0
+"""With so much a single vote settles who is who."""
 SOURCE_REDACTED = "source_without_secret"
 """The fact of a recorded run that its source had a password, which is not recorded."""
 
@@ -213,6 +215,8 @@ class WatchSettings:
             complete=complete_preset,
         ),
     ] = None
+    vote_evidence: float | None = None
+    """How much a vote for an identity tells, in units of log likelihood; None for what visup ships with."""
     attention: Annotated[
         bool, Option("Match well-known objects less often, which saves time.", "--attention")
     ] = False
@@ -230,6 +234,12 @@ class WatchSettings:
             raise SettingsError(
                 "nothing would see: --no-motion leaves seeing to another behaviour, and there is none",
                 hint="add --behaviour FILE, --plugin NAME or --detections FILE",
+            )
+        told = self.vote_evidence
+        if told is not None and not 0 < told <= LARGEST_EVIDENCE:
+            raise SettingsError(
+                f"`evidence` of identities is {told}",
+                expected=f"more than 0, at most {LARGEST_EVIDENCE}",
             )
         fov = self.fov_vertical_deg
         if fov is not None and not 0 < fov < 180:

@@ -31,6 +31,7 @@ from visup.percepts.video import VideoSource, open_source
 from visup.percepts.video.image_folder import image_names
 from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
 from visup.rules.activation.attention import AttentionReasoner
+from visup.rules.identity import VoteSettings
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import ReasonerSettings, default_reasoners
 from visup.runs.inputs.plugins import user_behaviours
@@ -297,6 +298,8 @@ def _reasoners(
     usual = ReasonerSettings()
     if settings.preset:
         usual = ReasonerSettings(objects=preset_named(settings.preset).objects)
+    if settings.vote_evidence is not None:
+        usual = replace(usual, votes=VoteSettings(evidence=settings.vote_evidence))
     interpreting = default_reasoners(usual, _rules(settings), traits=traits, early=settings.early)
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +15,17 @@ from hypothesis import strategies as st
 
 from tests.archive.recordings import meeting, record
 from tests.cli import Call, caller
-from visup.agent.model.errors import SourceError
+from tests.paths import ROOT
+from visup.agent.model.errors import SettingsError, SourceError
 from visup.archive.adding import add_run
 from visup.archive.lake import Lake
+from visup.commands.watch import watch_settings
 from visup.evaluation.archive.calibrating import read_truth, reliability
+from visup.evaluation.archive.vote_fitting import LabelledVotes, fitted_evidence
+from visup.rules.identity import VoteSettings
+from visup.runs.inputs.settings_file import fitted_settings
 from visup.runs.settings import WatchSettings
+from visup.runs.wiring import reasoning_agent
 
 pytest.importorskip("duckdb", reason="needs the extra `cluster`")
 pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
@@ -59,6 +68,78 @@ def test_what_is_no_truth_is_refused(tmp_path: Path, text: str, said: str) -> No
         read_truth(tmp_path / "none.csv")
 
 
+def figures_of(page: Path) -> list[dict[str, Any]]:
+    (held,) = re.findall(
+        r'id="figures">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL
+    )
+    found: list[dict[str, Any]] = json.loads(held)
+    return found
+
+
+def drawn_votes(evidence: float, count: int) -> list[LabelledVotes]:
+    """Objects that are what their votes say, as often as votes that tell so much say."""
+    rng, found = np.random.default_rng(5), []
+    for votes in rng.uniform(0, 3, (count, 3)):
+        named = {"arm": float(votes[0]), "cup": float(votes[1])}
+        of = LabelledVotes(named, float(votes[2]), "")
+        names = ("arm", "cup", "unknown object")
+        likely = [replace(of, truth=name).likelihood(evidence) for name in names]
+        assert sum(likely) == pytest.approx(1.0)
+        found.append(replace(of, truth=str(rng.choice(names, p=likely))))
+    return found
+
+
+@pytest.mark.parametrize("evidence", [0.7, 1.4, 3.0])
+def test_what_votes_tell_is_found_again(evidence: float) -> None:
+    assert fitted_evidence(drawn_votes(evidence, 600)) == pytest.approx(evidence, rel=0.15)
+
+
+def test_few_labels_change_little_and_fewer_nothing() -> None:
+    assert fitted_evidence(drawn_votes(2.2, 9)) is None
+    few = fitted_evidence([LabelledVotes({"arm": 2.0}, 1.0, "arm")] * 10)
+    assert few is not None
+    assert VoteSettings().evidence < few < 2 * VoteSettings().evidence
+
+
+def test_what_was_fitted_is_read_by_watch(tmp_path: Path) -> None:
+    path = tmp_path / "fit.toml"
+    path.write_text(fitted_settings(0.8, "Fitted.") + "[behaviours.lamp]\ncontrast = 4\n")
+    read = watch_settings("clip.mp4", {}, path)
+    assert (read.vote_evidence, read.plugin_settings) == (0.8, {"lamp": {"contrast": 4}})
+    sure = []
+    for settings in (WatchSettings("clip.mp4"), replace(read, plugin_settings={})):
+        agent = reasoning_agent(settings)
+        for seen in meeting(20):
+            agent.reason(seen)
+        sure.append(agent.mind.objects[2].confidence)
+    assert sure[1] < sure[0]
+
+
+def test_the_settings_of_the_page_are_some(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "archives.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "s.toml").write_text(text)
+    assert watch_settings("clip.mp4", {}, tmp_path / "s.toml").vote_evidence == 1.874
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("identity = 3", "`identity` holds something unknown"),
+        ("[identity]\nevidense = 3", "`identity` holds something unknown"),
+        ("[identity]\nevidence = true", "`evidence` is True"),
+        ("[identity]\nevidence = 0", "`evidence` of identities is 0"),
+        ("[identity]\nevidence = nan", "`evidence` of identities is nan"),
+        ("[identities]\nevidence = 1", "'identities' is unknown"),
+    ],
+)
+def test_a_settings_file_with_a_fault_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(SettingsError) as told:
+        watch_settings("clip.mp4", {}, tmp_path / "s.toml")
+    assert said in str(told.value)
+
+
 def test_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -79,5 +160,12 @@ def test_the_command(
     assert by_kind["identity"]["brier"] == pytest.approx(squares / 2)
     assert by_kind["verdict"]["right"] == 1.0
     assert "identity: 2 said, 50% right" in visup(*words).out
+    page, fit = tmp_path / "page.html", tmp_path / "fit.toml"
+    told = visup(*words, "--page", page, "--fit", fit)
+    assert "2 objects are labelled: from 10 on" in told.out
+    assert not fit.exists()
+    drawn = {f["id"]: f for f in figures_of(page)}
+    assert set(drawn) == {"reliability-identity", "reliability-verdict"}
+    assert drawn["reliability-verdict"]["data"][1]["y"] == [1.0]
     truth.write_text("source\nother.mp4\n")
     assert visup(*words).code == 2

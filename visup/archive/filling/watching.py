@@ -12,6 +12,7 @@ from pathlib import Path
 from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.storage.journal_reader import Recording
+from visup.archive.chunks.extending import chunk_options
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.plan import FailedClip, Job, put_aside
 from visup.archive.filling.stores import fetched, note_source
@@ -66,7 +67,9 @@ def watch_into(
     Raises:
         VisupError: It cannot be watched, or not all of it could be recorded.
     """
-    options = RunOptions(video=False, report=False, state_every_s=0.0, span=span)
+    options = RunOptions(video=False, report=False, state_every_s=0.0)
+    if span != (0, None):
+        options = chunk_options(*span)
     result = supervise(settings, folder, options=options)
     if not result.recorded:
         raise OutputError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +12,7 @@ from visup.agent.model.errors import OutputError
 from visup.agent.storage.atomic import write_whole
 from visup.archive.reporting.figures import all_figures, duration_figures, verdict_figure
 from visup.archive.reporting.statistics import LakeStatistics, StageDuration
+from visup.report.page.figures import Figure
 from visup.report.page.html import embedded, plotly_source, script_hash
 from visup.report.page.sections import figures
 from visup.wording import printable
@@ -26,8 +27,17 @@ def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
         ExtraMissingError: There are figures, and Plotly is not installed.
         OutputError: The file cannot be written.
     """
+    write_page(lake_page(found, lake), path)
+
+
+def write_page(page: str, path: Path) -> None:
+    """Write a page whole or not at all.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
     try:
-        write_whole(path, lake_page(found, lake).encode())
+        write_whole(path, page.encode())
     except OSError as fault:
         raise OutputError(
             f"the report cannot be written ({fault.strerror or fault})", where=str(path)
@@ -40,10 +50,6 @@ def lake_page(found: LakeStatistics, lake: Path) -> str:
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
     """
-    drawn = list(all_figures(found))
-    shared, own = files("visup.report.page"), files("visup.archive.reporting")
-    plotly = plotly_source() if drawn else ""
-    script = (shared / "figures.js").read_text(encoding="utf-8")
     text = {
         "title": escape(lake.absolute().name),
         "tiles": _tiles(found),
@@ -53,11 +59,28 @@ def lake_page(found: LakeStatistics, lake: Path) -> str:
         "actors": _duration_table(found.by_actor, "who played, or label"),
         "drifts": _drifts(found),
         "failures": _failures(found),
-        "figures": embedded(drawn),
     }
-    page = Template((own / "lake.html").read_text(encoding="utf-8"))
+    return filled_page("lake.html", text, list(all_figures(found)))
+
+
+def filled_page(template: str, text: Mapping[str, str], drawn: list[Figure]) -> str:
+    """A page that holds all that it shows.
+
+    Args:
+        template: Name of its file in this folder.
+        text: What stands in its places, as HTML.
+        drawn: All figures that it names.
+
+    Raises:
+        ExtraMissingError: There are figures, and Plotly is not installed.
+    """
+    shared, own = files("visup.report.page"), files("visup.archive.reporting")
+    plotly = plotly_source() if drawn else ""
+    script = (shared / "figures.js").read_text(encoding="utf-8")
+    page = Template((own / template).read_text(encoding="utf-8"))
     return page.substitute(
         {name: printable(words) for name, words in text.items()},
+        figures=printable(embedded(drawn)),
         style=(shared / "report.css").read_text(encoding="utf-8"),
         plotly=plotly,
         script=script,
@@ -87,7 +110,7 @@ def _duration_table(of: Sequence[StageDuration], group: str) -> str:
         for d in of
     ]
     head = (*((group,) if group else ()), *DURATION_HEAD)
-    return _table(head, rows, "No stage was followed.")
+    return html_table(head, rows, "No stage was followed.")
 
 
 def _drifts(found: LakeStatistics) -> str:
@@ -104,7 +127,7 @@ def _drifts(found: LakeStatistics) -> str:
         for d in found.drifts
     ]
     head = ("task", "stage", "first quarter", "last quarter", "change", "runs", "by chance")
-    return _table(head, rows, "No stage has become slower or faster, as far as can be told.")
+    return html_table(head, rows, "No stage has become slower or faster, as far as can be told.")
 
 
 def _failures(found: LakeStatistics) -> str:
@@ -114,10 +137,11 @@ def _failures(found: LakeStatistics) -> str:
         for f in found.failures
     ]  # fmt: skip
     head = ("stage that failed", "gravest alert", "runs", "of those that failed", "such as")
-    return _table(head, rows, "No run failed.")
+    return html_table(head, rows, "No run failed.")
 
 
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]], empty: str) -> str:
+def html_table(head: Iterable[str], rows: Iterable[Iterable[str]], empty: str) -> str:
+    """A table of texts, which are escaped; a sentence where there are no rows."""
     lines = "".join(f"<tr>{''.join(f'<td>{escape(c)}' for c in row)}" for row in rows)
     if not lines:
         return f"<p class=empty>{escape(empty)}</p>"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +12,7 @@ import typer
 from visup.archive.chunks.spans import SHORTEST_CHUNK_S, Cutting
 from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.parallel import Workers
+from visup.commands.archives.calibrate import calibrate
 from visup.commands.archives.lake_argument import Into, LakePlace
 from visup.commands.options import REPLAYED, Given, SettingsFile, takes
 from visup.commands.watch import watch_settings
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rich.console import Console
-    from rich.table import Table
 
     from visup.archive.filling.filling import FillResult
     from visup.archive.filling.plan import FailedClip, Plan
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from visup.archive.lake import Lake
     from visup.archive.replaying import RunChanges
     from visup.archive.storing.lake_store import LakeStore
-    from visup.evaluation.archive.calibrating import Reliability
 
 FILLED = (
     "tasks",
@@ -192,42 +191,7 @@ def compact(
     echo(f"{said}{gone}")
 
 
-@app.command("calibrate")
-def calibrate(
-    lake: LakePlace,
-    truth: Annotated[
-        Path,
-        typer.Option(metavar="FILE", help="What is true: source,verdict,objects,stages (CSV)."),
-    ],
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
-) -> None:
-    """Say how much confidences are worth: how often what was said so surely was right."""
-    from visup.archive.asking.database import open_database
-    from visup.archive.storing.places import open_lake
-    from visup.evaluation.archive.calibrating import read_truth, reliabilities
-    from visup.terminal.console import echo_json, make_console
-
-    with open_database(open_lake(lake)) as database:
-        found = reliabilities(database, read_truth(truth))
-    if as_json:
-        echo_json([asdict(one) for one in found])
-        return
-    console = make_console()
-    for one in found:
-        console.print(_reliability_table(one))
-
-
-def _reliability_table(one: Reliability) -> Table:
-    from visup.terminal.tables import table
-
-    shown = table("how often", "confidence", "right")
-    for b in one.bins:
-        shown.add_row(f"{b['count']:.0f}", f"{b['confidence']:.2f}", f"{b['right']:.2f}")
-    shown.title = (
-        f"{one.kind}: {one.count} said, {one.right:.0%} right,"
-        f" calibration error {one.error:.3f}, Brier {one.brier:.3f}"
-    )
-    return shown
+app.command("calibrate")(calibrate)
 
 
 @app.command("report")

@@ -29,6 +29,10 @@ def console(
     name: Annotated[
         list[str] | None, typer.Option(help="A name under which this machine is asked for.")
     ] = None,
+    save_to: Annotated[
+        Path | None,
+        typer.Option(help="Folder into which operators may save tasks, rules and zones."),
+    ] = None,
     open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
 ) -> None:
     """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
@@ -44,13 +48,10 @@ def console(
         from visup.console.state import ConsoleState
     except ModuleNotFoundError as missing:
         raise ExtraMissingError("the console", "console") from missing
-    if host not in LOOPBACK and OPERATOR_VARIABLE not in os.environ:
-        raise SettingsError(
-            f"at {host} others can reach the console",
-            expected=f"a token of your own in {OPERATOR_VARIABLE}",
-            hint="put a proxy with TLS before it, too: docs/console.md tells how",
-        )
-    state = ConsoleState(RunLibrary(places))
+    _check_reach(host)
+    if save_to is not None and not save_to.is_dir():
+        raise SettingsError("there is no such folder to save to", where=str(save_to))
+    state = ConsoleState(RunLibrary(places), save_to)
     access = _access((*LOOPBACK, host, *(name or ())))
     out = make_console(soft_wrap=True)
 
@@ -61,6 +62,18 @@ def console(
             webbrowser.open(address)
 
     serve_console(state, access, host, port, ready)
+
+
+def _check_reach(host: str) -> None:
+    """Refuse to be reached by others without a token that somebody chose."""
+    from visup.console.access import LOOPBACK
+
+    if host not in LOOPBACK and OPERATOR_VARIABLE not in os.environ:
+        raise SettingsError(
+            f"at {host} others can reach the console",
+            expected=f"a token of your own in {OPERATOR_VARIABLE}",
+            hint="put a proxy with TLS before it, too: docs/console.md tells how",
+        )
 
 
 def _access(hosts: tuple[str, ...]) -> Access:

@@ -14,17 +14,16 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
-from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
 from visup.commands.task.rule_names import rule_references, rule_rename_refused
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import TextFix, fix_of
-from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.tasks.actions.actions import known_actions
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.grammar.templates import called
 from visup.tasks.tools.editing import NameUse, name_at, names, references
+from visup.tasks.tools.rule_editing import rule_faults
 
 TOKEN_KINDS = ("class", "function", "variable", "keyword")
 _RULE = re.compile(r"^[ \t]*rule\s+(\w+)", re.MULTILINE)
@@ -42,19 +41,7 @@ def faults_of(document: TextDocument) -> list[Diagnostic]:
     """The mistakes of a document in either language."""
     if not holds_rules(document):
         return diagnose(document.source, file_of(document))[1]
-    try:
-        parse_rules(document.source, file_of(document))
-    except ErrorGroup as group:
-        return [_as_diagnostic(e) for e in group.errors]
-    except RuleError as error:
-        return [_as_diagnostic(error)]
-    return []
-
-
-def _as_diagnostic(error: VisupError) -> Diagnostic:
-    where = error.where
-    place = where if isinstance(where, SourceLocation) else SourceLocation(str(where or ""), 1, 1)
-    return Diagnostic(error.code or "", error.what, place, error.expected, error.hint)
+    return rule_faults(document.source, file_of(document))
 
 
 def code_actions(ls: LanguageServer, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:

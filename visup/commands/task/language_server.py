@@ -29,6 +29,7 @@ from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
 from visup.tasks.diagnostics.explain import explain
 from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at
+from visup.tasks.tools.rule_editing import rule_completions
 from visup.version import __version__
 
 KINDS = {
@@ -102,21 +103,11 @@ def _closed(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
 def _complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
     document = ls.workspace.get_text_document(params.text_document.uri)
     if holds_rules(document):
-        return _rule_words()
-    line, column = _from(document, params.position)
-    found = completions(document.source, _file(document), line, column)
+        found = list(rule_completions())
+    else:
+        line, column = _from(document, params.position)
+        found = completions(document.source, _file(document), line, column)
     return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
-
-
-def _rule_words() -> list[lsp.CompletionItem]:
-    words = {n: f"{', '.join(w.takes)}: {w.meaning}" for n, w in PREDICATES.items()}
-    words |= {n: f"{', '.join(w.takes)}: {w.meaning}" for n, w in QUANTITIES.items()}
-    kinds = lsp.CompletionItemKind
-    found = [lsp.CompletionItem(n, kind=kinds.Function, detail=a) for n, a in words.items()]
-    for kind, entries in ((kinds.Function, FUNCTIONS), (kinds.Keyword, KEYWORDS)):
-        said = ((w, ": ".join(entries[w])) for w in sorted(entries))
-        found += [lsp.CompletionItem(w, kind=kind, detail=text) for w, text in said]
-    return found
 
 
 def _rule_meaning(document: TextDocument, word: NameUse) -> str | None:

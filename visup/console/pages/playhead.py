@@ -66,6 +66,11 @@ class Playhead:
         smallest = min(here, key=lambda b: b.region.bbox[2] * b.region.bbox[3], default=None)
         self.choose(None if smallest is None else smallest.id)
 
+    def draw(self, corners: list[tuple[float, float]] | None = None) -> None:
+        """Have other corners of a zone drawn; none when left out."""
+        self.drawn = corners or []
+        self._tell()
+
     def choose(self, object_id: int | None) -> None:
         """Look at an object; at none when it was looked at already."""
         self.chosen = None if self.chosen == object_id else object_id

@@ -12,8 +12,10 @@ from visup.console.drawing.timeline_svg import timeline_svg
 from visup.console.pages.frame import button, clock, page_frame, shown_text, verdict_badge
 from visup.console.pages.panels.ask_panel import ask_panel
 from visup.console.pages.panels.belief_panel import belief_panel
+from visup.console.pages.panels.steps_panel import steps_panel
 from visup.console.pages.panels.told_panel import alerts_panel, events_panel
 from visup.console.pages.panels.try_panel import try_panel
+from visup.console.pages.panels.write_panel import write_panel
 from visup.console.pages.picture import RunPicture
 from visup.console.pages.playhead import SPEEDS, TICK_S, Playhead
 from visup.console.run_view import RunView
@@ -123,7 +125,7 @@ def _timeline(head: Playhead) -> None:
 
 
 def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
-    names = ("Now", "Told", "Alerts", "Ask", "Try")
+    names = ("Now", "Told", "Alerts", "Ask", "Steps", "Try", "Write")
     head.panel = names[0]
     with ui.tabs().props("dense align=left no-caps") as tabs:
         made = {name: ui.tab(name) for name in names}
@@ -136,8 +138,12 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
             alerts_panel(head, key, role)
         with ui.tab_panel(made["Ask"]):
             ask_panel(state, head, key)
+        with ui.tab_panel(made["Steps"]):
+            steps_panel(state, head, key)
         with ui.tab_panel(made["Try"]):
             try_panel(state, head, key, role)
+        with ui.tab_panel(made["Write"]):
+            write_panel(state, head, key, role)
     tabs.on_value_change(lambda e: head.open_panel(str(e.value)))
 
 

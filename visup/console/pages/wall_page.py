@@ -38,45 +38,56 @@ def wall_page(state: ConsoleState, role: ConsoleRole) -> None:
     """Lay out the wall; it looks anew every few seconds, and draws anew what has changed."""
     with page_frame("Cameras"):
         pass
-    shown: list[object] = [None, None]
-    wanted = AlertFilter()
-
-    @ui.refreshable
-    def tiles(found: Sequence[RunEntry] = ()) -> None:
-        with ui.element("div").classes("wall"):
-            for entry in found:
-                _tile(state, entry)
-        if not found:
-            ui.label("No camera is watched, and no run goes on.").classes("card w-full")
-
-    @ui.refreshable
-    def alerts(rows: Sequence[AlertRow] = ()) -> None:
-        for row in rows[:MOST_ROWS]:
-            moment = f"/run/{row.key}?t={row.alert.opened:.2f}"
-            show_alert(row, role, partial(ui.navigate.to, moment), look)
-        if not rows:
-            ui.label("No such alert.").classes("dim")
-
-    def look() -> None:
-        found = latest_by_camera(state.library.scan())[:MOST_TILES]
-        if shown[0] != (now := [(e.key, e.written, e.ended) for e in found]):
-            shown[0] = now
-            tiles.refresh(found)
-        rows = alert_rows(state, found, wanted)
-        if shown[1] != (told := [(r.key, r.alert, r.said) for r in rows]):
-            shown[1] = told
-            alerts.refresh(rows)
-
-    tiles()
+    wall = _Wall(state, role)
+    wall.tiles()
     with ui.element("section").classes("card w-full").props('aria-label="Alerts of all cameras"'):
         part_heading("Alerts")
-        _filter(wanted, look)
+        _filter(wall.wanted, wall.look)
         with (
             ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"')
         ):
-            alerts()
-    look()
-    ui.timer(REFRESH_S, look)
+            wall.alerts()
+    wall.look()
+    ui.timer(REFRESH_S, wall.look)
+
+
+class _Wall:
+    """What one page shows of all cameras, and what it showed last."""
+
+    def __init__(self, state: ConsoleState, role: ConsoleRole) -> None:
+        self.wanted = AlertFilter()
+        self._state, self._role = state, role
+        self._shown: tuple[object, object] = (None, None)
+
+    def look(self) -> None:
+        """Look anew."""
+        found = latest_by_camera(self._state.library.scan())[:MOST_TILES]
+        runs = [(e.key, e.written, e.ended) for e in found]
+        if self._shown[0] != runs:
+            self.tiles.refresh(found)
+        rows = alert_rows(self._state, found, self.wanted)
+        told = [(r.key, r.alert, r.said) for r in rows]
+        if self._shown[1] != told:
+            self.alerts.refresh(rows)
+        self._shown = runs, told
+
+    @ui.refreshable_method
+    def tiles(self, found: Sequence[RunEntry] = ()) -> None:
+        """A tile for each camera."""
+        with ui.element("div").classes("wall"):
+            for entry in found:
+                _tile(self._state, entry)
+        if not found:
+            ui.label("No camera is watched, and no run goes on.").classes("card w-full")
+
+    @ui.refreshable_method
+    def alerts(self, rows: Sequence[AlertRow] = ()) -> None:
+        """A row for each alert."""
+        for row in rows[:MOST_ROWS]:
+            moment = f"/run/{row.key}?t={row.alert.opened:.2f}"
+            show_alert(row, self._role, partial(ui.navigate.to, moment), self.look)
+        if not rows:
+            ui.label("No such alert.").classes("dim")
 
 
 def _filter(wanted: AlertFilter, look: Callable[[], None]) -> None:

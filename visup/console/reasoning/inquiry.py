@@ -8,12 +8,20 @@ frames, once, and goes on from there the next time.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
 from visup.agent import Mind
 from visup.agent.model.errors import SettingsError
+from visup.console.reasoning.debugging import (
+    FoundStop,
+    PhaseRecord,
+    phases_of,
+    searched,
+    stop_conditions,
+)
 from visup.rules.language.parser import parse_rules
 from visup.runs.replay import TranscriptDiff
 from visup.stepping import Stepper
@@ -82,6 +90,40 @@ class Inquiry:
         with self._lock:
             self._stepper.go(number)
             return self._stepper.mind
+
+    def next_stop(
+        self, number: int, words: Sequence[str], given_up: Callable[[], bool] = lambda: False
+    ) -> FoundStop:
+        """The next step after one at which a condition is met.
+
+        Args:
+            number: Of the step, from 1.
+            words: Conditions, as `break` in `visup step` takes them: `alert`, `rule NAME`, `stage NAME`,
+                `when gap(1, 2) < 20 px`.
+            given_up: Whether nobody waits any more.
+
+        Raises:
+            VisupError: Nothing is meant by one of them.
+        """
+        with self._lock:
+            self._stepper.go(number)
+            until = stop_conditions(self._stepper, words)
+        found, search = FoundStop(number), searched(self._stepper, number, until, given_up)
+        while True:
+            with self._lock:
+                place = next(search, None)
+            if place is None:
+                return found
+            found = place
+
+    def phases(self, number: int) -> tuple[PhaseRecord, ...]:
+        """What each phase of a step did.
+
+        Raises:
+            VisupError: There is no such step.
+        """
+        with self._lock:
+            return phases_of(self._stepper, number)
 
     def what_if(self, number: int, what: str, steps: int) -> AlternativeCourse:
         """How the run would have gone on from a step, had something been otherwise.

@@ -100,8 +100,12 @@ def read_truth(path: Path) -> dict[str, RunTruth]:
     }
 
 
-def reliabilities(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> tuple[Reliability, ...]:
-    """How much confidences are worth, by kind; those of which no truth is known are left out.
+def truth_by_run(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> Mapping[str, RunTruth]:
+    """The truth of the runs of a lake, by their keys.
+
+    Args:
+        database: The lake.
+        truth: By what was watched, or its name.
 
     Raises:
         SourceError: No run of the lake is among those whose truth is known.
@@ -118,6 +122,16 @@ def reliabilities(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> tupl
             "no run of the lake is in the file of the truth",
             expected="in its column `source` what was watched, such as clip.mp4",
         )
+    return known
+
+
+def reliabilities(database: LakeDatabase, known: Mapping[str, RunTruth]) -> tuple[Reliability, ...]:
+    """How much confidences are worth, by kind; those of which no truth is known are left out.
+
+    Args:
+        database: The lake.
+        known: The truth of its runs, by their keys.
+    """
     found = ((kind, list(_judged(database, kind, known))) for kind in KINDS)
     return tuple(reliability(kind, said) for kind, said in found if said)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,13 @@ from visup.archive.filling.watching import ClipOutcome
 from visup.archive.lake import Lake
 from visup.evaluation.figures import Progress
 from visup.evaluation.missions.runner import mission_settings
-from visup.evaluation.missions.scores import EVENT_TOLERANCE_S, precision_recall_f1
+from visup.evaluation.missions.scores import EVENT_TOLERANCE_S, SCORED_EVENTS, precision_recall_f1
 from visup.runs.replay import Line, Transcript, replay
 from visup.runs.wiring import open_video
 
 CHUNKS = 3
+EventCounts = tuple[int, int, int]
+"""Events alike, in excess, missed."""
 Beliefs = Mapping[int, Sequence[Region]]
 """Frame -> objects in sight, as regions with the ids of the objects."""
 
@@ -40,51 +43,71 @@ def compare_chunks(
         progress: Shows what is being done.
 
     Returns:
-        `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`;
+        `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`,
+        `scored_f1` of the kinds by which missions are scored;
         `verdicts` that differ; `longer`, by how much more frames are looked at in chunks, a share; `worst`
         mission by F1.
     """
-    scores: dict[str, tuple[int, int, int]] = {}
-    verdicts, looked, frames = 0, 0, 0
-    for mission in missions:
-        settings = mission_settings(mission, database)
-        with open_video(settings) as source:
-            count, fps = source.frame_count or 0, source.fps
-        cutting = Cutting(count / fps / CHUNKS)
-        spans = cutting.spans(settings)
-        looked += sum((s.end or count) - s.begin for s in spans)
-        frames += count
-        told = []
-        for name, how in (("whole", None), ("cut", cutting)):
-            progress(f"{mission.name}, {name}")
-            lake = Lake.create(place / f"{mission.name}-{name}")
-            clip = Clip(mission / "video.mp4", taken=0.0)
-            plan = make_plan(lake, [clip], settings, how)
-            fill(lake, plan, Pool(), _silent)
-            told.append(_told(lake))
-        (one, seen), (other, seen_again) = told
-        scores[mission.name] = matching_events(
-            one.events, other.events, same_objects(seen, seen_again)
-        )
-        verdicts += one.verdict != other.verdict
-        right, excess, missed = scores[mission.name]
-        progress(f"{mission.name}: {right} events alike, {excess} in excess, {missed} missed")
-    total = [sum(s[k] for s in scores.values()) for k in range(3)]
+    found = [_compared(place, mission, database, progress) for mission in missions]
+    right, excess, missed = _sums(one.counts for one in found)
     return {
         "missions": len(missions),
-        "events": total[0] + total[2],
-        "excess": total[1],
-        "missed": total[2],
-        "event_f1": precision_recall_f1(*total)[2],
-        "verdicts": verdicts,
-        "longer": looked / max(1, frames) - 1.0,
-        "worst": min(scores, key=lambda m: precision_recall_f1(*scores[m])[2], default=None),
+        "events": right + missed,
+        "excess": excess,
+        "missed": missed,
+        "event_f1": precision_recall_f1(right, excess, missed)[2],
+        "scored_f1": precision_recall_f1(*_sums(one.scored for one in found))[2],
+        "verdicts": sum(one.verdicts[0] != one.verdicts[1] for one in found),
+        "longer": sum(one.looked for one in found) / sum(one.frames for one in found) - 1.0,
+        "worst": min(found, key=lambda one: precision_recall_f1(*one.counts)[2]).mission,
     }
+
+
+@dataclass(frozen=True, slots=True)
+class _Compared:
+    """A mission unbroken and in chunks.
+
+    Attributes:
+        mission: Its name.
+        counts: Events alike, in excess, missed.
+        scored: The same of the kinds by which missions are scored.
+        verdicts: Of both.
+        frames: Of the video.
+        looked: How many frames the chunks have looked at, together.
+    """
+
+    mission: str
+    counts: EventCounts
+    scored: EventCounts
+    verdicts: tuple[str | None, str | None]
+    frames: int
+    looked: int
+
+
+def _compared(place: Path, mission: Path, database: Path, progress: Progress) -> _Compared:
+    settings = mission_settings(mission, database)
+    with open_video(settings) as source:
+        frames, seconds = source.frame_count or 0, (source.frame_count or 0) / source.fps
+    lakes = []
+    for name, cutting in (("whole", None), ("cut", Cutting(seconds / CHUNKS))):
+        progress(f"{mission.name}, {name}")
+        lake = Lake.create(place / f"{mission.name}-{name}")
+        plan = make_plan(lake, [Clip(mission / "video.mp4", taken=0.0)], settings, cutting)
+        fill(lake, plan, Pool(), _silent)
+        lakes.append(lake)
+    (one, seen), (other, seen_again) = map(_told, lakes)
+    same = same_objects(seen, seen_again)
+    counts = matching_events(one.events, other.events, same)
+    progress(f"{mission.name}: {counts[0]} events alike, {counts[1]} in excess, {counts[2]} missed")
+    spans = lakes[1].recorded(lakes[1].runs()[0])[0].facts()["chunks"]
+    looked = sum(last - first + 1 for first, last in spans)
+    scored = matching_events(_scored(one.events), _scored(other.events), same)
+    return _Compared(mission.name, counts, scored, (one.verdict, other.verdict), frames, looked)
 
 
 def matching_events(
     whole: Iterable[Line], cut: Iterable[Line], same: Mapping[int, int]
-) -> tuple[int, int, int]:
+) -> EventCounts:
     """How many events of a run in chunks are those of the unbroken one, in excess, missed.
 
     They are the same when kind, objects and what the details name agree, within a second; each counts once.
@@ -106,6 +129,15 @@ def matching_events(
             left.discard(min(near)[1])
     right = len(real) - len(left)
     return right, len(said) - right, len(left)
+
+
+def _scored(events: Iterable[Line]) -> list[Line]:
+    return [e for e in events if e["kind"] in SCORED_EVENTS]
+
+
+def _sums(counts: Iterable[EventCounts]) -> EventCounts:
+    right, excess, missed = map(sum, zip(*counts, strict=True))
+    return right, excess, missed
 
 
 def same_objects(whole: Beliefs, cut: Beliefs) -> dict[int, int]:

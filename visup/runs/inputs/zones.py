@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,21 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
         SettingsError: The file cannot be read, or is no such file.
         ManyErrors: More than one zone is not as it should be.
     """
-    entries, given = _entries(path)
+    return read_zones(_text(path), str(path))
+
+
+def read_zones(text: str, path: str) -> tuple[Zone, ...]:
+    """The zones of the text of a settings file; every fault of it is told at once.
+
+    Args:
+        text: TOML.
+        path: Its name, for messages.
+
+    Raises:
+        SettingsError: It is no such file.
+        ManyErrors: More than one zone is not as it should be.
+    """
+    entries, given = _entries(text, path)
     ground = _ground(given, path)
     h = None if ground is None else floor_map(ground)
     zones: list[Zone] = []
@@ -65,10 +80,21 @@ def load_ground(path: Path) -> Ground | None:
     Raises:
         SettingsError: The file cannot be read, or its ground is not as it should be.
     """
-    return _ground(_entries(path)[1], path)
+    return _ground(_entries(_text(path), str(path))[1], str(path))
 
 
-def _ground(given: object, path: Path) -> Ground | None:
+def zones_text(zones: Iterable[Zone]) -> str:
+    """A settings file with some zones, which `read_zones` reads back; those on the floor as they are seen."""
+    return "\n".join(map(_zone_text, zones))
+
+
+def _zone_text(zone: Zone) -> str:
+    corners = ", ".join(f"[{float(x)!r}, {float(y)!r}]" for x, y in zone.polygon)
+    depth = f"depth = [{', '.join(map(repr, zone.depth))}]\n" if zone.depth else ""
+    return f'[[zone]]\nname = "{zone.name}"\npolygon = [{corners}]\n{depth}'
+
+
+def _ground(given: object, path: str) -> Ground | None:
     if given is None:
         return None
     where, table = f"{path}, ground", given if isinstance(given, dict) else {}
@@ -87,26 +113,31 @@ def _ground(given: object, path: Path) -> Ground | None:
     return ground
 
 
-def _entries(path: Path) -> tuple[list[Any], object]:
+def _text(path: Path) -> str:
     try:
-        found = tomllib.loads(read_text_file(path))
+        return read_text_file(path)
     except OSError as fault:
         raise SettingsError(
             f"the zones cannot be read: {fault.strerror}", where=str(path)
         ) from fault
     except UnicodeDecodeError as fault:
         raise SettingsError("the file is not text", where=str(path), expected="TOML") from fault
+
+
+def _entries(text: str, path: str) -> tuple[list[Any], object]:
+    try:
+        found = tomllib.loads(text)
     except (ValueError, RecursionError) as fault:  # also numbers and tables beyond all bounds
-        raise SettingsError(f"this is not TOML: {fault}", where=str(path)) from fault
+        raise SettingsError(f"this is not TOML: {fault}", where=path) from fault
     entries, ground = found.pop("zone", None), found.pop("ground", None)
     if found:
         raise SettingsError(
-            f"'{next(iter(found))}' is not known here", where=str(path), expected="[[zone]]"
+            f"'{next(iter(found))}' is not known here", where=path, expected="[[zone]]"
         )
     if entries is None and ground is not None:
         return [], ground
     if not isinstance(entries, list) or not entries:
-        raise SettingsError("there is no zone in it", where=str(path), expected=_EXAMPLE)
+        raise SettingsError("there is no zone in it", where=path, expected=_EXAMPLE)
     return entries, ground
 
 

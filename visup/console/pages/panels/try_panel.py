@@ -1,4 +1,4 @@
-"""What if: another belief from the cursor on, or another task or other rules for the whole run."""
+"""What if: another belief from the cursor on; both courses side by side."""
 
 from __future__ import annotations
 
@@ -15,9 +15,7 @@ from visup.console.state import ConsoleState
 from visup.wording import prose
 
 ASSUMED = "object 2 satellite, touching 1 2 false, object 1 hidden"
-KINDS = {"task": "another task", "rules": "other rules"}
 MOST_LINES = 200
-LONGEST_TEXT = 100_000
 
 
 def try_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
@@ -41,12 +39,11 @@ def try_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) 
         answer.clear()
         if found is not None:  # the console is being stopped
             with answer:
-                _course(found, head)
+                show_course(found, head)
 
     _assume(
         lambda what, number: tried(lambda: state.inquiry(key).what_if(number, what, steps)), head
     )
-    _write(lambda kind, text: tried(lambda: state.inquiry(key).judged_by(kind, text, steps)))
     with (
         ui.element("div")
         .classes("scroll")
@@ -63,23 +60,7 @@ def _assume(begin: Callable[[str, int], Awaitable[None]], head: Playhead) -> Non
         worded_button("Try", lambda: begin(str(said.value or ""), head.number + 1), main=True)
 
 
-def _write(begin: Callable[[str, str], Awaitable[None]]) -> None:
-    with ui.expansion("Judge the whole run by another task or other rules").classes("w-full"):
-        kind = ui.select(KINDS, value="task").props('dense outlined aria-label="What is written"')
-        text = ui.codemirror("", language=None, theme="basicLight").classes("w-full")
-        text.style("height:200px")
-
-        async def judge() -> None:
-            written = str(text.value or "")
-            if len(written) > LONGEST_TEXT:
-                ui.notify(f"at most {LONGEST_TEXT} letters", type="negative")
-                return
-            await begin(str(kind.value), written)
-
-        worded_button("Judge", judge, main=True)
-
-
-def _course(course: AlternativeCourse, head: Playhead) -> None:
+def show_course(course: AlternativeCourse, head: Playhead) -> None:
     """What both courses tell, side by side."""
     was, would = (v or "none" for v in course.differs.verdicts)
     verdicts = f"verdict: {was}" if was == would else f"verdict: {was} → {would}"

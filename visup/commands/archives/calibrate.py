@@ -1,0 +1,101 @@
+"""`visup archive calibrate`: how much the confidences of a lake are worth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from visup.commands.archives.lake_argument import LakePlace
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.table import Table
+
+    from visup.archive.lake import Lake
+    from visup.evaluation.archive.calibrating import Reliability, RunTruth
+
+NOT_FITTED = "Nothing was fitted: --fit FILE does."
+
+
+def calibrate(
+    lake: LakePlace,
+    truth: Annotated[
+        Path,
+        typer.Option(metavar="FILE", help="What is true: source,verdict,objects,stages (CSV)."),
+    ],
+    page: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a page with reliability diagrams.")
+    ] = None,
+    fit: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TOML", help="Fit how much a vote tells; write settings for `visup watch`."
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+) -> None:
+    """Say how much confidences are worth: how often what was said so surely was right."""
+    from visup.archive.asking.database import open_database
+    from visup.archive.reporting.page import write_page
+    from visup.archive.storing.places import open_lake
+    from visup.evaluation.archive.calibrating import read_truth, reliabilities, truth_by_run
+    from visup.evaluation.archive.calibration_page import calibration_page
+    from visup.terminal.console import echo_json, make_console
+
+    opened = open_lake(lake)
+    with open_database(opened) as database:
+        known = truth_by_run(database, read_truth(truth))
+        found = reliabilities(database, known)
+    fitted = _fitted(opened, known, fit) if fit else NOT_FITTED
+    if page:
+        write_page(calibration_page(found, Path(lake), fitted), page)
+    if as_json:
+        echo_json([asdict(one) for one in found])
+        return
+    console = make_console()
+    for one in found:
+        console.print(_reliability_table(one))
+    for text in (fitted if fit else "", f"Page: {page}" if page else ""):
+        if text:
+            console.print(text, soft_wrap=True, markup=False)
+
+
+def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
+    """Fit what is meant to be fitted, and write it; what came of it, a sentence."""
+    from visup.agent.model.errors import OutputError
+    from visup.agent.storage.atomic import write_whole
+    from visup.evaluation.archive.vote_fitting import FEWEST, fitted_evidence, labelled_votes
+    from visup.rules.identity import VoteSettings
+    from visup.runs.inputs.settings_file import fitted_settings
+
+    labelled = list(labelled_votes(lake, known))
+    evidence = fitted_evidence(labelled)
+    if evidence is None:
+        return f"{len(labelled)} objects are labelled: from {FEWEST} on, how much a vote tells is fitted."
+    how = (
+        f"How much a vote for an identity tells, fitted to {len(labelled)} labelled objects;"
+        f" visup ships with {VoteSettings().evidence:g}."
+    )
+    try:
+        write_whole(path, fitted_settings(evidence, how).encode())
+    except OSError as fault:
+        said = fault.strerror or str(fault)
+        raise OutputError(f"the settings cannot be written ({said})", where=str(path)) from fault
+    return f"{how} Fitted: {evidence:.3f}, written to {path}."
+
+
+def _reliability_table(one: Reliability) -> Table:
+    from visup.terminal.tables import table
+
+    shown = table("how often", "confidence", "right")
+    for b in one.bins:
+        shown.add_row(f"{b['count']:.0f}", f"{b['confidence']:.2f}", f"{b['right']:.2f}")
+    shown.title = (
+        f"{one.kind}: {one.count} said, {one.right:.0%} right,"
+        f" calibration error {one.error:.3f}, Brier {one.brier:.3f}"
+    )
+    return shown

@@ -1,0 +1,91 @@
+"""A text field for tasks, rules and zones: mistakes are marked in it, and words put in where one writes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from nicegui import ui
+
+from visup.console.pages.frame import shown_text
+from visup.console.workbench.drafts import DraftFault, begun_word
+from visup.tasks.tools.editing import Completion
+
+WAIT_S = 2.0
+"""For the browser to say where one writes."""
+
+_NAMED = (
+    "(async () => {{ for (let k = 0; k < 50; k++) {{ const c = getElement({id});"
+    " if (c?.editor) {{ c.editor.contentDOM.setAttribute('aria-label', 'Text'); return; }}"
+    " await new Promise(r => setTimeout(r, 100)); }} }})()"
+)
+_PUT = (
+    "const e = getElement({id}).editor, h = e.state.selection.main.head, w = {word};"
+    " e.dispatch({{changes: {{from: h - {begun}, to: h, insert: w}},"
+    " selection: {{anchor: h - {begun} + w.length}}}}); e.focus();"
+)
+
+
+class DraftEditor:
+    """The text field."""
+
+    def __init__(self, text: str = "") -> None:
+        self.changed = True
+        self._field = ui.codemirror(text, language=None, line_wrapping=True)
+        self._field.classes("w-full editor").on_value_change(self._note)
+
+    @property
+    def text(self) -> str:
+        """What stands in it."""
+        return str(self._field.value or "")
+
+    @text.setter
+    def text(self, text: str) -> None:
+        self._field.set_value(text)
+
+    def _note(self) -> None:
+        self.changed = True
+
+    def name(self) -> None:
+        """Say what it is to those who cannot see it; again each time it is shown."""
+        ui.run_javascript(_NAMED.format(id=self._field.id))
+
+    def mark(self, faults: Sequence[DraftFault]) -> None:
+        """Mark the lines of mistakes; who points at one is told."""
+        last = self.text.count("\n") + 1
+        lines: dict[int, str] = {}
+        for fault in faults:
+            if 0 < fault.line <= last:
+                held = lines.get(fault.line)
+                lines[fault.line] = f"{held}\n{fault.text}" if held else fault.text
+        self._field.decorations = [
+            {"kind": "line", "line": n, "class": "fault-line"} for n in sorted(lines)
+        ]
+        self._field.line_tooltips = {n: shown_text(text) for n, text in lines.items()}
+
+    def show_line(self, line: int) -> None:
+        """Bring a line into view."""
+        if line:
+            self._field.reveal_line(line)
+
+    async def place(self) -> int:
+        """Before which letter one writes, from 0; the end where the browser does not say."""
+        code = f"getElement({self._field.id})?.editor?.state.selection.main.head"
+        try:
+            said = await ui.run_javascript(code, timeout=WAIT_S)
+        except TimeoutError:
+            said = None
+        units = self.text.encode("utf-16-le")  # the browser counts so
+        return len(
+            units[: 2 * said].decode("utf-16-le", "ignore") if isinstance(said, int) else self.text
+        )
+
+    async def put(self, word: Completion) -> None:
+        """Put a word in where one writes, in place of what is begun of it."""
+        before = self.text[: await self.place()]
+        begun = begun_word(before)
+        text = word.text
+        if text.startswith("<") and before[: len(before) - len(begun)].endswith("<"):
+            text = text[1:]
+        code = _PUT.format(id=self._field.id, word=json.dumps(text), begun=len(begun))
+        ui.run_javascript(code)

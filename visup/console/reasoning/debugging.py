@@ -1,0 +1,135 @@
+"""Where a run next does something, and what each phase of a step changes: `visup.stepping` for pages."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from visup.agent import Mind, Outcome
+from visup.agent.contract.phases import Phase
+from visup.agent.model.errors import SettingsError
+from visup.stepping import Stepper, parse_condition
+from visup.stepping.breakpoints import AnyStop, PhaseStop, StopCondition
+from visup.stepping.cursor import PausedStep
+from visup.stepping.diff import MindChange, mind_diff
+
+CHUNK = 100
+"""Steps at a time: in between, others may ask, and whoever waits may think better of it."""
+
+MOST_CONDITIONS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class FoundStop:
+    """Where a search ended.
+
+    Attributes:
+        number: Of the step.
+        reasons: Which conditions were met; empty where the run ended before, or it was given up.
+        ended: Whether there is nothing more.
+    """
+
+    number: int
+    reasons: tuple[str, ...] = ()
+    ended: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseRecord:
+    """What one phase of a step did.
+
+    Attributes:
+        phase: Which.
+        percepts: Kind -> how many, of what was perceived.
+        changes: What is believed otherwise than before the phase.
+        told: Sentences of its events.
+    """
+
+    phase: Phase
+    percepts: Mapping[str, int] = field(default_factory=dict)
+    changes: tuple[MindChange, ...] = ()
+    told: tuple[str, ...] = ()
+
+
+def stop_conditions(stepper: Stepper, words: Sequence[str]) -> AnyStop:
+    """One condition out of several, in the words of `break` in `visup step`.
+
+    Raises:
+        VisupError: Nothing is meant by one of them, or there is none.
+    """
+    given = [w.strip() for w in words if w.strip()]
+    if not 0 < len(given) <= MOST_CONDITIONS:
+        raise SettingsError(
+            f"there are {len(given)} conditions to stop at", expected=f"1 to {MOST_CONDITIONS}"
+        )
+    return AnyStop("; ".join(given), tuple(_condition(stepper, w) for w in given))
+
+
+def _condition(stepper: Stepper, words: str) -> StopCondition:
+    made = parse_condition(words, stepper.mind, stepper.names)
+    if isinstance(made, PhaseStop):
+        raise SettingsError(
+            f"'{words}' is over in every step", hint="the phases of a step are listed below"
+        )
+    return made
+
+
+def searched(
+    stepper: Stepper, number: int, until: AnyStop, given_up: Callable[[], bool]
+) -> Iterator[FoundStop]:
+    """Go on from a step until a condition is met; gives the place after each chunk, the last one found.
+
+    Args:
+        stepper: Of the run; others may move it between two chunks.
+        number: Of the step.
+        until: The condition.
+        given_up: Whether nobody waits any more.
+    """
+    at, found = number, False
+    while not found and not given_up():
+        if stepper.at != at or stepper.paused is not None:
+            stepper.go(at)
+        result = stepper.step(CHUNK, until)
+        at, found = stepper.at, bool(result.reasons) or result.ended
+        yield FoundStop(at, result.reasons, result.ended)
+
+
+def phases_of(stepper: Stepper, number: int) -> tuple[PhaseRecord, ...]:
+    """What each phase of a step did.
+
+    Args:
+        stepper: Of the run.
+        number: Of the step, from 1.
+
+    Raises:
+        SettingsError: There is no such step.
+    """
+    stepper.go(number)  # so that one that was not made yet is refused
+    stepper.go(number - 1)
+    mind, told, records = stepper.mind, 0, []
+    for phase in Phase:
+        result = stepper.step(1, until=phase)
+        if result.paused is None:
+            break
+        if (thought := result.paused.thought) is None:
+            records.append(_perceived(result.paused))
+            continue
+        records.append(_thought(phase, mind, thought, told))
+        mind, told = thought.mind, len(thought.events)
+    step = stepper.last
+    if step is not None and stepper.at == number:
+        changes = mind_diff(mind, step.mind).changes
+        texts = tuple(e.text for e in step.events[told:])
+        records.append(PhaseRecord(Phase.ACT, changes=changes, told=texts))
+    return tuple(records)
+
+
+def _perceived(paused: PausedStep) -> PhaseRecord:
+    kinds = Counter(p.kind for r in paused.seen.reports for p in r.percepts)
+    return PhaseRecord(Phase.PERCEIVE, dict(kinds))
+
+
+def _thought(phase: Phase, before: Mind, thought: Outcome, told: int) -> PhaseRecord:
+    texts = tuple(e.text for e in thought.events[told:])
+    return PhaseRecord(phase, changes=mind_diff(before, thought.mind).changes, told=texts)

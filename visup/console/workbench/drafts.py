@@ -1,0 +1,148 @@
+"""A text that is being written in the page: its mistakes, its tree, and the words that may stand in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from visup.agent import Zone
+from visup.agent.model.errors import ErrorGroup, TaskError, VisupError
+from visup.rules.language.diagnostics import Diagnostic
+from visup.rules.language.parser import parse_rules
+from visup.runs.inputs.zones import read_zones
+from visup.tasks.checks.diagnose import diagnose
+from visup.tasks.grammar.structure import tasks_of
+from visup.tasks.tools.editing import Completion, completions
+from visup.tasks.tools.outline import Branch, outline
+from visup.tasks.tools.rule_editing import rule_completions, rule_faults
+
+LONGEST_DRAFT = 100_000
+NAME = "the text"
+"""What messages call it."""
+
+
+class DraftKind(StrEnum):
+    """What is written."""
+
+    TASK = "task"
+    RULES = "rules"
+    ZONES = "zones"
+
+
+@dataclass(frozen=True, slots=True)
+class DraftFault:
+    """A mistake.
+
+    Attributes:
+        line: Where, from 1; 0 for the text as a whole.
+        text: What is wrong, what was expected, how to correct it.
+    """
+
+    line: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class DraftCheck:
+    """What there is to say of a text.
+
+    Attributes:
+        faults: Its mistakes, in their order.
+        tree: What it means, where it has none.
+        zones: Those that it draws.
+    """
+
+    faults: tuple[DraftFault, ...] = ()
+    tree: tuple[Branch, ...] = ()
+    zones: tuple[Zone, ...] = ()
+
+
+def check_draft(kind: DraftKind, text: str) -> DraftCheck:
+    """Check a text; an empty one is not wrong, but says nothing.
+
+    Args:
+        kind: What it is.
+        text: The text; it may include no other file, since it comes from a page.
+    """
+    if not text.strip():
+        return DraftCheck()
+    if len(text) > LONGEST_DRAFT:
+        return DraftCheck((DraftFault(0, f"it is too long: at most {LONGEST_DRAFT} letters"),))
+    if kind is DraftKind.TASK:
+        return _task(text)
+    return _rules(text) if kind is DraftKind.RULES else _zones(text)
+
+
+def _task(text: str) -> DraftCheck:
+    task, faults = diagnose(text, NAME, read=_no_other)
+    if faults:
+        return DraftCheck(_located(faults))
+    return DraftCheck(tree=tuple(outline(one) for one in tasks_of(task)))
+
+
+def _no_other(path: str, including: str) -> tuple[str, str]:
+    raise TaskError("what is written here cannot include another file", where=path[:80])
+
+
+def _rules(text: str) -> DraftCheck:
+    faults = rule_faults(text, NAME)
+    if faults:
+        return DraftCheck(_located(faults))
+    rules = parse_rules(text, NAME)
+    return DraftCheck(
+        tree=tuple(Branch(r.name, "stage", inside=(Branch(str(r.when), "action"),)) for r in rules)
+    )
+
+
+def _zones(text: str) -> DraftCheck:
+    try:
+        zones = read_zones(text, NAME)
+    except ErrorGroup as group:
+        return DraftCheck(tuple(DraftFault(0, str(e)) for e in group.errors))
+    except VisupError as fault:
+        return DraftCheck((DraftFault(0, str(fault)),))
+    tree = tuple(
+        Branch(z.name, "stage", inside=(Branch(f"{len(z.polygon)} corners", "words"),))
+        for z in zones
+    )
+    return DraftCheck(tree=tree, zones=zones)
+
+
+def _located(faults: Sequence[Diagnostic]) -> tuple[DraftFault, ...]:
+    return tuple(DraftFault(f.place.line, _said(f)) for f in faults)
+
+
+def _said(fault: Diagnostic) -> str:
+    expected = f"; expected: {fault.expected}" if fault.expected else ""
+    hint = f"; {fault.hint}" if fault.hint else ""
+    return f"{fault.message}{expected}{hint}"
+
+
+def words_at(kind: DraftKind, text: str, place: int) -> list[Completion]:
+    """What may stand at a place, with what is begun there already taken into account.
+
+    Args:
+        kind: What the text is.
+        text: The text.
+        place: Number of the letter before which it would stand, from 0.
+    """
+    if kind is DraftKind.ZONES or len(text) > LONGEST_DRAFT:
+        return []
+    before = text[: max(0, place)]
+    line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+    begun = begun_word(before)
+    found = (
+        completions(text, NAME, line, column)
+        if kind is DraftKind.TASK
+        else list(rule_completions())
+    )
+    return [c for c in found if c.text.strip("<>").startswith(begun.strip("<>"))]
+
+
+def begun_word(before: str) -> str:
+    """The word that is being written at the end of a text."""
+    length = 0
+    while length < len(before) and (before[-1 - length].isalnum() or before[-1 - length] == "_"):
+        length += 1
+    return before[len(before) - length :]

@@ -1,0 +1,52 @@
+"""Saving what was written in the page: into one folder that was named for it, under a plain name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from visup.agent.model.errors import OutputError, SettingsError
+from visup.agent.storage.atomic import write_whole
+from visup.console.workbench.drafts import DraftKind, check_draft
+
+ENDINGS = {DraftKind.TASK: ".task", DraftKind.RULES: ".rules", DraftKind.ZONES: ".toml"}
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
+
+
+def save_draft(folder: Path, kind: DraftKind, name: str, text: str, *, replace: bool) -> Path:
+    """Write a text that has no mistakes.
+
+    Args:
+        folder: Where.
+        kind: What it is, which gives the ending.
+        name: Of the file, without its ending.
+        text: The text.
+        replace: Whether a file of that name is written over.
+
+    Returns:
+        The file.
+
+    Raises:
+        SettingsError: The name or the text is not as it should be, or there is such a file.
+        OutputError: It cannot be written.
+    """
+    if not _NAME.fullmatch(name):
+        raise SettingsError(
+            "this is no name for a file here",
+            expected="letters, digits, hyphen and _, without an ending",
+        )
+    if not text.strip() or check_draft(kind, text).faults:
+        raise SettingsError(
+            "only a text without mistakes is saved", hint="correct what is listed below it"
+        )
+    path = folder / f"{name}{ENDINGS[kind]}"
+    if path.is_symlink() or (path.exists() and not (replace and path.is_file())):
+        raise SettingsError(
+            f"there is a file {path.name} already", hint="choose another name, or tick 'replace'"
+        )
+    try:
+        write_whole(path, text.encode() if text.endswith("\n") else f"{text}\n".encode())
+    except (OSError, UnicodeEncodeError) as fault:
+        said = getattr(fault, "strerror", None) or fault
+        raise OutputError(f"it cannot be saved: {said}", where=path.name) from fault
+    return path

@@ -1,0 +1,89 @@
+"""The page of a calibration: reliability diagrams, the same in numbers, and what was fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from visup.archive.reporting.figures import BAND, LINE
+from visup.archive.reporting.page import filled_page, html_table
+from visup.evaluation.archive.calibrating import Reliability
+from visup.report.page.figures import Figure, rounded
+from visup.report.page.sections import figures
+
+NUMBERS_HEAD = ("of", "said", "right", "calibration error", "Brier score")
+SMALLEST_PX, LARGEST_PX = 6.0, 24.0
+
+
+def calibration_page(found: Sequence[Reliability], lake: Path, fitted: str) -> str:
+    """The whole page; the same figures always give the same one.
+
+    Args:
+        found: How much the confidences of each kind are worth.
+        lake: The lake, for the title.
+        fitted: What was fitted, a sentence.
+
+    Raises:
+        ExtraMissingError: Plotly is not installed.
+    """
+    drawn = [reliability_figure(one) for one in found]
+    rows = [
+        (one.kind, f"{one.count:,}", f"{one.right:.0%}", f"{one.error:.3f}", f"{one.brier:.3f}")
+        for one in found
+    ]
+    text = {
+        "title": escape(lake.absolute().name),
+        "diagrams": figures(drawn, "Nothing was said of which the truth is known."),
+        "numbers": html_table(NUMBERS_HEAD, rows, "Nothing was said of which the truth is known."),
+        "fitted": escape(fitted),
+    }
+    return filled_page("calibration.html", text, drawn)
+
+
+def reliability_figure(one: Reliability) -> Figure:
+    """A reliability diagram: which share of what was said so surely is right."""
+    most = max(b["count"] for b in one.bins)
+    line = {
+        "type": "scatter",
+        "mode": "lines",
+        "name": "as good as said",
+        "x": [0, 1],
+        "y": [0, 1],
+        "line": {"color": BAND, "dash": "dot"},
+        "hoverinfo": "skip",
+    }
+    points = {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": one.kind,
+        "x": [rounded(b["confidence"]) for b in one.bins],
+        "y": [rounded(b["right"]) for b in one.bins],
+        "customdata": [b["count"] for b in one.bins],
+        "marker": {"size": [_size(b["count"] / most) for b in one.bins]},
+        "line": {"color": LINE},
+        "hovertemplate": "said %{x:.2f}, right %{y:.2f}, %{customdata:.0f} times<extra></extra>",
+    }
+    caption = (
+        f"{one.count:,} said, {one.right:.0%} right; calibration error {one.error:.3f},"
+        f" Brier score {one.brier:.3f}."
+    )
+    title = f"Confidences of the {one.kind}"
+    return Figure(f"reliability-{one.kind}", title, caption, [line, points], _layout())
+
+
+def _size(share: float) -> float:
+    """Diameter of a point, pixels, so that its area grows with its share."""
+    return rounded(SMALLEST_PX + (LARGEST_PX - SMALLEST_PX) * share**0.5)
+
+
+def _layout() -> dict[str, Any]:
+    axis = {"range": [0, 1], "zeroline": False}
+    return {
+        "height": 340,
+        "margin": {"l": 56, "r": 16, "t": 12, "b": 44},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
+        "xaxis": {**axis, "title": {"text": "confidence"}},
+        "yaxis": {**axis, "title": {"text": "share that is right"}},
+    }
