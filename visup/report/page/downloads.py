@@ -9,8 +9,9 @@ from html import escape
 from io import BytesIO, StringIO
 from typing import Any
 
+from visup.agent import Alert, Event
 from visup.report.page.summary import SEVERITY_WORDS, called
-from visup.report.records import RunData
+from visup.report.records import RunData, StateSpan
 
 Row = Mapping[str, Any]
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -26,49 +27,37 @@ def downloads(run: RunData) -> str:
 def tables_of(run: RunData) -> dict[str, list[Row]]:
     """The tables by name: events, alerts, stages, objects, distances; times in seconds of the source."""
     return {
-        "events": [
-            {
-                "time": e.time,
-                "kind": e.kind,
-                "severity": SEVERITY_WORDS[e.severity],
-                "text": e.text,
-            }
-            for e in run.events
-        ],
-        "alerts": [
-            {
-                "id": a.id,
-                "kind": a.kind,
-                "severity": SEVERITY_WORDS[a.severity],
-                "opened": a.opened,
-                "closed": a.closed,
-                "objects": "; ".join(called(run, i) for i in a.objects),
-                "cause": a.cause,
-            }
-            for a in run.alerts
-        ],
-        "stages": [
-            {
-                "task": s.subject[1],
-                "stage": s.subject[2],
-                "status": s.value,
-                "from": s.start,
-                "to": s.end,
-            }
-            for s in run.spans_about("stage")
-        ],
-        "objects": [
-            {
-                "id": o.id,
-                "name": o.name,
-                "share": o.share,
-                "first_seen": o.first_seen,
-                "last_seen": o.last_seen,
-            }
-            for o in run.objects
-        ],
+        "events": [_event(e) for e in run.events],
+        "alerts": [_alert(run, a) for a in run.alerts],
+        "stages": [_stage(s) for s in run.spans_about("stage")],
+        "objects": [{name: getattr(o, name) for name in OBJECT} for o in run.objects],
         "distances": list(_distances(run)),
     }
+
+
+OBJECT = ("id", "name", "share", "first_seen", "last_seen")
+
+
+def _event(one: Event) -> Row:
+    severity = SEVERITY_WORDS[one.severity]
+    return {"time": one.time, "kind": one.kind, "severity": severity, "text": one.text}
+
+
+def _alert(run: RunData, one: Alert) -> Row:
+    return {
+        "id": one.id,
+        "kind": one.kind,
+        "severity": SEVERITY_WORDS[one.severity],
+        "opened": one.opened,
+        "closed": one.closed,
+        "objects": "; ".join(called(run, i) for i in one.objects),
+        "cause": one.cause,
+    }
+
+
+def _stage(span: StateSpan) -> Row:
+    _, task, stage = span.subject
+    return {"task": task, "stage": stage, "status": span.value, "from": span.start, "to": span.end}
 
 
 def _distances(run: RunData) -> Iterator[Row]:
