@@ -13,7 +13,7 @@ import pytest
 
 from tests.archive.recordings import meeting, record
 from tests.console.evidence_files import keep_evidence
-from tests.console.test_runs import SETTINGS
+from tests.console.test_runs import SETTINGS, doubtful
 from tests.teaching.browser import Browser, found_browser
 from visup.api.recorded import open_run as open_run_of
 from visup.console.feedback import read_feedback
@@ -27,6 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("library")
     record(folder / "evening", meeting(), SETTINGS)
     record(folder / "<b>morning", meeting(30), SETTINGS)
+    record(folder / "who-is-it", doubtful(), SETTINGS)
     record(folder / "yard-run", meeting(), SETTINGS, ended=None, camera="yard")
     for name in ("evening", "yard-run"):
         for alert in open_run_of(folder / name).alerts:
@@ -65,12 +66,12 @@ LISTEN = (
 )
 
 
-def open_run(browser: Browser, address: str, token: str = OPERATOR) -> None:
+def open_run(browser: Browser, address: str, token: str = OPERATOR, name: str = "evening") -> None:
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     browser.open(f"{address}?token={token}")
-    browser.until("document.querySelectorAll('.runs tbody a').length == 3")
+    browser.until("document.querySelectorAll('.runs tbody a').length == 4")
     browser.value(
-        "[...document.querySelectorAll('.runs a')].find(a => a.innerText == 'evening').click()"
+        f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}').click()"
     )
     browser.until("document.querySelector('img.picture')?.complete")
     browser.until("document.querySelector('img.picture').naturalWidth > 0")
@@ -98,7 +99,7 @@ def shows(browser: Browser, text: str) -> None:
 def test_a_run_is_found_and_opened(browser: Browser, address: str) -> None:
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     browser.open(f"{address}?token={OPERATOR}")
-    browser.until("document.querySelectorAll('.runs tbody tr').length == 3")
+    browser.until("document.querySelectorAll('.runs tbody tr').length == 4")
     shows(browser, "<b>morning")
     assert "token" not in browser.value("location.href")
     browser.value("document.querySelector('input[aria-label=\"Search runs\"]').focus()")
@@ -257,6 +258,21 @@ def test_a_task_is_written_checked_tried_and_a_zone_is_drawn_and_saved(
     assert (zone.name, len(zone.polygon)) == ("dock", 3)
 
 
+def test_a_question_is_answered_to_see_what_would_have_followed(
+    browser: Browser, address: str
+) -> None:
+    open_run(browser, address, VIEWER, "who-is-it")
+    browser.press("End")
+    shows(browser, "Is object 1 the satellite or the arm?")
+    assert not browser.value("document.body?.innerText.includes('as if answered')")
+    open_run(browser, address, OPERATOR, "who-is-it")
+    browser.press("End")
+    shows(browser, "as if answered")
+    press(browser, "spartan")
+    shows(browser, "as if object 1 were said to be spartan")
+    assert violations(browser) == []
+
+
 def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
     browser: Browser, address: str, folder: Path
 ) -> None:
@@ -313,7 +329,7 @@ def violations(browser: Browser) -> list[str]:
 
 def test_everybody_can_use_it(browser: Browser, address: str) -> None:
     browser.open(f"{address}?token={OPERATOR}")
-    browser.until("document.querySelectorAll('.runs tbody a').length == 3")
+    browser.until("document.querySelectorAll('.runs tbody a').length == 4")
     assert violations(browser) == []
     open_run(browser, address)
     for name, text in (

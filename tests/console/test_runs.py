@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from tests.archive.recordings import meeting, record
+from tests.rules.scenes import box_region, seen
+from visup.agent import Observation
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
 from visup.console.library import RunLibrary, run_key
 from visup.console.pages.playhead import Playhead
 from visup.console.pages.wall_page import latest_by_camera
+from visup.console.questions import questions_at
 from visup.console.reasoning.inquiry import Inquiry
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
@@ -84,6 +87,29 @@ def test_answers_are_those_of_stepping(run: tuple[Path, Sequence[Step]]) -> None
     assert other.differs
     assert other.until == pytest.approx(5.9)
     assert not asked.what_if(60, "object 2 arm", 60).differs.new
+
+
+def doubtful(count: int = 60) -> Iterator[Observation]:
+    """A body that looks like two things, so that the operator is asked."""
+    for i in range(count):
+        region = box_region(1, (200 + i, 200, 80, 60))
+        alike = (0.8, 0.75) if i % 2 else (0.75, 0.8)
+        yield seen(i, [region], 10.0, {1: list(zip(("arm", "spartan"), alike, strict=True))})
+
+
+def test_an_answer_is_tried_as_if_the_operator_had_given_it(tmp_path: Path) -> None:
+    record(tmp_path / "a", doubtful(), SETTINGS)
+    view, asked = RunView(tmp_path / "a"), Inquiry(tmp_path / "a")
+    (question,) = questions_at(view.events, view.seconds)
+    assert set(question.names) == {"arm", "spartan"}
+    number = view.at(question.asked) + 1
+    course = asked.as_if_answered(number, 1, "spartan", 60)
+    told = [str(e["text"]) for e in course.differs.new]
+    assert any("operator says that object 1 is the satellite" in text for text in told)
+    for wrong in ((99, "arm"), (1, "nobody knows this")):
+        with pytest.raises(VisupError):
+            asked.as_if_answered(number, *wrong, 60)
+    assert asked.mind(60).answers == {}
 
 
 def test_a_run_is_judged_by_a_text_but_never_by_a_file(run: tuple[Path, Sequence[Step]]) -> None:

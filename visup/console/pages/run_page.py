@@ -131,7 +131,7 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
         made = {name: ui.tab(name) for name in names}
     with ui.tab_panels(tabs, value=made["Now"], animated=False).classes("w-full"):
         with ui.tab_panel(made["Now"]):
-            belief_panel(head)
+            belief_panel(state, head, key, role)
         with ui.tab_panel(made["Told"]):
             events_panel(head)
         with ui.tab_panel(made["Alerts"]):

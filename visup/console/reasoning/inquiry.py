@@ -145,6 +145,28 @@ class Inquiry:
             branch = here.branch(parse_assumption(here.mind, words, here.agent.models))
             return _course(" ".join(words), branch, steps - number)
 
+    def as_if_answered(
+        self, number: int, object_id: int, name: str, steps: int
+    ) -> AlternativeCourse:
+        """How the run would have gone on, had its operator said after a step who an object is.
+
+        Args:
+            number: Of the step, from 1.
+            object_id: The object.
+            name: A model, an actor, or 'unknown'.
+            steps: How many steps there are.
+
+        Raises:
+            VisupError: Nobody knows such an object or name.
+        """
+        with self._lock:
+            self._stepper.go(number)
+            branch = self._stepper.branch()
+            branch.answer(object_id, name)
+            return _course(
+                f"as if object {object_id} were said to be {name}", branch, steps - number
+            )
+
     def judged_by(self, kind: str, text: str, steps: int) -> AlternativeCourse:
         """How the whole run is judged by another task or other rules.
 

@@ -8,6 +8,7 @@ from nicegui import ui
 
 from visup.agent import Mind, ObjectBelief, Presence, TaskBelief
 from visup.agent.model.errors import VisupError
+from visup.console.access import ConsoleRole
 from visup.console.drawing.flow_svg import flow_svg, percent
 from visup.console.pages.frame import (
     OTHER_COLOUR,
@@ -17,15 +18,18 @@ from visup.console.pages.frame import (
     shown_text,
 )
 from visup.console.pages.panels.object_panel import Samples, show_object
+from visup.console.pages.panels.questions_panel import QuestionsPart
 from visup.console.pages.playhead import Playhead
+from visup.console.state import ConsoleState
 from visup.report.palette import STATUS_COLOURS, css, object_colour
 from visup.rules.wording.sentences import called, spaced
 
 MOST_OBJECTS = 30
 
 
-def belief_panel(head: Playhead) -> None:
+def belief_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     """Lay out the panel; it follows the cursor."""
+    QuestionsPart(state, head, key, role)
     known: dict[tuple[int, int], Samples] = {}
 
     @ui.refreshable
