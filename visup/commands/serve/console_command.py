@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import webbrowser
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -33,6 +35,9 @@ def console(
         Path | None,
         typer.Option(help="Folder into which operators may save tasks, rules and zones."),
     ] = None,
+    with_parent: Annotated[
+        bool, typer.Option(hidden=True, help="End when standard input does; cameras come first.")
+    ] = False,
     open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
 ) -> None:
     """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
@@ -54,6 +59,8 @@ def console(
     state = ConsoleState(RunLibrary(places), save_to)
     access = _access((*LOOPBACK, host, *(name or ())))
     out = make_console(soft_wrap=True)
+    if with_parent:
+        _end_with_parent()
 
     def ready(address: str) -> None:
         out.print(f"The console: {address}", markup=False, highlight=False)
@@ -62,6 +69,19 @@ def console(
             webbrowser.open(address)
 
     serve_console(state, access, host, port, ready)
+
+
+def _end_with_parent() -> None:
+    """End once standard input does, and leave the processor to cameras."""
+
+    def wait() -> None:
+        while os.read(0, 4096):
+            continue
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    Thread(target=wait, name="parent", daemon=True).start()
+    if hasattr(os, "nice"):
+        os.nice(5)
 
 
 def _check_reach(host: str) -> None:
