@@ -2,59 +2,27 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
-from tests.archive.recordings import meeting, record
-from tests.console.evidence_files import keep_evidence
-from tests.console.test_runs import SETTINGS, doubtful
+from tests.console.conftest import OPERATOR, VIEWER
 from tests.teaching.browser import Browser, found_browser
-from visup.api.recorded import open_run as open_run_of
 from visup.console.feedback import read_feedback
 from visup.runs.inputs.zones import load_zones
 
-OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
 
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("library")
-    record(folder / "evening", meeting(), SETTINGS)
-    record(folder / "<b>morning", meeting(30), SETTINGS)
-    record(folder / "who-is-it", doubtful(), SETTINGS)
-    record(folder / "yard-run", meeting(), SETTINGS, ended=None, camera="yard")
-    for name in ("evening", "yard-run"):
-        for alert in open_run_of(folder / name).alerts:
-            keep_evidence(folder / name, alert.id)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def address(folder: Path) -> Iterator[str]:
+@pytest.fixture
+def address(console: str) -> str:
     found_browser()
-    tokens = {"VISUP_CONSOLE_TOKEN": OPERATOR, "VISUP_CONSOLE_VIEWER_TOKEN": VIEWER}
-    command = [sys.executable, "-m", "visup.cli", "console", str(folder), "--port", "0"]
-    saved = folder.parent / "saved"
-    saved.mkdir(exist_ok=True)
-    command += ["--save-to", str(saved)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env={**os.environ, **tokens}
-    ) as process:
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert "token=" in line, line
-        yield line.split()[-1].partition("?")[0]
-        process.terminate()
+    return console
 
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[Browser]:
+    found_browser()
     with Browser(tmp_path / "profile", (1280, 860)) as browser:
         yield browser
         assert browser.value("window.troubles || []") == []

@@ -52,6 +52,17 @@ def test_only_who_changed_is_touched(tmp_path: Path) -> None:
     assert supervisor.closed_well
 
 
+@pytest.mark.parametrize(("cores", "cameras", "threads"), [(8, 2, 4), (2, 3, 1), (None, 1, 1)])
+def test_cameras_share_the_cores(
+    cores: int | None, cameras: int, threads: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    bench = Bench()
+    all_of_them = [site_camera(f"camera{n}") for n in range(cameras)]
+    SiteSupervisor(site(tmp_path, *all_of_them), bench.tell, bench.start).turn(0.0)
+    assert [c.job.threads for c in bench.children] == [threads] * cameras
+
+
 class Script:
     """A clock whose every tick does the next thing."""
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -131,7 +131,8 @@ def _cookie(text: str) -> str:
 async def _welcome(scope: Scope, send: Send, token: str) -> None:
     """Keep the token in a cookie that scripts cannot read, and take it out of the address."""
     kept = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
-    headers = [(b"location", scope["path"].encode()), (b"set-cookie", kept.encode())]
+    place = "/" + quote(scope["path"].lstrip("/\\"))  # two slashes would lead to another host
+    headers = [(b"location", place.encode()), (b"set-cookie", kept.encode())]
     await send({"type": "http.response.start", "status": 303, "headers": [*headers, *_SAFE]})
     await send({"type": "http.response.body", "body": b""})
 

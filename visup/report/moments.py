@@ -61,7 +61,13 @@ def sample_of(mind: Mind) -> Sample:
     }
     pairs = itertools.combinations(sorted(objects[:MOST_PAIRED], key=lambda b: b.id), 2)
     distances = {(a.id, b.id): _distance(mind, a, b) for a, b in pairs}
-    return Sample(mind.time, votes, {k: d for k, d in distances.items() if d is not None})
+    likely = {
+        b.id: {c.name: c.confidence for c in b.candidates[:MOST_CANDIDATES]}
+        for b in objects
+        if b.candidates
+    }
+    known = {k: d for k, d in distances.items() if d is not None}
+    return Sample(mind.time, votes, known, likely)
 
 
 def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:

@@ -32,12 +32,14 @@ class Sample:
     Attributes:
         time: Seconds.
         votes: Object id -> model name -> votes.
+        likelihoods: Object id -> model name -> how likely it is that, 0 to 1.
         distances: (smaller id, larger id) -> distance, for objects in view.
     """
 
     time: float
     votes: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     distances: Mapping[tuple[int, int], Distance] = field(default_factory=dict)
+    likelihoods: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
+import cv2
+
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError, VisupError
 from visup.agent.model.step import Step
@@ -104,6 +106,8 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
         job: What to do.
         pipe: To the supervisor.
     """
+    if job.threads is not None:
+        cv2.setNumThreads(job.threads)
     heart = Heartbeat(pipe)
     audience = Audience(
         observers=(heart,),

@@ -29,6 +29,7 @@ class CameraJob:
         folder: Of the run.
         resume: Whether the folder holds the run, and it goes on; else a new one is begun.
         fingerprint: As the camera is now; runs that follow go on under the same.
+        threads: That OpenCV may use; None for as many as there are cores.
     """
 
     settings: WatchSettings
@@ -36,6 +37,7 @@ class CameraJob:
     folder: Path
     resume: bool
     fingerprint: str = ""
+    threads: int | None = None
 
 
 class ReportKind(StrEnum):

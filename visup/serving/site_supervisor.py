@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError, VisupError
@@ -110,7 +112,13 @@ class SiteSupervisor:
     def _supervisor(self, name: str, site: Site) -> CameraSupervisor:
         (camera,) = (c for c in site.cameras if c.name == name)
         store = self._site.store  # one store for the whole life of a service
-        return CameraSupervisor(camera, store, self._tell, self._start)
+        return CameraSupervisor(camera, store, self._tell, _sharing(self._start, len(site.cameras)))
+
+
+def _sharing(start: Callable[[CameraJob], Child], cameras: int) -> Callable[[CameraJob], Child]:
+    """How cameras are started when they share the cores: threads in each other's way only cost time."""
+    threads = max(1, (os.cpu_count() or 1) // cameras)
+    return lambda job: start(replace(job, threads=threads))
 
 
 _CALM = (CameraState.WATCHING, CameraState.OVER)

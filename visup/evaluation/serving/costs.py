@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from itertools import cycle
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,8 +29,8 @@ WATCHED_S, BUSY_S = 60.0, 6.0
 def camera_costs(seed: int = 0) -> dict[str, float]:
     """Shares of a processor that one camera takes, 640x480 pixels at 5 frames a second.
 
-    Of each frame what is done is what the service does, but for decoding and the journal; time is that of
-    the processor, so that other work on the machine counts little.
+    Of each frame what is done is what the service does where there are as many cameras as cores, but for
+    decoding and the journal; time is that of the processor, so that other work on the machine counts little.
 
     Args:
         seed: Of the scene and the noise.
@@ -37,6 +38,7 @@ def camera_costs(seed: int = 0) -> dict[str, float]:
     Returns:
         `idle_cpu`, `idle_cpu_without_rest`, `busy_cpu`.
     """
+    cv2.setNumThreads(1)
     frames = scene(seed)
     rest_s = float(CameraTable.model_fields["rest_s"].default)
     return {

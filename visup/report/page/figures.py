@@ -43,14 +43,27 @@ class Figure:
 
 def vote_figures(run: RunData) -> list[Figure]:
     """Votes over time for each object that has any (paper, figure 9)."""
+    return [_candidate_figure(run, s, "votes", "votes") for s in _identified(run)]
+
+
+def likelihood_figures(run: RunData) -> list[Figure]:
+    """How likely each object is to be which model, over time."""
+    figures = [_candidate_figure(run, s, "likelihoods", "likelihood") for s in _identified(run)]
+    for figure in figures:
+        figure.layout["yaxis"] |= {"range": [0, 1.02], "autorange": False}
+    return figures
+
+
+def _identified(run: RunData) -> list[ReportedObject]:
+    """The objects that were compared with models, those longest in view."""
     voted = {i for s in run.samples for i in s.votes}
     subjects = [s for s in run.objects if s.id in voted]
     longest = sorted(subjects, key=lambda s: (s.first_seen - s.last_seen, s.id))[:MOST_FIGURES]
-    return [_vote_figure(run, s) for s in sorted(longest, key=lambda s: s.id)]
+    return sorted(longest, key=lambda s: s.id)
 
 
-def _vote_figure(run: RunData, subject: ReportedObject) -> Figure:
-    samples = [(s.time, s.votes.get(subject.id)) for s in run.samples]
+def _candidate_figure(run: RunData, subject: ReportedObject, series: str, word: str) -> Figure:
+    samples = [(s.time, getattr(s, series).get(subject.id)) for s in run.samples]
     peaks: dict[str, float] = {}
     for _, votes in samples:
         for name, value in (votes or {}).items():
@@ -59,14 +72,14 @@ def _vote_figure(run: RunData, subject: ReportedObject) -> Figure:
     shown = [n for n in best if peaks[n] > LEAST_VOTES][:MOST_CANDIDATES] or best[:1]
     traces = [_vote_trace(samples, name, i) for i, name in enumerate(shown)]
     left_out = len(peaks) - len(shown)
-    caption = f"Highest votes: {', '.join(f'{n} {peaks[n]:.2f}' for n in shown[:3])}"
+    caption = f"Highest {word}: {', '.join(f'{n} {peaks[n]:.2f}' for n in shown[:3])}"
     caption += f"; {left_out} weaker left out." if left_out else "."
     return Figure(
-        f"votes-{subject.id}",
+        f"{series}-{subject.id}",
         name_of(subject),
         caption,
         traces,
-        time_layout("votes", run, rangemode="tozero"),
+        time_layout(word, run, rangemode="tozero"),
     )
 
 
@@ -176,11 +189,11 @@ def time_layout(y_title: str, run: RunData, rangemode: str = "normal") -> dict[s
     grave = [a for a in run.alerts if a.severity > Severity.INFO]
     return {
         "height": 300,
-        "margin": {"l": 56, "r": 16, "t": 12, "b": 44},
+        "margin": {"l": 56, "r": 16, "t": 12, "b": 76},
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
+        "legend": {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0},
         "xaxis": {
-            "title": {"text": "time, s"},
+            "title": {"text": "time, s", "standoff": 6},
             "range": [0, max(run.duration, 1e-3)],
             "zeroline": False,
         },

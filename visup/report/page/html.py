@@ -5,22 +5,65 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from types import MappingProxyType
 
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.storage.atomic import write_whole
 from visup.report.page import sections
 from visup.report.page.distance_figures import distance_figures
-from visup.report.page.figures import Figure, presence_figure, stage_figure, vote_figures
+from visup.report.page.downloads import downloads
+from visup.report.page.figures import (
+    Figure,
+    likelihood_figures,
+    presence_figure,
+    stage_figure,
+    vote_figures,
+)
+from visup.report.page.lives import lives
+from visup.report.page.player import player
 from visup.report.page.summary import title_of, verdict_words
 from visup.report.page.task_trees import courses
 from visup.report.records import RunData
 from visup.wording import printable, prose
 
-SCRIPTS = ("figures.js", "report.js")
+PARTS: Mapping[str, Callable[[RunData], str]] = MappingProxyType(
+    {
+        "title": lambda run: escape(title_of(run)),
+        "verdict_word": lambda run: escape(verdict_words(run)[0]),
+        "source": lambda run: escape(run.source),
+        "verdict": sections.verdict_badge,
+        "notices": sections.notices,
+        "hero": sections.hero,
+        "narrative": sections.narrative,
+        "player": player,
+        "alert_filter": sections.alert_filter,
+        "alerts": sections.alerts,
+        "lives": lives,
+        "key_frames": sections.key_frames,
+        "tasks": sections.tasks,
+        "courses": courses,
+        "similarity": sections.similarity,
+        "downloads": downloads,
+        "facts": sections.run_facts,
+    }
+)
+"""Places of the page and what stands in them."""
+FIGURES: Mapping[str, tuple[Callable[[RunData], Sequence[Figure | None]], str]] = MappingProxyType(
+    {
+        "stages": (lambda run: [stage_figure(run)], "No stage was followed."),
+        "presence": (lambda run: [presence_figure(run)], "No object was followed."),
+        "distances": (distance_figures, "No two objects were in view together."),
+        "likelihoods": (likelihood_figures, "No object was identified."),
+        "votes": (vote_figures, "No object was identified."),
+    }
+)
+"""Figures in the order of the page, and what is said where there are none."""
+SCRIPTS = ("figures.js", "report.js", "cursor.js", "filters.js")
 
 
 def write_report(run: RunData, path: Path) -> None:
@@ -58,33 +101,15 @@ def report_page(run: RunData) -> str:
     Raises:
         ExtraMissingError: The run has figures, and Plotly is not installed.
     """
-    stages, presence = stage_figure(run), presence_figure(run)
-    distances, votes = distance_figures(run), vote_figures(run)
-    drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
+    made = {name: [f for f in make(run) if f] for name, (make, _) in FIGURES.items()}
+    drawn = [f for figures in made.values() for f in figures]
     own = files("visup.report.page")
     plotly = plotly_source() if drawn else ""
     script = "".join((own / name).read_text(encoding="utf-8") for name in SCRIPTS)
     page = Template((own / "report.html").read_text(encoding="utf-8"))
-    text = {
-        "title": escape(title_of(run)),
-        "verdict_word": escape(verdict_words(run)[0]),
-        "source": escape(run.source),
-        "verdict": sections.verdict_badge(run),
-        "notices": sections.notices(run),
-        "hero": sections.hero(run),
-        "narrative": sections.narrative(run),
-        "alerts": sections.alerts(run),
-        "key_frames": sections.key_frames(run),
-        "tasks": sections.tasks(run),
-        "courses": courses(run),
-        "stages": sections.figures([stages], "No stage was followed."),
-        "presence": sections.figures([presence], "No object was followed."),
-        "distances": sections.figures(distances, "No two objects were in view together."),
-        "votes": sections.figures(votes, "No object was identified."),
-        "similarity": sections.similarity(run),
-        "facts": sections.run_facts(run),
-        "figures": embedded(drawn),
-    }
+    text = {name: part(run) for name, part in PARTS.items()}
+    text |= {name: sections.figures(made[name], empty) for name, (_, empty) in FIGURES.items()}
+    text["figures"] = embedded(drawn)
     return page.substitute(
         {name: printable(prose(words)) for name, words in text.items()},
         style=(own / "report.css").read_text(encoding="utf-8"),

@@ -22,6 +22,10 @@ from visup.report.palette import OBJECT_COLOURS, css, object_colour
 from visup.report.records import KeyFrame, RegionCloseup, RunData
 
 MARKS = {Severity.INFO: "•", Severity.WARNING: "▲", Severity.CRITICAL: "◆"}
+FEWEST_FILTERED = 4
+"""Fewer alerts need no filter."""
+MANY_OBJECTS, FEW_FRAMES = 12, 8
+"""With more objects than so many the gallery has that few pictures."""
 MOST_COMPARED = 10
 """Key frames in the similarity table; the journal has all hypotheses."""
 
@@ -81,7 +85,8 @@ def narrative(run: RunData) -> str:
     """All sentences in order, each leading to the key frame nearest to it."""
     if not run.events:
         return "<p class=empty>Nothing happened that was worth telling.</p>"
-    lines = "".join(_told(run, e, nearest(run.key_frames, e)) for e in run.events)
+    shown = shown_frames(run)
+    lines = "".join(_told(run, e, nearest(shown, e)) for e in run.events)
     more = (
         f"<p class=empty>{run.events_left_out} later sentences are only in the journal.</p>"
         if run.events_left_out
@@ -110,7 +115,7 @@ def _told(run: RunData, event: Event, key: KeyFrame | None) -> str:
     mark = f'<span class=mark title="{word}" aria-label="{word}">{MARKS[event.severity]}</span>'
     text = f"{time}{mark}<span>{escape(event.text)}</span>"
     inside = f'<a href="#{_anchor(key)}">{text}</a>' if key else f"<div>{text}</div>"
-    return f'<li class="told {word}">{inside}</li>'
+    return f'<li class="told {word}" data-time="{event.time:.3f}">{inside}</li>'
 
 
 def alerts(run: RunData) -> str:
@@ -120,13 +125,37 @@ def alerts(run: RunData) -> str:
     return f"<ul class=alerts>{''.join(_alert(run, a) for a in run.alerts)}</ul>"
 
 
+def alert_filter(run: RunData) -> str:
+    """Choices that cut the list of alerts down, where there is more than one."""
+    if len(run.alerts) < FEWEST_FILTERED:
+        return ""
+    grave = sorted({a.severity for a in run.alerts}, reverse=True)
+    kinds = sorted({a.kind for a in run.alerts})
+    return (
+        "<div class=alert-filter hidden role=search aria-label='Filter alerts'>"
+        + _choice("Severity", [(SEVERITY_WORDS[s], SEVERITY_WORDS[s]) for s in grave])
+        + _choice("Kind", [(k, k.replace("_", " ")) for k in kinds])
+        + "<label><input type=checkbox> still open</label>"
+        + "<input type=search placeholder='words' aria-label='Words in the alert'><output></output></div>"
+    )
+
+
+def _choice(name: str, values: Iterable[tuple[str, str]]) -> str:
+    options = "".join(
+        f'<option value="{escape(v)}">{escape(words)}</option>' for v, words in values
+    )
+    return f'<select aria-label="{name}"><option value="">{name}: all</option>{options}</select>'
+
+
 def _alert(run: RunData, alert: Alert) -> str:
     word = SEVERITY_WORDS[alert.severity]
     until = "still open at the end" if alert.closed is None else f"closed at {alert.closed:.1f} s"
     who = "; ".join(called(run, i) for i in alert.objects)
+    opened = " data-open" if alert.closed is None else ""
     evidence = "".join(f"<li>{escape(e)}</li>" for e in alert.evidence)
     return (
-        f'<li class="alert {word}"><p class=alert-head><span class=tag>{word}</span> '
+        f'<li class="alert {word}" data-severity="{word}" data-kind="{escape(alert.kind)}"{opened}>'
+        f"<p class=alert-head><span class=tag>{word}</span> "
         f"<strong>{escape(alert.kind.replace('_', ' '))}</strong> "
         f"{_time(run, alert.opened, 'from ')}, {until}</p>"
         f"<p>{escape(alert.cause)}</p>"
@@ -140,7 +169,15 @@ def key_frames(run: RunData) -> str:
     """The annotated pictures, each a place that the narrative leads to."""
     if not run.key_frames:
         return "<p class=empty>No frame was seen.</p>"
-    return f"<div class=gallery>{''.join(_key_frame(run, k) for k in run.key_frames)}</div>"
+    return f"<div class=gallery>{''.join(_key_frame(run, k) for k in shown_frames(run))}</div>"
+
+
+def shown_frames(run: RunData) -> Sequence[KeyFrame]:
+    """The key frames of the gallery: where many objects come and go, their lives tell more."""
+    if len(run.objects) <= MANY_OBJECTS:
+        return run.key_frames
+    heaviest = sorted(run.key_frames, key=lambda k: (-k.weight, k.time))[:FEW_FRAMES]
+    return sorted(heaviest, key=lambda k: k.time)
 
 
 def _key_frame(run: RunData, key: KeyFrame) -> str:
@@ -219,7 +256,7 @@ def _figure(figure: Figure) -> str:
 
 def similarity(run: RunData) -> str:
     """The best hypotheses for each region at key frames (paper, figure 4)."""
-    compared = [k for k in run.key_frames if any(look.matches for look in k.looks)]
+    compared = [k for k in shown_frames(run) if any(look.matches for look in k.looks)]
     heaviest = sorted(compared, key=lambda k: (-k.weight, k.time))[:MOST_COMPARED]
     if not heaviest:
         return "<p class=empty>No region was compared with models; name a database of models.</p>"

@@ -160,7 +160,7 @@ class CameraTable(_Table):
         description="How long a stream that drops is tried again within a process.",
     )
     rest_s: float = Field(
-        default=4.0,
+        default=8.0,
         ge=0,
         le=60,
         description="Seconds between two looks for motion while nothing in the picture changes; 0 for none.",

@@ -1,0 +1,108 @@
+"""Tables of a run to download from its page: CSV, and Parquet where pyarrow is installed."""
+
+from __future__ import annotations
+
+import base64
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from io import BytesIO, StringIO
+from typing import Any
+
+from visup.agent import Alert, Event
+from visup.report.page.summary import SEVERITY_WORDS, called
+from visup.report.records import RunData, StateSpan
+
+Row = Mapping[str, Any]
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What a spreadsheet takes for a formula when a text begins with it."""
+
+
+def downloads(run: RunData) -> str:
+    """Links to the tables; they are in the page itself."""
+    items = "".join(_links(name, rows) for name, rows in tables_of(run).items() if rows)
+    return f"<p class=downloads>Download: {items}</p>" if items else ""
+
+
+def tables_of(run: RunData) -> dict[str, list[Row]]:
+    """The tables by name: events, alerts, stages, objects, distances; times in seconds of the source."""
+    return {
+        "events": [_event(e) for e in run.events],
+        "alerts": [_alert(run, a) for a in run.alerts],
+        "stages": [_stage(s) for s in run.spans_about("stage")],
+        "objects": [{name: getattr(o, name) for name in OBJECT} for o in run.objects],
+        "distances": list(_distances(run)),
+    }
+
+
+OBJECT = ("id", "name", "share", "first_seen", "last_seen")
+
+
+def _event(one: Event) -> Row:
+    severity = SEVERITY_WORDS[one.severity]
+    return {"time": one.time, "kind": one.kind, "severity": severity, "text": one.text}
+
+
+def _alert(run: RunData, one: Alert) -> Row:
+    return {
+        "id": one.id,
+        "kind": one.kind,
+        "severity": SEVERITY_WORDS[one.severity],
+        "opened": one.opened,
+        "closed": one.closed,
+        "objects": "; ".join(called(run, i) for i in one.objects),
+        "cause": one.cause,
+    }
+
+
+def _stage(span: StateSpan) -> Row:
+    _, task, stage = span.subject
+    return {"task": task, "stage": stage, "status": span.value, "from": span.start, "to": span.end}
+
+
+def _distances(run: RunData) -> Iterator[Row]:
+    for sample in run.samples:
+        for (a, b), distance in sample.distances.items():
+            yield {"time": sample.time, "a": a, "b": b, "gap_px": distance.gap}
+
+
+def _links(name: str, rows: Sequence[Row]) -> str:
+    made = {"csv": ("text/csv", csv_bytes(rows)), "parquet": (_PARQUET, parquet_bytes(rows))}
+    shown = (
+        f'<a download="{name}.{kind}" href="data:{mime};base64,{_base64(data)}">{kind}</a>'
+        for kind, (mime, data) in made.items()
+        if data is not None
+    )
+    return f"<span>{escape(name)} {' '.join(shown)}</span> "
+
+
+_PARQUET = "application/vnd.apache.parquet"
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")
+
+
+def csv_bytes(rows: Sequence[Row]) -> bytes:
+    """A table as CSV, UTF-8; no text in it is a formula to a spreadsheet."""
+    text = StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: _harmless(v) for k, v in row.items()} for row in rows)
+    return text.getvalue().encode()
+
+
+def _harmless(value: Any) -> Any:
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
+
+
+def parquet_bytes(rows: Sequence[Row]) -> bytes | None:
+    """A table as Parquet; None where pyarrow is not installed."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ModuleNotFoundError:
+        return None
+    place = BytesIO()
+    pq.write_table(pa.Table.from_pylist([dict(r) for r in rows]), place, compression="zstd")
+    return place.getvalue()
