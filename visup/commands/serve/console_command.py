@@ -21,6 +21,14 @@ OPERATOR_VARIABLE = "VISUP_CONSOLE_TOKEN"
 VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
 SHORTEST_TOKEN = 16
 
+SaveTo = Annotated[
+    Path | None,
+    typer.Option(help="Folder into which operators may save tasks, rules and zones."),
+]
+WithParent = Annotated[
+    bool, typer.Option(hidden=True, help="End when standard input does; cameras come first.")
+]
+
 
 def console(
     places: Annotated[
@@ -31,13 +39,8 @@ def console(
     name: Annotated[
         list[str] | None, typer.Option(help="A name under which this machine is asked for.")
     ] = None,
-    save_to: Annotated[
-        Path | None,
-        typer.Option(help="Folder into which operators may save tasks, rules and zones."),
-    ] = None,
-    with_parent: Annotated[
-        bool, typer.Option(hidden=True, help="End when standard input does; cameras come first.")
-    ] = False,
+    save_to: SaveTo = None,
+    with_parent: WithParent = False,
     open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
 ) -> None:
     """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
