@@ -29,14 +29,15 @@ def console_command(console: SiteConsole, store: Path) -> Sequence[str]:
     names = (part for name in console.names for part in ("--name", name))
     saved = () if console.save_to is None else ("--save-to", str(console.save_to))
     return (
-        *(sys.executable, "-m", "visup.cli", "console", str(store), "--with-parent"),
+        *(sys.executable, "-m", "visup.cli", "console", str(store)),
         *("--host", host, "--port", str(port), *names, *saved),
     )
 
 
 def console_environment(console: SiteConsole) -> Mapping[str, str]:
-    """Tokens, as the command takes them."""
+    """Tokens, as the command takes them; and that it shall end with its parent."""
     given = {
+        "VISUP_CONSOLE_WITH_PARENT": "1",
         "VISUP_CONSOLE_TOKEN": console.token,
         "VISUP_CONSOLE_VIEWER_TOKEN": console.viewer_token,
     }

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 OPERATOR_VARIABLE = "VISUP_CONSOLE_TOKEN"
 VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
+PARENT_VARIABLE = "VISUP_CONSOLE_WITH_PARENT"
+"""Set where another process begins it: it ends with that, and leaves the processor to cameras."""
+
 SHORTEST_TOKEN = 16
 
 SaveTo = Annotated[
     Path | None,
     typer.Option(help="Folder into which operators may save tasks, rules and zones."),
-]
-WithParent = Annotated[
-    bool, typer.Option(hidden=True, help="End when standard input does; cameras come first.")
 ]
 
 
@@ -40,7 +40,6 @@ def console(
         list[str] | None, typer.Option(help="A name under which this machine is asked for.")
     ] = None,
     save_to: SaveTo = None,
-    with_parent: WithParent = False,
     open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
 ) -> None:
     """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
@@ -62,7 +61,7 @@ def console(
     state = ConsoleState(RunLibrary(places), save_to)
     access = _access((*LOOPBACK, host, *(name or ())))
     out = make_console(soft_wrap=True)
-    if with_parent:
+    if os.environ.get(PARENT_VARIABLE):
         _end_with_parent()
 
     def ready(address: str) -> None:
