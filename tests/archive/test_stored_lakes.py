@@ -54,10 +54,10 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Machine:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Lake:
-    """The lake of three clips in a folder."""
+    """The lake of two clips in a folder."""
     place = tmp_path_factory.mktemp("whole")
     lake = Lake.create(place / "lake")
-    some = clips(place / "clips", "1", "2", "3")
+    some = clips(place / "clips", "1", "2")
     fill(lake, make_plan(lake, some, WatchSettings("")), Pool(), lambda outcome: None, scripted)
     return lake
 
@@ -74,7 +74,7 @@ def without_places(lake: Lake) -> dict[str, list[dict[str, Any]]]:
 def filled(place: str, folder: Path) -> Lake:
     lake, store = create_lake(place), store_of(place)
     assert store is not None
-    plan = make_plan(lake, clips(folder / "clips", "1", "2", "3"), WatchSettings(""))
+    plan = make_plan(lake, clips(folder / "clips", "1", "2"), WatchSettings(""))
     fill(lake, plan, Pool(), pushed(store, lake, lambda outcome: None), scripted)
     store.push(lake)
     return lake
@@ -97,7 +97,7 @@ def check_store(place: str, folder: Path, machine: Machine, whole: Lake) -> None
     again = open_lake(place)
     assert without_places(again) == without_places(whole)
     with open_database(again) as database:
-        assert database.ask("SELECT count(*) AS n FROM runs").to_pylist() == [{"n": 3}]
+        assert database.ask("SELECT count(*) AS n FROM runs").to_pylist() == [{"n": 2}]
 
 
 def test_a_lake_in_memory(tmp_path: Path, machine: Machine, whole: Lake) -> None:
@@ -118,7 +118,7 @@ def test_wherever_a_writer_stops_there_are_whole_runs_and_the_rest_comes(
     tmp_path: Path, machine: Machine, whole: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     send, expected, seen = lake_store._send, without_places(whole), set[int]()
-    for allowed in (16, 30):
+    for allowed in (16, 24):
         machine(f"writer-{allowed}")
         place, left = f"memory://{uuid4().hex}", iter(range(allowed))
 
@@ -157,7 +157,7 @@ def test_who_has_joined_meanwhile_is_not_overruled(tmp_path: Path, machine: Mach
         LakeStore(place).push(mine)
     machine("here")
     LakeStore(place).push(open_lake(place))
-    assert len(open_lake(place).runs()) == 3
+    assert len(open_lake(place).runs()) == 2
 
 
 @pytest.mark.parametrize("place", ["memory://nowhere", "nonsense://x/lake"])

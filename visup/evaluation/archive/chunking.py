@@ -1,9 +1,14 @@
-"""What it costs to cut a video into chunks: the events against those of the same video watched unbroken."""
+"""What it costs to cut a video into chunks: the events against those of the same video watched unbroken.
+
+How much of that is chance is told by the same video unbroken but for its first frame: whoever begins at
+another frame sees outlines that differ by some pixels, and what is near a threshold falls otherwise.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +21,7 @@ from visup.archive.filling.clips import Clip
 from visup.archive.filling.filling import fill
 from visup.archive.filling.plan import make_plan
 from visup.archive.filling.pool import Pool
-from visup.archive.filling.watching import ClipOutcome
+from visup.archive.filling.watching import ClipOutcome, Watch, watch_into
 from visup.archive.lake import Lake
 from visup.evaluation.figures import Progress
 from visup.evaluation.missions.runner import mission_settings
@@ -44,7 +49,8 @@ def compare_chunks(
 
     Returns:
         `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`,
-        `scored_f1` of the kinds by which missions are scored;
+        `scored_f1` of the kinds by which missions are scored, `shifted_f1` of the unbroken runs without
+        their first frame;
         `verdicts` that differ; `longer`, by how much more frames are looked at in chunks, a share; `worst`
         mission by F1.
     """
@@ -57,6 +63,7 @@ def compare_chunks(
         "missed": missed,
         "event_f1": precision_recall_f1(right, excess, missed)[2],
         "scored_f1": precision_recall_f1(*_sums(one.scored for one in found))[2],
+        "shifted_f1": precision_recall_f1(*_sums(one.shifted for one in found))[2],
         "verdicts": sum(one.verdicts[0] != one.verdicts[1] for one in found),
         "longer": sum(one.looked for one in found) / sum(one.frames for one in found) - 1.0,
         "worst": min(found, key=lambda one: precision_recall_f1(*one.counts)[2]).mission,
@@ -71,6 +78,7 @@ class _Compared:
         mission: Its name.
         counts: Events alike, in excess, missed.
         scored: The same of the kinds by which missions are scored.
+        shifted: Of all kinds, of the unbroken run without its first frame.
         verdicts: Of both.
         frames: Of the video.
         looked: How many frames the chunks have looked at, together.
@@ -79,6 +87,7 @@ class _Compared:
     mission: str
     counts: EventCounts
     scored: EventCounts
+    shifted: EventCounts
     verdicts: tuple[str | None, str | None]
     frames: int
     looked: int
@@ -88,21 +97,39 @@ def _compared(place: Path, mission: Path, database: Path, progress: Progress) ->
     settings = mission_settings(mission, database)
     with open_video(settings) as source:
         frames, seconds = source.frame_count or 0, (source.frame_count or 0) / source.fps
-    lakes = []
-    for name, cutting in (("whole", None), ("cut", Cutting(seconds / CHUNKS))):
+    ways: Mapping[str, tuple[Cutting | None, Watch]] = {
+        "whole": (None, watch_into),
+        "cut": (Cutting(seconds / CHUNKS), watch_into),
+        "shifted": (None, partial(watch_into, span=(1, None))),
+    }
+    lakes = {}
+    for name, (cutting, watch) in ways.items():
         progress(f"{mission.name}, {name}")
-        lake = Lake.create(place / f"{mission.name}-{name}")
+        lake = lakes[name] = Lake.create(place / f"{mission.name}-{name}")
         plan = make_plan(lake, [Clip(mission / "video.mp4", taken=0.0)], settings, cutting)
-        fill(lake, plan, Pool(), _silent)
-        lakes.append(lake)
-    (one, seen), (other, seen_again) = map(_told, lakes)
-    same = same_objects(seen, seen_again)
-    counts = matching_events(one.events, other.events, same)
+        fill(lake, plan, Pool(), _silent, watch)
+    counts, scored = _counted(lakes["whole"], lakes["cut"])
+    shifted, _ = _counted(lakes["whole"], lakes["shifted"])
     progress(f"{mission.name}: {counts[0]} events alike, {counts[1]} in excess, {counts[2]} missed")
-    spans = lakes[1].recorded(lakes[1].runs()[0])[0].facts()["chunks"]
-    looked = sum(last - first + 1 for first, last in spans)
-    scored = matching_events(_scored(one.events), _scored(other.events), same)
-    return _Compared(mission.name, counts, scored, (one.verdict, other.verdict), frames, looked)
+    facts, (row,) = _facts(lakes["cut"]), lakes["whole"].rows("runs")
+    looked = sum(last - first + 1 for first, last in facts["chunks"])
+    verdicts = row["verdict"], facts["verdict"]
+    return _Compared(mission.name, counts, scored, shifted, verdicts, frames, looked)
+
+
+def _counted(whole: Lake, other: Lake) -> tuple[EventCounts, EventCounts]:
+    """Events of two runs of a video compared: all, and those of the kinds by which missions are scored."""
+    (one, seen), (again, seen_again) = _told(whole), _told(other)
+    same = same_objects(seen, seen_again)
+    return (
+        matching_events(one.events, again.events, same),
+        matching_events(_scored(one.events), _scored(again.events), same),
+    )
+
+
+def _facts(lake: Lake) -> Mapping[str, Any]:
+    (run,) = lake.runs()
+    return lake.recorded(run)[0].facts()
 
 
 def matching_events(
