@@ -33,7 +33,13 @@ from visup.tasks.learning.order import (
     without,
 )
 from visup.tasks.learning.periods import Period, course_of, periods_of
-from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
+from visup.tasks.learning.relevance import (
+    AT_ONCE_S,
+    MEETINGS,
+    CourseEvent,
+    joined,
+    relevant,
+)
 from visup.tasks.learning.rests import Rest, rests_of
 from visup.tasks.learning.traces import RunTrace, Symbol
 
@@ -149,7 +155,8 @@ class _Draft:
         if not self.holding:
             return 0.0
         found = [event_of(row, occurrence) for row in self.rows]
-        if not all(e is not None and e.lasts for e in found):
+        # A meeting is over when it ends, or has lasted: nothing follows by which it would end.
+        if not all(e is not None and (e.lasts or e.symbol[0] in MEETINGS) for e in found):
             return 0.0
         shortest = min(e.happening.end - e.happening.begin for e in found if e is not None)
         return max(0.0, floor(2 * HELD_SHARE * min(shortest, LONGEST_HOLD_S)) / 2)
