@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from pydantic import BaseModel
@@ -126,6 +127,10 @@ def test_a_source_is_what_it_says(tmp_path: Path, written_as: str, read_as: str)
         ('[[camera]]\nname = "a"', 1, "'source' is missing"),
         (ONE + ONE.replace("cell", "CELL"), 5, "two cameras are called 'CELL'"),
         ("[limits]\nmemory = 3\n" + ONE, 2, "memory_mb"),
+        (f'[console]\nlisten = "8086"\ntoken = "{"t" * 20}"\n' + ONE, 2, "ADDRESS:PORT"),
+        ('[console]\nlisten = "127.0.0.1:8086"\n' + ONE, 1, "'token' is missing"),
+        ('[console]\nlisten = "127.0.0.1:8086"\ntoken = "short"\n' + ONE, 1, "too short"),
+        (f'[console]\nlisten = "a:8086"\ntoken = "{"t" * 20}"\nname = "a"\n' + ONE, 4, "'names'"),
         ("[[camera]", 1, "this is not TOML"),
         (ONE.replace("clip.avi", "rtsp://${NONE}/"), 1, "has no variable NONE"),
         (ONE.replace("clip.avi", "rtsp://${file:none}/"), 1, "cannot be read"),
@@ -181,6 +186,22 @@ def test_keys_of_webhooks_come_from_the_environment(tmp_path: Path) -> None:
     assert "has no variable" in str(fault)
 
 
+def test_the_console_has_its_tokens_from_the_environment(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    head = (
+        '[console]\nlisten = "0.0.0.0:8086"\ntoken = "${TOKEN}"\nnames = ["cell.example"]\n'
+        'save_to = "own"\n'
+    )
+    site = read_site(written(tmp_path, head + ONE), {"TOKEN": "swordfish-and-marlin"})
+    assert site.console is not None
+    assert site.console.listen == ("0.0.0.0", 8086)
+    assert site.console.token == "swordfish-and-marlin"
+    assert site.console.names == ("cell.example",)
+    assert site.console.save_to == tmp_path.resolve() / "own"
+    assert "swordfish" not in repr(site)
+    assert read_site(written(tmp_path, ONE)).console is None
+
+
 def test_the_schema_knows_every_key_of_a_camera() -> None:
     form = json.loads(schema_text())
     keys = form["$defs"]["CameraTable"]["properties"]
@@ -192,9 +213,10 @@ def test_the_schema_knows_every_key_of_a_camera() -> None:
 def test_the_page_has_every_key_and_its_example_is_a_site(tmp_path: Path) -> None:
     page = ROOT / "docs" / "serving.md"
     text = page.read_text(encoding="utf-8")
-    tables = [kind.annotation for kind in SiteTable.model_fields.values()]
+    given = [kind.annotation for kind in SiteTable.model_fields.values()]
+    tables = [one for kind in given for one in (kind, *get_args(kind))]
     own = [t for t in tables if isinstance(t, type) and issubclass(t, BaseModel)]
-    assert len(own) >= 6
+    assert len(own) >= 7
     every: list[type[BaseModel]] = [SiteTable, CameraTable, *own]
     for table in every:
         assert [key for key in table.model_fields if not re.search(rf"[`\[]{key}[`\]]", text)] == []

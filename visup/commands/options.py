@@ -22,7 +22,9 @@ Given = dict[str, Any]
 
 SettingsFile = Annotated[
     Path | None,
-    typer.Option("--settings", metavar="TOML", help="Settings, in tables [behaviours.NAME]."),
+    typer.Option(
+        "--settings", metavar="TOML", help="Settings, in tables [behaviours.NAME] and [identity]."
+    ),
 ]
 
 REPLAYED = ("tasks", "rules", "early", "at_end", "actors", "zones")

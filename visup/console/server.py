@@ -21,6 +21,9 @@ from visup.console.pages.wall_page import wall_page
 from visup.console.state import ConsoleState
 
 FAVICON = "◉"
+CLOSING_S = 1
+"""How long pages that are open may hold up its end, seconds."""
+
 _PICTURE = {"Cache-Control": "private, max-age=60", "X-Content-Type-Options": "nosniff"}
 _KINDS = {"jpg": "image/jpeg", "webm": "video/webm"}
 
@@ -102,7 +105,12 @@ def serve_console(
     with _listening(host, port) as listening:
         chosen = listening.getsockname()[1]
         name = f"[{host}]" if ":" in host else host
-        settings = uvicorn.Config(application, log_level=logging.WARNING, lifespan="on")
+        settings = uvicorn.Config(
+            application,
+            log_level=logging.WARNING,
+            lifespan="on",
+            timeout_graceful_shutdown=CLOSING_S,
+        )
         server = uvicorn.Server(settings)
         ready(f"http://{name}:{chosen}/?token={access.operator}")
         server.run(sockets=[listening])

@@ -8,6 +8,7 @@ from dataclasses import replace
 from visup.agent.model.errors import OutputError
 from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
+from visup.serving.console_process import ConsoleProcess
 from visup.serving.monitoring.endpoint import MonitoringServer
 from visup.serving.room.housekeeper import Housekeeper
 from visup.serving.site.records import Site
@@ -35,6 +36,8 @@ def serve(site: Site, tell: Tell, stop: StopRequest) -> ExitCode:
         stack.callback(spare.close)
         monitor = MonitoringFeed(site, tell)
         stack.callback(monitor.close)
+        console = ConsoleProcess(site.store, tell)
+        stack.callback(console.close)
         keeper = Housekeeper(site.store, site.retention, tell)
 
         def keep_house(supervisor: SiteSupervisor, now: float) -> None:
@@ -44,7 +47,7 @@ def serve(site: Site, tell: Tell, stop: StopRequest) -> ExitCode:
         def look(supervisor: SiteSupervisor, now: float) -> None:
             monitor.turn(supervisor, now, keeper)
 
-        beside = (keep_house, look, *((spare.turn,) if site.spare else ()))
+        beside = (keep_house, look, console.turn, *((spare.turn,) if site.spare else ()))
         return serve_site(site, tell, stop, spare.start, beside=beside)
 
 

@@ -35,6 +35,8 @@ class SiteEvent(StrEnum):
     NOT_MONITORED = "not_monitored"
     DELETED = "deleted"
     NO_ROOM = "no_room"
+    CONSOLE = "console"
+    CONSOLE_ENDED = "console_ended"
 
 
 _WARNINGS = frozenset(
@@ -48,6 +50,7 @@ _WARNINGS = frozenset(
         SiteEvent.NOT_RELOADED,
         SiteEvent.NOT_MONITORED,
         SiteEvent.NO_ROOM,
+        SiteEvent.CONSOLE_ENDED,
     }
 )
 

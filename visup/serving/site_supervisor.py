@@ -19,7 +19,7 @@ from visup.serving.monitoring.status import SiteStatus
 from visup.serving.reports import CameraJob
 from visup.serving.service_manager import notify_manager
 from visup.serving.site.reading import read_site
-from visup.serving.site.records import RetentionLimits, Site
+from visup.serving.site.records import RetentionLimits, Site, SiteConsole
 from visup.serving.site_log import SITE, SiteEvent, Tell
 
 TURN_S = 0.1
@@ -92,6 +92,11 @@ class SiteSupervisor:
     def limits(self) -> RetentionLimits:
         """What is kept of the store, as the site file says now."""
         return self._site.retention
+
+    @property
+    def console(self) -> SiteConsole | None:
+        """The console, as the site file says now."""
+        return self._site.console
 
     @property
     def calm(self) -> bool:

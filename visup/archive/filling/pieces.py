@@ -92,7 +92,8 @@ def watch_piece(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
         return _watch_chunk(lake, piece, piece.chunk, watch)
     if not piece.job.spans:
         return watch_job(lake, piece.job, watch)
-    journals = sorted(piece.folder(lake.path).glob(f"*/{JOURNAL}"))
+    chunks = (ClipPiece(piece.job, n) for n in range(len(piece.job.spans)))
+    journals = [chunk.folder(lake.path) / JOURNAL for chunk in chunks]
     outcome = watch_job(lake, piece.job, partial(stitch_into, journals=journals))
     if not outcome.failure:
         shutil.rmtree(piece.folder(lake.path), ignore_errors=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import webbrowser
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -17,7 +19,15 @@ if TYPE_CHECKING:
 
 OPERATOR_VARIABLE = "VISUP_CONSOLE_TOKEN"
 VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
+PARENT_VARIABLE = "VISUP_CONSOLE_WITH_PARENT"
+"""Set where another process begins it: it ends with that, and leaves the processor to cameras."""
+
 SHORTEST_TOKEN = 16
+
+SaveTo = Annotated[
+    Path | None,
+    typer.Option(help="Folder into which operators may save tasks, rules and zones."),
+]
 
 
 def console(
@@ -29,10 +39,7 @@ def console(
     name: Annotated[
         list[str] | None, typer.Option(help="A name under which this machine is asked for.")
     ] = None,
-    save_to: Annotated[
-        Path | None,
-        typer.Option(help="Folder into which operators may save tasks, rules and zones."),
-    ] = None,
+    save_to: SaveTo = None,
     open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
 ) -> None:
     """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
@@ -54,6 +61,8 @@ def console(
     state = ConsoleState(RunLibrary(places), save_to)
     access = _access((*LOOPBACK, host, *(name or ())))
     out = make_console(soft_wrap=True)
+    if os.environ.get(PARENT_VARIABLE):
+        _end_with_parent()
 
     def ready(address: str) -> None:
         out.print(f"The console: {address}", markup=False, highlight=False)
@@ -62,6 +71,19 @@ def console(
             webbrowser.open(address)
 
     serve_console(state, access, host, port, ready)
+
+
+def _end_with_parent() -> None:
+    """End once standard input does, and leave the processor to cameras."""
+
+    def wait() -> None:
+        while os.read(0, 4096):
+            continue
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    Thread(target=wait, name="parent", daemon=True).start()
+    if hasattr(os, "nice"):
+        os.nice(5)
 
 
 def _check_reach(host: str) -> None:

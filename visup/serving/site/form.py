@@ -83,6 +83,21 @@ class MonitoringTable(_Table):
     )
 
 
+class ConsoleTable(_Table):
+    """The console in the browser, in a process of its own beside the cameras; values may be placeholders."""
+
+    listen: str = Field(
+        pattern=r"^([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\]):[1-9][0-9]{0,4}$",
+        description="ADDRESS:PORT, such as 127.0.0.1:8086.",
+    )
+    token: str = Field(description="Lets in who may act; of at least 16 letters and digits.")
+    viewer_token: str | None = Field(default=None, description="Lets in who may only look.")
+    names: Names = Field(default=(), description="Names under which this machine is asked for.")
+    save_to: str | None = Field(
+        default=None, description="Folder into which tasks, rules and zones may be saved."
+    )
+
+
 class WebhooksTable(_Table):
     """How servers of webhooks know that records come from here; values may be placeholders."""
 
@@ -200,6 +215,9 @@ class SiteTable(_Table):
     )
     limits: LimitsTable = LimitsTable()
     webhooks: WebhooksTable = WebhooksTable()
+    console: ConsoleTable | None = Field(
+        default=None, description="Show all runs in the browser; without it nothing listens."
+    )
     camera: tuple[CameraTable, ...] = Field(
         description="One table [[camera]] for each camera.",
         json_schema_extra={"minItems": 1, "maxItems": MOST_CAMERAS},

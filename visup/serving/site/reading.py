@@ -7,7 +7,7 @@ import os
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -15,6 +15,7 @@ from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.agent.storage.text_file import read_text_file
 from visup.serving.site.camera_settings import camera_of
+from visup.serving.site.console_settings import address_of, console_of
 from visup.serving.site.form import MOST_CAMERAS, CameraTable, RetentionTable, SiteTable
 from visup.serving.site.records import RetentionLimits, Site
 from visup.serving.site.toml_lines import locate, syntax_location
@@ -46,25 +47,27 @@ def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
             faults.append(
                 SettingsError(fault.what, where=where, expected=fault.expected, hint=fault.hint)
             )
+    console = None
+    try:
+        console = console_of(table.console, path.resolve().parent, variables)
+    except VisupError as fault:
+        where = locate(text, ("console",), str(path))
+        faults.append(SettingsError(fault.what, where=where, expected=fault.expected))
     _refuse([*faults, *_miscounted(table, path), *_twins(table, text, path)])
     return Site(
         path,
         path.resolve().parent / Path(table.store).expanduser(),
         tuple(cameras),
         _retention(table.retention),
-        _listen(table.monitoring.listen),
+        address_of(table.monitoring.listen),
         table.limits.spare,
+        console,
     )
 
 
 def _retention(table: RetentionTable) -> RetentionLimits:
     store = None if table.store_gb is None else table.store_gb * 1e9
     return RetentionLimits(table.days, table.evidence_days, store, table.free_gb * 1e9)
-
-
-def _listen(address: str) -> tuple[str, int] | None:
-    host, colon, port = address.rpartition(":")
-    return (host.strip("[]"), int(port)) if colon else None
 
 
 def _text(path: Path) -> str:
@@ -167,8 +170,8 @@ def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
     if table[0] == "camera":
         return tuple(CameraTable.model_fields)
     kind = SiteTable.model_fields[str(table[0])].annotation
-    known = isinstance(kind, type) and issubclass(kind, BaseModel)
-    return tuple(kind.model_fields if known else SiteTable.model_fields)  # type: ignore[union-attr]
+    kinds = [k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, BaseModel)]
+    return tuple(kinds[0].model_fields if kinds else SiteTable.model_fields)
 
 
 def _miscounted(table: SiteTable, path: Path) -> Iterator[VisupError]:

@@ -61,6 +61,25 @@ class SiteCamera:
 
 
 @dataclass(frozen=True, slots=True)
+class SiteConsole:
+    """The console beside the cameras.
+
+    Attributes:
+        listen: Address and port.
+        token: Of those who may act.
+        viewer_token: Of those who may only look; None for nobody.
+        names: Under which this machine is asked for.
+        save_to: Folder into which operators may save what they write, or None.
+    """
+
+    listen: tuple[str, int]
+    token: str = field(repr=False)
+    viewer_token: str | None = field(default=None, repr=False)
+    names: tuple[str, ...] = ()
+    save_to: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Site:
     """All that one service watches.
 
@@ -71,6 +90,7 @@ class Site:
         retention: What is kept of the store.
         listen: Address and port where is told how the service does, or None.
         spare: Whether a process stands ready.
+        console: The console beside the cameras, or None.
     """
 
     path: Path
@@ -79,3 +99,4 @@ class Site:
     retention: RetentionLimits = field(default_factory=RetentionLimits)
     listen: tuple[str, int] | None = None
     spare: bool = True
+    console: SiteConsole | None = None

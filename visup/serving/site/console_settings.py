@@ -1,0 +1,64 @@
+"""The console of a site, as its table says it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from visup.agent.model.errors import SettingsError
+from visup.serving.site.form import ConsoleTable
+from visup.serving.site.placeholders import filled
+from visup.serving.site.records import SiteConsole
+
+SHORTEST_TOKEN = 16
+"""As of `visup console`."""
+
+
+def console_of(
+    table: ConsoleTable | None, folder: Path, environment: Mapping[str, str]
+) -> SiteConsole | None:
+    """The console of a site; None where it has none.
+
+    Args:
+        table: As it stands in the site file.
+        folder: Of the site file, from which names of files count.
+        environment: Variables that placeholders stand for.
+
+    Raises:
+        SettingsError: A token is too short, a placeholder cannot be replaced, or the folder is not there.
+    """
+    if table is None:
+        return None
+    address = address_of(table.listen)
+    assert address is not None  # the form wants one
+    viewer = table.viewer_token
+    return SiteConsole(
+        address,
+        _token(filled(table.token, environment, folder)),
+        None if viewer is None else _token(filled(viewer, environment, folder)),
+        table.names,
+        None if table.save_to is None else _existing(folder / Path(table.save_to).expanduser()),
+    )
+
+
+def address_of(listen: str) -> tuple[str, int] | None:
+    """Address and port out of `ADDRESS:PORT`; None out of nothing."""
+    host, colon, port = listen.rpartition(":")
+    return (host.strip("[]"), int(port)) if colon else None
+
+
+def _token(token: str) -> str:
+    if len(token) < SHORTEST_TOKEN or not token.isascii():
+        raise SettingsError(
+            "a token of the console is too short, or not of plain letters",
+            expected=f"at least {SHORTEST_TOKEN} letters and digits",
+        )
+    return token
+
+
+def _existing(folder: Path) -> Path:
+    if not folder.is_dir():
+        raise SettingsError(
+            f"there is no folder {folder} to save to", expected="one that the console may write to"
+        )
+    return folder
