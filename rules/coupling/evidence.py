@@ -45,6 +45,7 @@ class CouplingEvidence:
         apart_since: Since when they are apart.
         relative_track: How they have moved relative to each other since they are near.
         contact: Whether their outlines meet, and whether that is meant.
+        decoupled_at: Since when they are no longer coupled, if they were.
     """
 
     converged_at: float | None = None
@@ -53,6 +54,7 @@ class CouplingEvidence:
     apart_since: float | None = None
     relative_track: RelativeTrack | None = None
     contact: OutlineContact | None = None
+    decoupled_at: float | None = None
 
 
 COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
@@ -154,6 +156,8 @@ def coupling_cells(
             since[0, k] = coupled[seen.pair].since
         elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
             state[:, k] = UNKNOWN_CODE
+        elif (parted := kept[seen.pair].decoupled_at) is not None:
+            since[0, k] = parted
     return RelationBlock(COLUMNS, state, since, np.full((1, len(observed)), CONFIDENCE))
 
 

@@ -141,7 +141,7 @@ class CouplingReasoner:
                     del coupled[pair]
                     text = "{0} and {1} {are} no longer coupled."
                     events.append(_event("decoupled", text, pair, mind, observation))
-                    evidence = NO_EVIDENCE
+                    evidence = replace(NO_EVIDENCE, decoupled_at=mind.time)
             elif log is None and evidence.relative_track is None:
                 pass  # as nearly always: they are not near each other; the first condition
             elif decide(self._coupling(evidence, seen, mind), log, "coupled", pair):
@@ -149,7 +149,7 @@ class CouplingReasoner:
                 coupled[pair] = Coupling(pair, since)
                 text = "{0} and {1} {are} coupled."
                 events.append(_event("coupled", text, pair, mind, observation))
-                evidence = replace(evidence, apart_since=None)
+                evidence = replace(evidence, apart_since=None, decoupled_at=None)
             kept[pair] = evidence
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
         table = table.with_block(coupling_cells(observed, coupled, kept, mind))
@@ -188,6 +188,7 @@ class CouplingReasoner:
             _since(before.apart_since, apart, mind.time),
             track,
             contact,
+            before.decoupled_at,
         )
 
     def _follow(

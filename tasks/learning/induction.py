@@ -33,7 +33,13 @@ from visup.tasks.learning.order import (
     without,
 )
 from visup.tasks.learning.periods import Period, course_of, periods_of
-from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
+from visup.tasks.learning.relevance import (
+    AT_ONCE_S,
+    MEETINGS,
+    CourseEvent,
+    joined,
+    relevant,
+)
 from visup.tasks.learning.rests import Rest, rests_of
 from visup.tasks.learning.traces import RunTrace, Symbol
 
@@ -149,7 +155,8 @@ class _Draft:
         if not self.holding:
             return 0.0
         found = [event_of(row, occurrence) for row in self.rows]
-        if not all(e is not None and e.lasts for e in found):
+        # A meeting is over when it ends, or has lasted: nothing follows by which it would end.
+        if not all(e is not None and (e.lasts or e.symbol[0] in MEETINGS) for e in found):
             return 0.0
         shortest = min(e.happening.end - e.happening.begin for e in found if e is not None)
         return max(0.0, floor(2 * HELD_SHARE * min(shortest, LONGEST_HOLD_S)) / 2)
@@ -208,8 +215,8 @@ def learn_task(
     plan = plan_of(folded, core, partial(_at_once, rows))
     periods = periods_of(times, rows)
     draft = _Draft(name, plan, times, good, rows, declared or {}, periods=periods)
-    draft.rests = tuple(rests_of(good, draft.actors()))
     results = _tried(draft, dropped)
+    _ask_for_rests(draft, results)
     told = {r.name: _judge(draft, r) for r in bad}
     for run in bad:
         if told[run.name] is Verdict.SUCCEEDED:
@@ -226,9 +233,6 @@ def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
         task = parse_task(draft.text())
         found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
         refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
-        if any(j.verdict is Verdict.FAILED for j in refused) and draft.rests:
-            draft.rests = ()
-            continue
         if refused and draft.periods:
             draft.periods = {}
             continue
@@ -243,6 +247,13 @@ def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
             return {name: j.verdict for name, j in found.items()}
         dropped.append(f"{_said(blamed)}: a good run would be refused by it")
         draft.plan = plan
+
+
+def _ask_for_rests(draft: _Draft, results: Mapping[str, Verdict]) -> None:
+    """Who rests in all good runs must, unless one of them would be refused by it."""
+    draft.rests = tuple(rests_of(draft.runs, draft.actors()))
+    if {r.name: _judge(draft, r) for r in draft.runs if r.minds} != dict(results):
+        draft.rests = ()
 
 
 def _blamed(draft: _Draft, run: JudgedRun) -> Occurrence | None:

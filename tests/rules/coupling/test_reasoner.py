@@ -79,6 +79,15 @@ def test_coupled_bodies_that_part_are_decoupled() -> None:
     assert 7.0 < found[1][1] < 9.0
 
 
+def test_who_is_decoupled_is_so_since_one_moment() -> None:
+    """A stage that begins by it needs it to have lasted."""
+    thoughts = scene(lambda t: closing(t) if t < 7 else 180 + 15 * (t - 7))
+    ((_, at),) = (e for e in told(thoughts) if e[0] == "decoupled")
+    after = [t.mind.relation("coupled", 1, 2) for t in thoughts if t.mind.time >= at]
+    assert len(after) > 20
+    assert {(r.truth, r.since) for r in after if r is not None} == {(Truth.FALSE, at)}
+
+
 @pytest.mark.parametrize("parts_at", [None, 8.0])
 def test_regions_that_become_their_union_are_coupled(parts_at: float | None) -> None:
     """The two close in; from contact on there is one region, which keeps its shape."""
