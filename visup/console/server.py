@@ -122,6 +122,7 @@ def _listening(host: str, port: int) -> socket.socket:
         made = socket.socket(family, socket.SOCK_STREAM)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind((host, port))
+        made.listen()  # whoever is told the address may ask at once
     except (OSError, OverflowError) as fault:
         raise SettingsError(
             f"the console cannot listen at {host}:{port} ({fault})",
