@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
+from visup.agent.model.errors import ErrorGroup, OutputError, SourceLocation, VisupError
 from visup.console.library import RunLibrary
 from visup.console.reasoning.inquiry import Inquiry
 from visup.console.run_view import RunView
@@ -58,7 +59,21 @@ class ConsoleState:
         with self._lock:
             folder = self.library.folder(key)
         with self._asking:  # tasks, rules and models are loaded: other pages need not wait for that
-            return _kept(self._inquiries, key, lambda: Inquiry(folder), MOST_INQUIRIES)
+            return _kept(self._inquiries, key, lambda: _opened(folder), MOST_INQUIRIES)
+
+
+def _opened(folder: Path) -> Inquiry:
+    """What answers questions about a run; no line is quoted of a file that only its folder names.
+
+    A folder from a stranger may name any file as its task.
+    """
+    try:
+        return Inquiry(folder)
+    except VisupError as fault:
+        if not isinstance(fault, ErrorGroup) and not isinstance(fault.where, SourceLocation):
+            raise
+    what = "a file of tasks, rules or zones that the run names is not as it should be"
+    raise OutputError(what, where=folder.name, hint="`visup task check FILE` tells what is wrong")
 
 
 def _kept(held: OrderedDict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
