@@ -84,10 +84,10 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
     before = kept[0].time if kept else 0.0
     for mind in kept:
         names = names_of(mind)
-        for name, speed, moves in _motions(mind, names):
-            moved[name] = moved.get(name, 0.0) + (mind.time - before if moves else 0.0)
+        for actor, speed, moves in _motions(mind, names):
+            moved[actor] = moved.get(actor, 0.0) + (mind.time - before if moves else 0.0)
             if speed is not None:
-                speeds.setdefault(name, []).append((mind.time, speed))
+                speeds.setdefault(actor, []).append((mind.time, speed))
         before = mind.time
         named |= set(names.values())
         gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
@@ -104,7 +104,7 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         kept,
         frozenset(named - gone),
         moved,
-        {name: _sustained(row) for name, row in speeds.items()},
+        {actor: _sustained(row) for actor, row in speeds.items()},
         image_diagonal(kept[0].frame_size) if kept else 0.0,
     )
 

@@ -290,7 +290,7 @@ def test_a_camera_run_goes_on_with_new_numbers_and_later_times(
     images = moving_disc(40)
     stateless = RunOptions(video=False, report=False, state_every_s=0.0)
 
-    def camera(settings: WatchSettings) -> LiveSource:
+    def camera(settings: WatchSettings, span: object) -> LiveSource:
         clock = itertools.count(0.0, 0.05)
         return LiveSource("camera 0", FakeCapture(images, fps=20.0), clock=lambda: next(clock))
 

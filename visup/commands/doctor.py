@@ -44,7 +44,10 @@ EXTRAS = {
     "ros": ("the pictures of ROS 2 bags", ("rosbags",)),
     "rerun": ("the Rerun viewer", ("rerun-sdk",)),
     "tables": ("runs as pandas and Arrow tables", ("pandas", "pyarrow")),
-    "serve": ("figures of visup serve for Prometheus", ("prometheus-client",)),
+    "serve": (
+        "visup serve: mail, chat, and figures for Prometheus",
+        ("apprise", "prometheus-client"),
+    ),
     "console": ("visup console: runs in the browser", ("nicegui",)),
     "cluster": (
         "visup archive: tables of many runs",

@@ -31,7 +31,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     write_report(shown, folder / "report.html")
     with Browser(folder / "browser") as browser:
         browser.open((folder / "report.html").as_uri())
-        browser.until("document.querySelector('#cursor video').readyState >= 1")
+        browser.until("document.querySelector('#cursor video')?.readyState >= 1")
         yield browser
 
 

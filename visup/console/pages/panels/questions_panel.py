@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-from nicegui import run, ui
+from nicegui import ui
 
 from visup.agent import Question
 from visup.agent.cycle.answers import NOBODY
-from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.pages.frame import clock, part_heading, shown_text, worded_button
-from visup.console.pages.panels.try_panel import show_course
+from visup.console.pages.panels.try_panel import show_tried
 from visup.console.pages.playhead import Playhead
 from visup.console.questions import questions_at
 from visup.console.state import ConsoleState
@@ -58,23 +57,11 @@ class QuestionsPart:
                 worded_button(shown_text(shown), partial(self._try, question.object_id, name))
 
     async def _try(self, object_id: int, name: str) -> None:
-        number, steps, said = self._head.number + 1, len(self._head.run.frames), ""
-        self._answer.clear()
-        with self._answer:
-            ui.spinner(size="md")
-        inquiry = self._state.inquiry
-        try:
-            course = await run.io_bound(
-                lambda: inquiry(self._key).as_if_answered(number, object_id, name, steps)
-            )
-        except VisupError as fault:
-            course, said = None, str(fault)
-        if self._answer.is_deleted:  # the page was left meanwhile
-            return
-        self._answer.clear()
-        with self._answer:
-            if course is not None:
-                ui.label(shown_text(course.assumed)).classes("dim")
-                show_course(course, self._head)
-            elif said:
-                ui.label(shown_text(said)).classes("why")
+        number, steps = self._head.number + 1, len(self._head.run.frames)
+        inquiry, key = self._state.inquiry, self._key
+        await show_tried(
+            lambda: inquiry(key).as_if_answered(number, object_id, name, steps),
+            self._answer,
+            self._head,
+            assumed=True,
+        )

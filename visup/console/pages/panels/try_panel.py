@@ -25,25 +25,10 @@ def try_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) 
         return
     steps = len(head.run.frames)
 
-    async def tried(course: Callable[[], AlternativeCourse]) -> None:
-        answer.clear()
-        with answer:
-            ui.spinner(size="md")
-        try:
-            found = await run.io_bound(course)
-        except VisupError as fault:
-            answer.clear()
-            with answer:
-                ui.label(shown_text(str(fault))).classes("why")
-            return
-        answer.clear()
-        if found is not None:  # the console is being stopped
-            with answer:
-                show_course(found, head)
+    async def tried(what: str, number: int) -> None:
+        await show_tried(lambda: state.inquiry(key).what_if(number, what, steps), answer, head)
 
-    _assume(
-        lambda what, number: tried(lambda: state.inquiry(key).what_if(number, what, steps)), head
-    )
+    _assume(tried, head)
     with (
         ui.element("div")
         .classes("scroll")
@@ -60,7 +45,42 @@ def _assume(begin: Callable[[str, int], Awaitable[None]], head: Playhead) -> Non
         worded_button("Try", lambda: begin(str(said.value or ""), head.number + 1), main=True)
 
 
-def show_course(course: AlternativeCourse, head: Playhead) -> None:
+async def show_tried(
+    course: Callable[[], AlternativeCourse],
+    answer: ui.element,
+    head: Playhead,
+    *,
+    assumed: bool = False,
+) -> None:
+    """Think an alternative course through beside the page, and show it or why there is none.
+
+    Args:
+        course: Thinks it through.
+        answer: Where it is shown.
+        head: The cursor.
+        assumed: Whether to say what was assumed.
+    """
+    answer.clear()
+    with answer:
+        ui.spinner(size="md")
+    found, said = None, ""
+    try:
+        found = await run.io_bound(course)
+    except VisupError as fault:
+        said = str(fault)
+    if answer.is_deleted:  # the page was left meanwhile
+        return
+    answer.clear()
+    with answer:
+        if found is not None:
+            if assumed:
+                ui.label(shown_text(found.assumed)).classes("dim")
+            _show_course(found, head)
+        elif said:  # with neither, the console is being stopped
+            ui.label(shown_text(said)).classes("why")
+
+
+def _show_course(course: AlternativeCourse, head: Playhead) -> None:
     """What both courses tell, side by side."""
     was, would = (v or "none" for v in course.differs.verdicts)
     verdicts = f"verdict: {was}" if was == would else f"verdict: {was} → {would}"

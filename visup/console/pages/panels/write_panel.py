@@ -11,7 +11,7 @@ from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.pages.editor import DraftEditor
 from visup.console.pages.frame import shown_text, worded_button
-from visup.console.pages.panels.try_panel import show_course
+from visup.console.pages.panels.try_panel import show_tried
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
 from visup.console.workbench.drafts import DraftCheck, DraftKind, check_draft, words_at
@@ -130,29 +130,16 @@ class _Workbench:
     # On the run, and to a file
 
     async def _judge(self) -> None:
-        kind, text = self._kind, self.editor.text
-        self._answer.clear()
-        with self._answer:
-            if kind is DraftKind.ZONES:
+        kind, text, steps = self._kind, self.editor.text, len(self._head.run.frames)
+        if kind is DraftKind.ZONES:
+            self._answer.clear()
+            with self._answer:
                 ui.label("Save the zones, then: visup replay --zones FILE").classes("dim")
-                return
-            ui.spinner(size="md")
-        steps = len(self._head.run.frames)
-        said = ""
-        try:
-            course = await run.io_bound(
-                lambda: self._state.inquiry(self._key).judged_by(kind.value, text, steps)
-            )
-        except VisupError as fault:
-            course, said = None, str(fault)
-        if self._answer.is_deleted:  # the page was left meanwhile
             return
-        self._answer.clear()
-        with self._answer:
-            if course is not None:
-                show_course(course, self._head)
-            elif said:
-                ui.label(shown_text(said)).classes("why")
+        inquiry, key = self._state.inquiry, self._key
+        await show_tried(
+            lambda: inquiry(key).judged_by(kind.value, text, steps), self._answer, self._head
+        )
 
     def _saving(self) -> None:
         folder = self._state.save_to
