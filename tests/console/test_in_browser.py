@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
+from shutil import rmtree
 
 import pytest
 
+from tests.archive.recordings import record
 from tests.console.conftest import OPERATOR, VIEWER
+from tests.console.test_runs import SETTINGS, doubtful
 from tests.teaching.browser import Browser, found_browser
 from visup.console.feedback import read_feedback
+from visup.runs.inputs.answer_box import ANSWERS
 from visup.runs.inputs.zones import load_zones
 
 
@@ -239,6 +243,24 @@ def test_a_question_is_answered_to_see_what_would_have_followed(
     press(browser, "spartan")
     shows(browser, "as if object 1 were said to be spartan")
     assert violations(browser) == []
+
+
+def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: Path) -> None:
+    record(folder / "live", doubtful(), SETTINGS, ended=None)
+    try:
+        browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+        browser.open(f"{address}?token={OPERATOR}")
+        link = "[...document.querySelectorAll('.runs a')].find(a => a.innerText == 'live')"
+        browser.until(f"!!{link}")
+        browser.value(f"{link}.click()")
+        browser.until("document.querySelector('img.picture')?.naturalWidth > 0")
+        browser.press("End")
+        shows(browser, "answer:")
+        press(browser, "spartan")
+        shows(browser, "The run is told")
+        assert (folder / "live" / ANSWERS).read_text() == "1=spartan\n"
+    finally:
+        rmtree(folder / "live")
 
 
 def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(

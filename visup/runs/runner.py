@@ -19,6 +19,7 @@ from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.rules.safety.ending import open_rules
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.evidence.keeper import EvidenceKeeper
+from visup.runs.inputs.answer_box import AnswerBox
 from visup.runs.inputs.audience import Audience, RunFigures, RunProgress
 from visup.runs.inputs.preflight import check_cast, told_of_actors
 from visup.runs.inputs.run_folder import fresh_folder
@@ -215,7 +216,8 @@ class _Run:
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         # Evidence comes before who is told where it is.
         kept = (self._evidence,) if self._evidence else ()
-        others = (*audience.observers, *kept, self._sinks, *answering)
+        box = (AnswerBox(self._agent, lambda: self._folder, audience.notice),) if recording else ()
+        others = (*audience.observers, *kept, self._sinks, *answering, *box)
         clocked = (self._stamp,) if self.source.live else ()
         self._agent.observers = (self._alarms, *clocked, *recording, *others)
         for warning in self._warnings:

@@ -1,19 +1,25 @@
-"""What the run asked its operator: each answer is a button, and shows what would have followed from it."""
+"""What the run asked its operator: each answer is a button.
+
+While the run goes on it is told; and in any run one may see what would have followed from it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from nicegui import ui
 
 from visup.agent import Question
 from visup.agent.cycle.answers import NOBODY
+from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.pages.frame import clock, part_heading, shown_text, worded_button
 from visup.console.pages.panels.try_panel import show_tried
 from visup.console.pages.playhead import Playhead
 from visup.console.questions import questions_at
 from visup.console.state import ConsoleState
+from visup.runs.inputs.answer_box import put_answer
 
 
 class QuestionsPart:
@@ -50,11 +56,24 @@ class QuestionsPart:
                 self._buttons(question)
 
     def _buttons(self, question: Question) -> None:
+        if not self._head.run.ended:
+            self._row("answer:", question, self._say)
+        self._row("as if answered:", question, self._try)
+
+    def _row(self, what: str, question: Question, act: Callable[[int, str], object]) -> None:
         with ui.row().classes("gap-1 items-center under-line"):
-            ui.label("as if answered:").classes("dim")
+            ui.label(what).classes("dim")
             for name in (*question.names, NOBODY[0]):
                 shown = name.replace("_", " ") if name != NOBODY[0] else "none of them"
-                worded_button(shown_text(shown), partial(self._try, question.object_id, name))
+                worded_button(shown_text(shown), partial(act, question.object_id, name))
+
+    def _say(self, object_id: int, name: str) -> None:
+        try:
+            put_answer(self._head.run.folder, object_id, name)
+        except VisupError as fault:
+            ui.notify(shown_text(str(fault)), type="negative")
+            return
+        ui.notify("The run is told; it takes this up with its next frame.")
 
     async def _try(self, object_id: int, name: str) -> None:
         number, steps = self._head.number + 1, len(self._head.run.frames)

@@ -1,0 +1,105 @@
+"""Answers that come to a run from elsewhere, such as the console: lines in a file of its folder.
+
+Whoever answers appends `ID=NAME`; the run reads on after each step. The last word on an object holds,
+so that a run that goes on after a break does not take up again what it knows already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from visup.agent import Frame
+from visup.agent.cycle.agent import Agent
+from visup.agent.cycle.answers import resolve_model
+from visup.agent.model.errors import OutputError, VisupError
+from visup.agent.model.step import Step
+from visup.agent.storage.file_lock import only_writer
+from visup.agent.storage.text_file import read_bounded
+from visup.runs.operator import parse_answers
+
+ANSWERS = "answers.txt"
+LARGEST_FILE = 2**16
+"""Bytes of answers to one run; no more are kept."""
+
+
+def put_answer(folder: Path, object_id: int, name: str) -> None:
+    """Leave an answer for a run that goes on, in any process.
+
+    Args:
+        folder: Of the run.
+        object_id: The object.
+        name: A model, an actor, or 'unknown' for none of the models.
+
+    Raises:
+        SettingsError: The name cannot stand in such a line.
+        OutputError: The folder cannot be written, or holds too many answers already.
+    """
+    ((number, said),) = parse_answers([f"{object_id}={' '.join(name.split())}"]).items()
+    path = folder / ANSWERS
+    try:
+        with only_writer(path, "answers to this run"), path.open("a", encoding="utf-8") as out:
+            if out.tell() > LARGEST_FILE // 2:
+                raise OutputError("too many answers wait for this run", where=str(path))
+            out.write(f"{number}={said}\n")
+    except OSError as fault:
+        why = f"the answer cannot be kept: {fault.strerror}"
+        raise OutputError(why, where=str(path)) from fault
+
+
+class AnswerBox:
+    """An observer that gives an agent what is said in the folder of its run.
+
+    Args:
+        agent: The agent.
+        folder: Gives the folder, which changes when a run rolls over; None for none.
+        tell: Told what is wrong with a line.
+    """
+
+    def __init__(
+        self, agent: Agent, folder: Callable[[], Path | None], tell: Callable[[str], None] | None
+    ) -> None:
+        self._agent, self._folder, self._tell = agent, folder, tell
+        self._path: Path | None = None
+        self._read = 0
+        self._waiting: dict[int, str] = {}
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Take up what was said since, of objects that are known."""
+        for line in self._new_lines():
+            self._try(self._note, line)
+        for number in [i for i in self._waiting if i in self._agent.mind.objects]:
+            self._try(self._take, number, self._waiting.pop(number))
+
+    def _note(self, line: str) -> None:
+        self._waiting.update(parse_answers([line]))
+
+    def _take(self, number: int, name: str) -> None:
+        agent = self._agent
+        meant = resolve_model(agent.mind, name, agent.models, cast=agent.cast)
+        if agent.mind.answers.get(number) != meant:
+            agent.answer(number, name)
+
+    def _try(self, act: Callable[..., None], *given: object) -> None:
+        try:
+            act(*given)
+        except VisupError as fault:
+            if self._tell:
+                self._tell(str(fault))
+
+    def _new_lines(self) -> list[str]:
+        """Whole lines that were not read yet."""
+        folder = self._folder()
+        if folder is None:
+            return []
+        if (path := folder / ANSWERS) != self._path:
+            self._path, self._read = path, 0
+        try:
+            if path.stat().st_size == self._read:
+                return []
+            new = read_bounded(path, LARGEST_FILE)[self._read :]
+        except OSError:
+            return []  # nobody answered yet, or what lies there is no file of answers
+        whole = new[: new.rfind(b"\n") + 1]
+        self._read += len(whole)
+        return whole.decode("utf-8", errors="replace").splitlines()
