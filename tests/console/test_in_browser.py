@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from shutil import rmtree
@@ -12,6 +13,7 @@ import pytest
 from tests.archive.recordings import record
 from tests.console.conftest import OPERATOR, VIEWER
 from tests.console.test_runs import SETTINGS, doubtful
+from tests.paths import ROOT
 from tests.teaching.browser import Browser, found_browser
 from visup.console.feedback import read_feedback
 from visup.runs.inputs.answer_box import ANSWERS
@@ -42,11 +44,15 @@ def open_run(browser: Browser, address: str, token: str = OPERATOR, name: str = 
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     browser.open(f"{address}?token={token}")
     browser.until("document.querySelectorAll('.runs tbody a').length == 4")
-    browser.value(
-        f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}').click()"
-    )
-    browser.until("document.querySelector('img.picture')?.complete")
-    browser.until("document.querySelector('img.picture').naturalWidth > 0")
+    follow(browser, name)
+
+
+def follow(browser: Browser, name: str) -> None:
+    """Open a run from the list."""
+    link = f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}')"
+    browser.until(f"!!{link}")
+    browser.value(f"{link}.click()")
+    browser.until("document.querySelector('img.picture')?.naturalWidth > 0")
 
 
 def tab(browser: Browser, name: str) -> None:
@@ -250,10 +256,7 @@ def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: 
     try:
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
         browser.open(f"{address}?token={OPERATOR}")
-        link = "[...document.querySelectorAll('.runs a')].find(a => a.innerText == 'live')"
-        browser.until(f"!!{link}")
-        browser.value(f"{link}.click()")
-        browser.until("document.querySelector('img.picture')?.naturalWidth > 0")
+        follow(browser, "live")
         browser.press("End")
         shows(browser, "answer:")
         press(browser, "spartan")
@@ -261,6 +264,28 @@ def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: 
         assert (folder / "live" / ANSWERS).read_text() == "1=spartan\n"
     finally:
         rmtree(folder / "live")
+
+
+def test_why_an_object_looks_like_a_model_is_shown(
+    browser: Browser, address: str, folder: Path
+) -> None:
+    models = ROOT / "visup" / "data" / "demo.models"
+    record(folder / "alike", doubtful(), replace(SETTINGS, models=models))
+    try:
+        browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+        browser.open(f"{address}?token={VIEWER}")
+        follow(browser, "alike")
+        browser.press("End")
+        shows(browser, "frame 59")
+        browser.until("!!document.querySelector('[aria-label=\"who object 1 is\"]')")
+        browser.value("document.querySelector('[aria-label=\"who object 1 is\"]').click()")
+        press(browser, "Beside the views")
+        browser.until("document.querySelector('.likeness img')?.naturalWidth > 1000")
+        assert violations(browser) == []
+        press(browser, "Close")
+        browser.until("!document.querySelector('.likeness')")
+    finally:
+        rmtree(folder / "alike")
 
 
 def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(

@@ -20,6 +20,7 @@ from visup.console.drawing.pictures import RunPictures, jpeg
 from visup.console.recorded_mind import recorded_mind
 from visup.console.run_files import flows_of, zones_of
 from visup.console.tracks import TimelineTrack, tracks_of
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.report.annotate import annotate
 from visup.runs.settings import WatchSettings
 from visup.tasks.tools.diagram import Flow
@@ -125,6 +126,16 @@ class RunView:
             return None
 
     @cached_property
+    def models(self) -> ModelDatabase | None:
+        """What its objects were compared with; None where that was nothing.
+
+        Raises:
+            DatabaseError: They cannot be read.
+        """
+        named = self.settings.models if self.settings else None
+        return ModelDatabase.open(named) if named else None
+
+    @cached_property
     def flows(self) -> Mapping[str, Flow]:
         """Task -> what follows what in it."""
         return flows_of(self.settings)
@@ -169,14 +180,18 @@ class RunView:
 
     def looks(self, number: int, object_id: int) -> tuple[Hypothesis, ...]:
         """What an object was last found to look like, the most alike first; empty where nobody looked."""
+        return self.last_look(number, object_id)[1]
+
+    def last_look(self, number: int, object_id: int) -> tuple[int | None, tuple[Hypothesis, ...]]:
+        """The moment at which somebody last looked what an object is, or None, and what was found."""
         for at in range(number, max(-1, number - LOOKED_BACK), -1):
             mind, seen = self._moment(at)
             belief = mind.objects.get(object_id)
             region = belief.region.id if belief else None
             found = [h for h in seen.of("hypothesis") if h.region_id == region]
             if found:
-                return tuple(sorted(found, key=lambda h: -h.similarity))
-        return ()
+                return at, tuple(sorted(found, key=lambda h: -h.similarity))
+        return None, ()
 
     def trails(self, number: int) -> Mapping[int, list[tuple[float, float]]]:
         """Where each object in view was in the seconds before a moment: centres of its boxes, pixels."""

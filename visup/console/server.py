@@ -18,6 +18,7 @@ from visup.console.evidence import evidence_of
 from visup.console.pages.library_page import library_page
 from visup.console.pages.run_page import run_page
 from visup.console.pages.wall_page import wall_page
+from visup.console.reasoning.likeness import likeness_picture
 from visup.console.state import ConsoleState
 
 FAVICON = "◉"
@@ -47,6 +48,10 @@ def _pictures(app: FastAPI, state: ConsoleState) -> None:
     @app.get("/thumbnail/{key}.jpg")
     def thumbnail(key: str) -> Response:
         return _jpeg(lambda: state.view(key).thumbnail())
+
+    @app.get("/likeness/{key}/{number}/{object_id}.jpg")
+    def likeness(key: str, number: int, object_id: int) -> Response:
+        return _jpeg(lambda: likeness_picture(state.view(key), number, object_id))
 
     @app.get("/evidence/{key}/{alert}.{kind}")
     def evidence(key: str, alert: int, kind: Literal["jpg", "webm"]) -> Response:

@@ -51,7 +51,7 @@ def belief_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRol
             if which not in known:
                 known.clear()
                 known[which] = list(head.run.shares(number))
-            show_object(head, number, known[which])
+            show_object(head, key, number, known[which])
 
     now()
     identity()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from html import escape
 
 from nicegui import ui
 
 from visup.agent import Hypothesis
 from visup.console.drawing.flow_svg import percent
-from visup.console.pages.frame import part_heading, shown_text
+from visup.console.pages.frame import part_heading, shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.report.page.figures import CANDIDATE_COLOURS
 
@@ -18,11 +19,12 @@ CURVE_HEIGHT = 90
 Samples = Sequence[tuple[float, Mapping[str, float]]]
 
 
-def show_object(head: Playhead, number: int, samples: Samples) -> None:
+def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None:
     """Lay out what is known of an object at the cursor.
 
     Args:
         head: The cursor.
+        key: Of the run.
         number: Of the object.
         samples: How sure each of its names was over time.
     """
@@ -43,6 +45,19 @@ def show_object(head: Playhead, number: int, samples: Samples) -> None:
     if best:
         place = head.run.times[head.number] / max(head.run.seconds, 1e-6)
         ui.html(_curves(samples, best, head.run.seconds, place), sanitize=False).classes("w-full")
+    if looks and head.run.settings and head.run.settings.models:
+        address = f"/likeness/{key}/{head.number}/{number}.jpg"
+        worded_button("Beside the views", partial(_show_likeness, address, number))
+
+
+def _show_likeness(address: str, number: int) -> None:
+    """The silhouette and the views that it looks like, large, over the page."""
+    told = f"Silhouette of object {number} beside the views that it looks like"
+    with ui.dialog(value=True) as dialog, ui.card().classes("likeness"):
+        dialog.props(f'aria-label="{told}"')
+        ui.element("img").props(f'src="{address}" alt="{told}"')
+        worded_button("Close", dialog.close)
+    dialog.on("hide", dialog.delete)
 
 
 def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypothesis]) -> None:

@@ -1,0 +1,40 @@
+"""Why an object was taken for a model: its silhouette beside the views that look most like it."""
+
+from __future__ import annotations
+
+from visup.agent.model.errors import OutputError
+from visup.console.drawing.pictures import jpeg
+from visup.console.run_view import RunView
+from visup.percepts.shape.drawing.pictures import match_picture
+from visup.percepts.shape.silhouette.silhouette import normalise
+
+BEST = 3
+"""Views that are shown."""
+
+
+def likeness_picture(run: RunView, number: int, object_id: int) -> bytes:
+    """The silhouette of an object, and the views that it looked like when it was last looked at.
+
+    The views are searched anew, among all: a run may have looked only for what its tasks name.
+
+    Args:
+        run: The run.
+        number: Of the moment, from 0.
+        object_id: The object.
+
+    Returns:
+        A JPEG.
+
+    Raises:
+        VisupError: The run has no models, they cannot be read, or nobody looked at the object.
+    """
+    at, _ = run.last_look(number, object_id)
+    belief = run.mind(at).objects.get(object_id) if at is not None else None
+    if at is None or belief is None or run.models is None:
+        raise OutputError(f"no model was compared with object {object_id}", where=run.folder.name)
+    silhouette = normalise(belief.region.mask, cut=belief.region.cut)
+    if silhouette is None:
+        raise OutputError(f"object {object_id} has no outline there", where=run.folder.name)
+    ranking = run.models.query(silhouette, top=BEST)
+    title = f"Object {object_id} in frame {run.frames[at]}"
+    return jpeg(match_picture(run.models, silhouette, ranking, title, BEST))
