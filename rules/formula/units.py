@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,3 +186,17 @@ def number_text(number: float) -> str:
     if number == float("inf"):
         return "1e999"
     return str(int(number)) if number == int(number) and abs(number) < 1e15 else repr(number)
+
+
+UNITS_MEANT: Mapping[str, str] = MappingProxyType(
+    {
+        "sec": "s", "secs": "s", "second": "s", "seconds": "s", "mins": "min", "minute": "min",
+        "minutes": "min", "hr": "h", "hrs": "h", "hour": "h", "hours": "h", "msec": "ms",
+        "msecs": "ms", "millisecond": "ms", "milliseconds": "ms", "pixel": "px", "pixels": "px",
+        "pix": "px", "pixel/s": "px/s", "pixels/s": "px/s", "px/sec": "px/s", "percent": "%",
+        "degree": "deg", "degrees": "deg", "degree/s": "deg/s", "degrees/s": "deg/s",
+        "deg/sec": "deg/s", "dps": "deg/s", "meter": "m", "meters": "m", "metre": "m",
+        "metres": "m",
+    }
+)  # fmt: skip
+"""What people write -> the unit that they mean."""

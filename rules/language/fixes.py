@@ -34,6 +34,7 @@ class TextFix:
 _IN_PLACE = re.compile(r"write `([^`]+)` in place of `([^`]+)`")
 _PUT = re.compile(r"put `([^`]+)` here")
 _OUT = re.compile(r"leave `([^`]+)` out")
+_LINE = re.compile(r"add the line `([^`]+)`")
 _WRITE = re.compile(r"write `([^`]+)`")
 _MEANT = re.compile(r"did you mean [`']([^`']+)[`']\?")
 _NAME = re.compile(r"[^\W\d]\w*")
@@ -56,6 +57,8 @@ def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None
         if old := re.match(rf"\s*{pattern}", rest):
             return _replacing(where, old, m[1])
         return _on_line(where, pattern, m[1]) or _further(where, pattern, rest, m[1])
+    if m := _LINE.search(hint):
+        return _at_the_end(text, m[1])
     if m := _PUT.search(hint):
         spaced = m[1] if m[1] in ",:)]" else f" {m[1]} "
         return TextFix(where.line, where.column, 0, spaced)
@@ -70,6 +73,13 @@ def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None
     if m := _WRITE.search(hint):
         return TextFix(where.line, where.column, where.length, m[1])
     return None
+
+
+def _at_the_end(text: str, new: str) -> TextFix:
+    """A line put behind all others."""
+    lines = text.split("\n")
+    new = f"{new}\n" if text.endswith("\n") else f"\n{new}"
+    return TextFix(len(lines), len(lines[-1]) + 1, 0, new)
 
 
 def _on_line(where: SourceLocation, pattern: str, new: str) -> TextFix | None:

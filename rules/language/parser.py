@@ -49,7 +49,9 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
     for block in _blocks(text):
         found = read_repaired(block, "start", file, RULES, patience)
         told = found.told(text)
-        errors += with_tried_edits(block, told, partial(weight, patience=patience))
+        errors += with_tried_edits(
+            block, told, partial(weight, patience=patience), len(found.syntax)
+        )
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)
     raise_all(sorted(errors, key=_position)[:MOST_FAULTS], RuleError)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.resources import files
 from itertools import chain
 from typing import Any
@@ -15,8 +15,9 @@ from lark import Lark, UnexpectedInput
 
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SourceLocation
+from visup.rules.correction.edits import Repair, edits, hint_of
+from visup.rules.correction.search import corrections
 from visup.rules.language.diagnostics import Diagnostic, Source, either
-from visup.rules.language.edits import Repair, edits, hint_of
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.repair import (
     MOST_REPAIRS,
@@ -26,6 +27,7 @@ from visup.rules.language.repair import (
     place_of,
     usual_slips,
 )
+from visup.rules.language.spelling import speller
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
@@ -77,6 +79,22 @@ class Patience:
         if self.left < 0:
             return _syntax_fault("", "formula")
         return _syntax_fault(text, start)
+
+    def corrections(self, text: str, start: str, since: int) -> Iterator[Repair]:
+        """The least changes from an offset on that bring a text into the grammar, while patience lasts."""
+        least = max(0, self.left - MOST_READINGS * READING_COST)
+
+        def may_go_on() -> bool:
+            self.left -= READING_COST
+            return self.left > least
+
+        yield from corrections(text, since, speller(_parser(), start, text), may_go_on)
+
+
+MOST_READINGS = 4000
+"""Of a text that cannot be read, when the least corrections of it are looked for."""
+READING_COST = 5
+"""To follow a reading of a text takes as long as to parse so many characters."""
 
 
 def grammar() -> str:
@@ -158,6 +176,7 @@ def read_repaired(
                 fault,
                 lambda t: patience.spend(t, start),
                 lambda t: not _semantic(t, start, file, vocabulary)[1],
+                partial(patience.corrections, text, start),
             )
         syntax.append(_syntax_error(fault, _Place(block, text, tuple(repairs), file), repair))
         if repair is None:
@@ -212,6 +231,7 @@ def _line_of(text: str, at: int) -> tuple[int, int]:
 Weight = tuple[int, int]
 """How bad a text is: 1 and how much of it is left unread, or 0 and how many faults of meaning it has."""
 UNTRIED: Weight = (2, 0)
+SOUND: Weight = (0, 0)
 
 
 def weight(text: str, patience: Patience) -> Weight:
@@ -226,7 +246,7 @@ def weight(text: str, patience: Patience) -> Weight:
 
 
 def with_tried_edits(
-    block: str, faults: Sequence[Diagnostic], weigh: Callable[[str], Weight]
+    block: str, faults: Sequence[Diagnostic], weigh: Callable[[str], Weight], unread: int = 0
 ) -> list[Diagnostic]:
     """The faults of a rule; one whose hint is no change gets a small edit that helps, where one does.
 
@@ -234,13 +254,15 @@ def with_tried_edits(
         block: The rule, its lines numbered as in the file.
         faults: What is wrong with it.
         weigh: How bad a text is.
+        unread: How many of the faults, the first ones, are of syntax; while there are any, no edits are
+            looked for to help the others, which may follow from them.
     """
     told = list(faults)
     before = weigh(block)
     if before == UNTRIED:
         return told
     with suppress(_OutOfPatienceError):
-        for n, fault in enumerate(faults):
+        for n, fault in enumerate(faults[: unread or None]):
             told[n] = _with_edit(block, fault, before, weigh)
     return told
 
@@ -260,17 +282,23 @@ def _with_edit(
 
     place = fault.place
     own = fix_of(block, place, fault.hint)
-    if own is not None and tried(own) <= before:
+    helps = None if own is None else tried(own)
+    if helps is not None and (helps[0] == 0 or helps <= before):
         return fault
     line, begin, length = place.text, place.column - 1, place.length
     tries = (usual_slips(line, begin, length), edits(line, begin, length, EDIT_WORDS))
+    best, least = None, before
     for repair in chain.from_iterable(tries):
         hint = hint_of(place.text, repair)
         fix = None if hint is None else fix_of(block, place, hint)
-        if fix is not None and tried(fix) < before:
-            said = hint if fault.hint is None else f"{fault.hint}; {hint}"
-            return replace(fault, hint=said)
-    return fault
+        found = before if fix is None else tried(fix)
+        if found < least:
+            best, least = hint, found
+        if least == SOUND or (before[0] == 0 and least < before):
+            break
+    if best is None:
+        return fault
+    return replace(fault, hint=best if fault.hint is None or own else f"{fault.hint}; {best}")
 
 
 EDIT_WORDS = (*RULES.quantities, *RULES.words, *WORDS)

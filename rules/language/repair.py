@@ -9,16 +9,21 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from math import inf
 
 from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.model.did_you_mean import closest
-from visup.rules.language.edits import Repair, edits
+from visup.rules.correction.edits import Repair, edits
 from visup.rules.language.keywords import KEYWORDS
 from visup.rules.language.slips import SLIPS
 
 MOST_REPAIRS = 12
+MOST_CORRECTIONS = 16
+"""That are tried of each error, the least first."""
+NEAR = 60
+"""Characters before an error from which on its cause is looked for; the whole line always."""
 MUCH_FURTHER = 8
 """Where a usual slip lets so many more characters be read, it is what was meant, whatever else is wrong."""
 
@@ -49,7 +54,11 @@ Parses = Callable[[str], UnexpectedInput | None]
 
 
 def find_repair(
-    text: str, error: UnexpectedInput, error_of: Parses, is_sound: Callable[[str], bool]
+    text: str,
+    error: UnexpectedInput,
+    error_of: Parses,
+    is_sound: Callable[[str], bool],
+    corrected: Callable[[int], Iterable[Repair]],
 ) -> Repair | None:
     """The first change after which a text can be read further than before.
 
@@ -58,6 +67,7 @@ def find_repair(
         error: Where it cannot.
         error_of: Reads a text.
         is_sound: Whether a text without syntax errors makes sense, too.
+        corrected: Changes from an offset on that bring the text into its grammar, the least first.
 
     Returns:
         A change after which all makes sense, else there is no syntax error left, else only later ones.
@@ -65,10 +75,17 @@ def find_repair(
     at, length = place_of(text, error)
     trial = _RepairTrial(text, at, length, error_of, is_sound)
     usual = trial.best(_candidates(text, at, length))
-    if usual is not None and trial.moved > MUCH_FURTHER:
+    if usual is not None and trial.sound:
+        return usual
+    further, trial.moved = trial.moved, 0.0
+    since = max(0, min(at - NEAR, text.rfind("\n", 0, at) + 1))
+    least = trial.best(islice(corrected(since), MOST_CORRECTIONS))
+    if trial.sound:
+        return least
+    if usual is not None and further > MUCH_FURTHER:
         return usual
     places = dict.fromkeys((at, max(0, end_before(text, at) - 1)))
-    return trial.best(r for place in places for r in _edited(text, place)) or usual
+    return trial.best(r for place in places for r in _edited(text, place)) or usual or least
 
 
 @dataclass
@@ -82,6 +99,7 @@ class _RepairTrial:
         error_of: Reads a text.
         is_sound: Whether a text without syntax errors makes sense, too.
         moved: By how many characters the last that was chosen lets the text be read further.
+        sound: Whether a change was found after which all makes sense.
     """
 
     text: str
@@ -90,6 +108,7 @@ class _RepairTrial:
     error_of: Parses
     is_sound: Callable[[str], bool]
     moved: float = 0.0
+    sound: bool = False
 
     def best(self, repairs: Iterable[Repair]) -> Repair | None:
         """The first that makes sense, else that can be read, else that can be read further."""
@@ -105,6 +124,7 @@ class _RepairTrial:
             if left is None:
                 self.moved = inf
                 if self.is_sound(changed):
+                    self.sound = True
                     return repair
                 readable = readable or repair
                 continue

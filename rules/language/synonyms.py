@@ -22,7 +22,10 @@ _MEANT = (
     ("lost gone", "gone left away disappear vanish absent missing"),
     ("inside in_zone", "in within contained"),
     ("in_zone inside", "zone area_of"),
-    ("on", "above upon atop over"),
+    ("on north_of", "above upon atop over"),
+    ("south_of", "below under beneath underneath"),
+    ("west_of", "left left_of leftof"),
+    ("east_of", "right right_of rightof"),
     ("gap", "distance dist separation clearance spacing"),
     ("speed", "velocity rate"),
     ("closing_speed", "approach_speed closing"),
@@ -45,9 +48,15 @@ def stem(word: str) -> str:
     return re.sub(r"(?:ings?|ed|es|s|e)$", "", word.casefold())
 
 
-SYNONYMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {stem(word): tuple(meant.split()) for meant, said in _MEANT for word in said.split()}
-)
+def _by_stem() -> Mapping[str, tuple[str, ...]]:
+    found: dict[str, tuple[str, ...]] = {}
+    for meant, said in _MEANT:
+        for word in said.split():
+            found[stem(word)] = (*found.get(stem(word), ()), *meant.split())
+    return MappingProxyType(found)
+
+
+SYNONYMS: Mapping[str, tuple[str, ...]] = _by_stem()
 """Stem of a word -> what may be meant by it."""
 
 

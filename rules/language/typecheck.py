@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
+from itertools import count
 
 from visup.agent.cycle.own_troubles import OWN_TROUBLES
 from visup.agent.model.did_you_mean import closest, did_you_mean
@@ -41,9 +42,8 @@ from visup.rules.language.dimensions import (
 from visup.rules.language.keywords import KEYWORDS
 from visup.rules.language.synonyms import synonym
 from visup.rules.language.transform import Fault
-from visup.rules.predicates.qualitative_words import ALLEN_RELATIONS, TPCC_RELATIONS
-from visup.rules.predicates.snapshot import RELATION_NAMES
-from visup.rules.predicates.vocabulary import PERCEPT_KINDS, RULES, Vocabulary
+from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits, known_of
+from visup.rules.predicates.vocabulary import RULES, Vocabulary
 from visup.rules.wording.sentences import mentions
 
 
@@ -70,7 +70,9 @@ class TypeChecker:
         for rule in rules:
             if rule.name in names:
                 what = f"there are two rules '{rule.name}'"
-                yield self.fault(rule.span, what, None, "rename one of them")
+                other = next(n for i in count(2) if (n := f"{rule.name}_{i}") not in names)
+                hint = f"write `{other}` in place of `{rule.name}`"
+                yield self.fault(rule.span, what, "another name for each rule", hint)
             names.add(rule.name)
 
     def formula(self, formula: Formula) -> Iterator[Diagnostic]:
@@ -80,6 +82,11 @@ class TypeChecker:
 
     def rule(self, rule: Rule) -> Iterator[Diagnostic]:
         """The faults of one rule."""
+        if not rule.variables and (missing := _objects_in(rule, self.vocabulary)):
+            what = f"'{rule.name}' has no variables, but names {', '.join(missing)}"
+            hint = f"write `{rule.name}({', '.join(missing)})` in place of `{rule.name}()`"
+            yield self.fault(rule.span, what, "the names of its objects", hint)
+            return
         reader = _FormulaChecker(self.vocabulary, rule.variables)
         found = [f for formula in rule.formulas for f in reader.node(formula)]
         found += [f for w in ("hold", "cooldown") for f in _time(getattr(rule, w), w)]
@@ -96,7 +103,7 @@ class TypeChecker:
     def _head(self, rule: Rule) -> Iterator[Fault]:
         if len(set(rule.variables)) < len(rule.variables):
             what = f"a variable of '{rule.name}' is named twice"
-            given, apart = ", ".join(rule.variables), ", ".join(_distinct(rule.variables, ()))
+            given, apart = ", ".join(rule.variables), ", ".join(dict.fromkeys(rule.variables))
             change = f"write `{rule.name}({apart})` in place of `{rule.name}({given})`"
             yield rule.span, what, "distinct names", change
         for word in (rule.name, *rule.variables):
@@ -181,7 +188,11 @@ class _FormulaChecker:
     def quantified(self, node: Quantified) -> Iterator[Fault]:
         name, outer = node.variable, self.scope
         if name in outer:
-            yield node.span, f"'{name}' is already the name of an object", "another name", None
+            what, hint = (
+                f"'{name}' is already the name of an object",
+                f"leave `{node.kind} {name}:` out",
+            )
+            yield node.span, what, "another name", hint
         if name in KEYWORDS:
             yield node.span, f"'{name}' is a reserved word", "another name", None
         self.scope = (*outer, name)
@@ -254,16 +265,18 @@ class _FormulaChecker:
             yield call.span, f"there is no {kind} '{call.name}'", _nearest(call.name, table), hint
             return
         takes = table[call.name].takes
+        hint = f"write `{arranged(call.name, call.words, takes, self.scope)}`"
         if len(takes) != len(call.words):
             what = f"'{call.name}' takes {len(takes)} argument(s), not {len(call.words)}"
-            hint = f"write `{call.name}({', '.join(self._filled(call, takes))})`"
             yield call.span, what, f"{call.name}({', '.join(takes)})", hint
             return
         for wanted, word in zip(takes, call.words, strict=True):
-            yield from self.argument(call, wanted, word)
+            for span, what, expected, own in self.argument(call, wanted, word):
+                sorted_out = any(fits(wanted, w, self.scope) for w in call.words)
+                yield span, what, expected, hint if sorted_out else own
         names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
         if len(set(names)) < len(names):
-            hint = f"write `{call.name}({', '.join(_distinct(call.words, self.scope))})`"
+            hint = f"write `{call.name}({', '.join(distinct(call.words, self.scope))})`"
             what = f"'{call.name}' is given the same object twice"
             yield call.span, what, "two different objects", hint
 
@@ -274,24 +287,8 @@ class _FormulaChecker:
         amount = example_amount(Comparison(measured, "<", measured), self.vocabulary)
         return f"compare it with a number; write `{said} < {amount}` in place of `{said}`"
 
-    def _filled(self, call: Predicate | Measure, takes: tuple[str, ...]) -> Iterator[str]:
-        """Arguments as the call has them, the missing ones by what there is."""
-        spare = iter([v for v in self.scope if v not in call.words] or ["b"])
-        given = list(call.words)
-        for wanted in takes:
-            if given:
-                yield given.pop(0)
-            else:
-                yield next(spare, "b") if wanted == "object" else EXAMPLES.get(wanted, "name")
-
     def argument(self, call: Predicate | Measure, wanted: str, word: str) -> Iterator[Fault]:
-        known: Iterable[str] = {
-            "object": self.scope,
-            "relation": RELATION_NAMES,
-            "kind": (*PERCEPT_KINDS, word),
-            "allen": ALLEN_RELATIONS,
-            "tpcc": TPCC_RELATIONS,
-        }.get(wanted, (word,))
+        known = known_of(wanted, word, self.scope)
         if word not in known:
             what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
             near = closest(word, known) or next((k for k in known if k not in call.words), None)
@@ -299,20 +296,21 @@ class _FormulaChecker:
             yield call.span, what, _listed(known), hint
         elif wanted != "object" and word in self.scope:
             what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
-            hint = (
-                f"write `{EXAMPLES[wanted]}` in place of `{word}`" if wanted in EXAMPLES else None
-            )
+            other = EXAMPLES.get(wanted)
+            hint = None if other is None else f"write `{other}` in place of `{word}`"
             yield call.span, what, None, hint or "rename the variable"
 
 
-EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
-EXAMPLES |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
-
-
-def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:
-    """The arguments with another object in the place of the second."""
-    other = next((v for v in scope if v not in words), "b" if "b" not in words else "a")
-    return [*words[:-1], other]
+def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:
+    """The names that stand for objects in a rule, in their order."""
+    found: list[str] = []
+    for node in (n for formula in rule.formulas for n in walk(formula)):
+        table = vocabulary.words if isinstance(node, Predicate) else vocabulary.quantities
+        if isinstance(node, Predicate | Measure) and node.name in table:
+            takes = table[node.name].takes
+            found += [w for w, t in zip(node.words, takes, strict=False) if t == "object"]
+    bound = {n.variable for f in rule.formulas for n in walk(f) if isinstance(n, Quantified)}
+    return [w for w in dict.fromkeys(found) if w not in bound]
 
 
 def _time(number: Number | None, word: str) -> Iterator[Fault]:

@@ -11,7 +11,7 @@ from math import isinf
 
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.formula.nodes import SIGNAL_WORDS, Comparison
-from visup.rules.formula.units import Number, Span, Unit
+from visup.rules.formula.units import UNITS_MEANT, Number, Span, Unit
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
@@ -43,7 +43,7 @@ from visup.tasks.grammar.nodes import (
     walk,
 )
 from visup.tasks.grammar.structure import spare_kinds, task_actors
-from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of, value
+from visup.tasks.grammar.units import LENGTH, SIZE, TIME, UNITS, dimension, units_of, value
 
 Declared = Actor | ZoneDeclaration | Parameter
 Asked = tuple[str, tuple[Name, ...], Span]
@@ -156,7 +156,7 @@ class NameCheck:
         if wanted == ANY and amount.unit == Unit.NONE:
             return
         if amount.unit not in UNITS:
-            meant = MEANT.get(amount.unit.casefold())
+            meant = UNITS_MEANT.get(amount.unit.casefold())
             hint = f"did you mean `{meant}`?" if meant else None
             if wanted == TIME and amount.unit == "m":
                 hint = "did you mean `min`?"

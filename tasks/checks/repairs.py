@@ -10,11 +10,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import islice
 
+from visup.rules.correction.edits import ALIKE, Repair, edits, hint_of
 from visup.rules.language.diagnostics import Diagnostic
-from visup.rules.language.edits import ALIKE, edits, hint_of
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
+from visup.tasks.checks.additions import added
+from visup.tasks.checks.corrections import corrected, said
 from visup.tasks.checks.usual_meanings import NAME, USUAL
 from visup.tasks.diagnostics.recovery import KEYWORDS
 from visup.tasks.grammar.statement import RESERVED_WORDS
@@ -23,6 +26,10 @@ from visup.tasks.grammar.units import UNITS
 CHARACTERS_TRIED = 60_000
 """Of changes of one file: of a long file with many mistakes only the first have a tried hint."""
 MOST_HINTS = 12
+MOST_CORRECTIONS, MOST_READINGS = 12, 3000
+"""Of one statement: changes of several words that are tried, and readings followed to find them."""
+READING_COST = 1
+"""To follow a reading of a statement takes as long as to check so many characters of a file."""
 
 Check = Callable[[str], Sequence[Diagnostic]]
 
@@ -85,11 +92,36 @@ class _HintTrial:
 
     def mend(self, fault: Diagnostic) -> str | None:
         """A hint that helps: what is usually meant before small edits, one step before none."""
-        usual, helps = self.best(fault, _hints(self.text, fault))
-        if helps > ONE_STEP:
-            return usual
-        edit, helps = self.best(fault, _edits(fault))
-        return edit if helps > ONE_STEP else usual
+        found: list[tuple[str | None, int]] = []
+        for hints in (_hints(self.text, fault), self.corrected(fault), self.edited(fault)):
+            keep = fault.code < "E2" and bool(found) and found[0][1] > ONE_STEP
+            # What is usually meant, and helps in part, goes before leaving words out.
+            hint, helps = self.best(
+                fault, (h for h in hints if not (keep and h.startswith("leave")))
+            )
+            if helps == WHOLLY:
+                return hint
+            found.append((hint, helps))
+        usual, _, edit = found
+        return edit[0] if usual[1] <= ONE_STEP < edit[1] else usual[0]
+
+    def edited(self, fault: Diagnostic) -> Iterator[str]:
+        """Small edits; of what cannot be read first, since what else is wrong may follow from it."""
+        if fault.code < "E2" or all(f.code >= "E2" for f in self.faults):
+            yield from _edits(fault)
+
+    def corrected(self, fault: Diagnostic) -> Iterator[str]:
+        """Changes of several words of a statement that cannot be read."""
+        readings = MOST_READINGS
+
+        def may_go_on() -> bool:
+            nonlocal readings
+            readings -= 1
+            self.left -= READING_COST
+            return readings > 0 and self.left > 0
+
+        if fault.code < "E2":
+            yield from islice(corrected(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
 
     def best(self, fault: Diagnostic, hints: Iterable[str]) -> tuple[str | None, int]:
         """The first hint that helps wholly, else the first that helps most; and how much."""
@@ -120,12 +152,23 @@ class _HintTrial:
         # What could not be read hid what comes to light now.
         unread = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
         if fault.code >= "E2":
-            return NOTHING
+            return self.left_over(fault, after)
         if unread[0] < unread[1]:
             return IN_PART
         new = [f for f in after if (f.code, f.message) not in known]
         further = all(_at(f) > _at(fault) for f in new) and len(after) <= len(self.faults)
         return ONE_STEP if further and (fault.code, fault.message) not in told(after) else NOTHING
+
+    def left_over(self, fault: Diagnostic, after: Sequence[Diagnostic]) -> int:
+        """How much a change helps after which only something stands there that nobody uses any more."""
+        known = told(self.faults)
+        new = {f.code for f in after if (f.code, f.message) not in known}
+        gone = (fault.code, fault.message) not in told(after)
+        return IN_PART if gone and new <= set(UNUSED) else NOTHING
+
+
+UNUSED = ("E204", "E213", "E225")
+"""Codes of what is defined and takes no part, which can always be left out."""
 
 
 def told(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
@@ -152,8 +195,25 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
         for match in sorted(matches, key=lambda m: _away(m, fault.place.column - 1)):
             new = match.expand(usual.new) if isinstance(usual.new, str) else usual.new(match)
             if new != match[0]:
-                yield _hint(line, match, new, fault.place.column - 1)
+                yield _placed(text, fault, match, new)
     yield from _as_expected(fault)
+    yield from added(text, fault)
+
+
+def _placed(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str:
+    """A change as a hint; with words around it where without them it would mean another place."""
+    line = fault.place.text
+    plain = _hint(line, match, new, fault.place.column - 1)
+    fix = fix_of(text, fault.place, plain)
+    if fix is None or not match[0].strip() or fix.line != fault.place.line:
+        return plain
+    begin = sum(len(row) + 1 for row in text.split("\n")[: fault.place.line - 1])
+    if (
+        fix.column - 1 <= match.start() + len(match[0])
+        and match.start() <= fix.column - 1 + fix.length
+    ):
+        return plain
+    return said(text, fault.place, Repair(begin + match.start(), begin + match.end(), new)) or plain
 
 
 def _misspelt(line: str, at: int) -> Iterator[str]:

@@ -217,7 +217,7 @@ class _Semantics:
         references += [r for i in self.parsed.task.invariants for r in i.during]
         references += self.parsed.task.recovered
         for r in references:
-            if r.stage not in known and not self.parsed.lacking:
+            if not {r.stage, r.stage.split("(")[0]} & known and not self.parsed.lacking:
                 found.setdefault(r.stage, r)
         return found
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from visup.agent.model.did_you_mean import closest
-from visup.rules.language.edits import NUMBERS
+from visup.rules.correction.everyday import NUMBERS
 from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS
+from visup.tasks.checks.spelling import plain_call
 from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
 
 New = str | Callable[[re.Match[str]], str]
@@ -242,6 +243,21 @@ USUAL = (
     _usual("E117", rf"\(\s*({NAME})\s+({NAME})\s*\)", r"(\1, \2)"),
     _usual("E117", r",\s*\)", ")"),
     _usual("E118", rf"\b({NAME})\s*\(\s*\)", r"\1(one, other)"),
+    _usual("E201 E219", rf"(::=)\s*((?:{NAME}\s+){{1,7}}{NAME})\s*$", lambda m: f"{m[1]} {plain_call(m[2])}"),
+    _usual("E205", rf"\b(inside|outside|reaching|wholly_inside)\(\s*({NAME})\s*\)\s*$",
+           r"\1(\2, berth) zone berth is (100, 50) (300, 50) (300, 200)"),
+    _usual("E113", rf"<({NAME})>\s*(\([^()]*\))", r"\1\2"),
+    _usual("E207", rf"(<{NAME}>)(?!\s*::=)(?![?*+])", r"\1?"),
+    _usual("E206", rf"(<({NAME})>\s*::=)\s*<\2>\s*$", r"\1 present(x)"),
+    _usual("E228", rf"\b{NAME}(\([^()]*,[^()]*\))(?=\s*[<>])", r"gap\1"),
+    _usual("E228", rf"\b{NAME}(\([^(),]*\))(?=\s*[<>])", r"speed\1"),
+    _usual("E228", r"(\))\s*[<>]=?\s*[\d.]+\s*[a-z%/]*", r"\1"),
+    _usual("E233", r"\bat\s+least\s+(\d+)\s+times\s+at\s+most\s+(\d+)", r"at least \2 times at most \1"),
+    _usual("E234", rf",\s*({PARTS})\s*\)(?=[^()]*$)", r") \1"),
+    _usual("E238", r"\band\s+([\d.]+)\s*([a-z%/]+)", lambda m: f"and {2 * float(m[1]) or 1:g} {m[2]}"),
+    _usual("E229", rf"\b(\w+)\(\s*({NAME})\s*,\s*({NAME})\s*\)", r"\1(\3, \2)"),
+    _usual("E229", rf"\b{NAME}(\(\s*{NAME}\s*,\s*{NAME}\s*\))", r"inside\1"),
+    _usual("E226", rf"\b(for|within|after|every)\s+{NAME}", r"\1 5 s"),
     _usual("E113", rf"<\s*({CALL})\s*>", r"\1"),
     _usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
 )  # fmt: skip

@@ -93,7 +93,7 @@ def read_statements(text: str) -> list[object]:
         lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
     """
     # The parser makes the tree as it goes, which its types do not say.
-    return cast("list[object]", _parser().parse(text))
+    return cast("list[object]", parser().parse(text))
 
 
 def tokens(text: str) -> list[Token]:
@@ -102,7 +102,7 @@ def tokens(text: str) -> list[Token]:
     Raises:
         lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
     """
-    reader = _parser().parse_interactive(text)
+    reader = parser().parse_interactive(text)
     found = list(reader.iter_parse())
     reader.feed_eof(found[-1] if found else None)  # type: ignore[no-untyped-call]
     return found
@@ -138,7 +138,8 @@ def grammar() -> str:
 
 
 @lru_cache(maxsize=1)
-def _parser() -> Lark:
+def parser() -> Lark:
+    """The parser of task files; it gives their statements."""
     return Lark(
         grammar(),
         parser="lalr",

@@ -40,19 +40,6 @@ UNITS = MappingProxyType(
 )
 """Unit -> (what it measures, how many of the base unit one of it is)."""
 
-MEANT = MappingProxyType(
-    {
-        "sec": "s", "secs": "s", "second": "s", "seconds": "s", "mins": "min", "minute": "min",
-        "minutes": "min", "hr": "h", "hrs": "h", "hour": "h", "hours": "h", "msec": "ms",
-        "msecs": "ms", "millisecond": "ms", "milliseconds": "ms", "pixel": "px", "pixels": "px",
-        "pix": "px", "pixel/s": "px/s", "pixels/s": "px/s", "px/sec": "px/s", "percent": "%",
-        "degree": "deg", "degrees": "deg", "degree/s": "deg/s", "degrees/s": "deg/s",
-        "deg/sec": "deg/s", "dps": "deg/s", "meter": "m", "meters": "m", "metre": "m",
-        "metres": "m",
-    }
-)  # fmt: skip
-"""What people write -> the unit that they mean."""
-
 
 def value(amount: Number) -> float:
     """An amount in the base unit of what it measures; an unknown unit counts as the base unit."""

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from visup.rules.correction.everyday import NUMBERS
+
 TOKEN = re.compile(r"::=|<[^<>\n]*>|\"[^\"\n]*\"|\w+(?:\.\d+)?|[<>=!]=|\S")
 NEAR = 3
 """Words to either side of a fault that are looked at."""
@@ -20,8 +22,6 @@ BEHIND_WORD = ("()", ")")
 BETWEEN = (")", "(", ",", ">", "<", ":")
 UNITS = ("s", "px", "px/s", "%", "samples")
 ALIKE = 0.7
-NUMBERS = {"two": "2", "three": "3", "four": "4", "five": "5", "six": "6", "seven": "7", "eight": "8",
-           "nine": "9", "ten": "10"}  # fmt: skip
 JOINTS = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
 
 
@@ -80,6 +80,7 @@ def edits(
             yield Repair(start, stop, NUMBERS[word])
         if word.isidentifier() and word not in words:
             yield from (Repair(start, stop, meant) for meant in _ranked(word, words))
+    yield from _of_call(line, begin)
     for start, _, _ in near if unread else ():
         yield from (Repair(start, start, f"{new} ") for new in BETWEEN)
     yield from (Repair(start, stop, "") for start, stop, _ in near)
@@ -98,6 +99,34 @@ def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
         yield from ((end, new) for new in BEHIND_CALL)
     elif line[begin:end].isidentifier():
         yield from ((end, new) for new in BEHIND_WORD)
+
+
+def _of_call(line: str, begin: int) -> Iterator[Repair]:
+    """A call without one of its arguments, or an argument without the call around it."""
+    name = re.compile(r"\w+\s*\(").match(line, begin)
+    parts = list(_arguments(line, name.end())) if name else []
+    if name is None or not parts or line[parts[-1][1] : parts[-1][1] + 1] != ")":
+        return
+    end = parts[-1][1] + 1
+    said = [line[start:stop].strip() for start, stop in parts]
+    for n in reversed(range(len(said))) if len(said) > 1 else ():
+        left = ", ".join(said[:n] + said[n + 1 :])
+        yield Repair(begin, end, f"{name[0]}{left})")
+    for part in said:
+        if not part.isidentifier():
+            yield from (Repair(begin, end, f"{part}{more}") for more in ("", " > 0", " < 5 px"))
+
+
+def _arguments(line: str, at: int) -> Iterator[tuple[int, int]]:
+    """Where each argument of a call begins and ends, from behind its bracket on."""
+    depth, start = 0, at
+    for n in range(at, len(line)):
+        depth += (line[n] == "(") - (line[n] == ")")
+        if depth < 0 or (depth == 0 and line[n] == ","):
+            yield start, n
+            start = n + 1
+        if depth < 0:
+            return
 
 
 def _fillers(

@@ -1,0 +1,64 @@
+"""The LR automaton of a Lark grammar as plain stacks of states: what may come next, and what follows.
+
+Lark's own parser builds a tree as it goes; to try thousands of changes of a text only the states are needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from lark import Lark
+from lark.parsers.lalr_analysis import Shift
+
+Stack = tuple[int, ...]
+END = "$END"
+
+
+@dataclass
+class LrAutomaton:
+    """The states of an LALR parser.
+
+    Attributes:
+        states: What each state does at each terminal, and where it goes at each nonterminal.
+        first: The state in which it begins.
+        last: The state in which it has read all.
+        known: Steps that were taken before.
+    """
+
+    states: Mapping[int, Mapping[str, Any]]
+    first: int
+    last: int
+    known: dict[tuple[Stack, str], Stack | None] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, parser: Lark, start: str) -> LrAutomaton:
+        """The automaton of a parser, for one of its start symbols."""
+        table = parser.parser.parser._parse_table  # type: ignore[attr-defined]
+        return cls(table.states, table.start_states[start], table.end_states[start])
+
+    def offered(self, stack: Stack) -> list[str]:
+        """Terminals that may come next, and perhaps some that may not."""
+        return [name for name in self.states[stack[-1]] if name.isupper() or name == END]
+
+    def step(self, stack: Stack, terminal: str) -> Stack | None:
+        """The stack after a terminal; None where it cannot come."""
+        key = stack, terminal
+        if key not in self.known:
+            self.known[key] = self._step(stack, terminal)
+        return self.known[key]
+
+    def _step(self, stack: Stack, terminal: str) -> Stack | None:
+        while True:
+            if terminal == END and stack[-1] == self.last:
+                return stack
+            found = self.states[stack[-1]].get(terminal)
+            if found is None:
+                return None
+            action, argument = found
+            if action is Shift:
+                return (*stack, argument)
+            size = len(argument.expansion)
+            stack = stack[:-size] if size else stack
+            stack = (*stack, self.states[stack[-1]][argument.origin.name][1])

@@ -1,0 +1,226 @@
+"""The least changes after which a text can be read: words put in, left out, or written otherwise.
+
+The least-cost repair of LR parse errors (Corchuelo et al. 2002, Diekmann and Tratt 2020): stacks of states
+are followed through the words of the text from where it can last be read, the cheapest changes first.
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count, islice, product
+
+from visup.rules.correction.automaton import END, LrAutomaton, Stack
+from visup.rules.correction.edits import Repair
+from visup.rules.correction.words import Terminals, Word, words_of
+
+MOST_PUT_IN_A_ROW = 4
+SPELLINGS_TRIED = 8
+"""Of one correction, in which a unit or a name that is put in may be one of several."""
+ALIKE = 3
+"""Readings that are followed beside each other, though what may follow is the same: a bracket may be
+missing in several places."""
+NEARLY = 0.1
+"""What it costs to take a word for what it would be if other words followed it."""
+_NO_BLANK_BEFORE = (",", ")", "]", ":", "?", "*", "+", "..")
+_NO_BLANK_AFTER = ("(", "[")
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What some words may mean that are not of the language, or not where they stand.
+
+    Attributes:
+        words: How many words it stands for.
+        terminals: What they mean.
+        text: How that is written.
+        cost: How far-fetched it is.
+    """
+
+    words: int
+    terminals: tuple[str, ...]
+    text: str
+    cost: float
+
+
+@dataclass(frozen=True)
+class Speller:
+    """How words of a language are put in, left out and taken for others.
+
+    Attributes:
+        automaton: Of its grammar.
+        terminals: Of its grammar.
+        put: What it costs to put in a terminal, and how it may be written; no others are put in.
+        drop: What it costs to leave a word out.
+        meant: What may be meant by the words from one on.
+        loose: Terminals that take in so much that words are not cut by them.
+    """
+
+    automaton: LrAutomaton
+    terminals: Terminals
+    put: Mapping[str, tuple[float, tuple[str, ...]]]
+    drop: Callable[[Word], float]
+    meant: Callable[[Sequence[Word], int], Sequence[Meaning]]
+    loose: Container[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """A word written otherwise, put in (`words` is 0), or left out (no `texts`), behind other changes."""
+
+    at: int
+    words: int
+    texts: tuple[str, ...]
+    before: _Change | None
+
+
+def corrections(
+    text: str, since: int, speller: Speller, may_go_on: Callable[[], bool]
+) -> Iterator[Repair]:
+    """Corrections of a text, the least first; none where it takes too long to find any.
+
+    Args:
+        text: It cannot be read.
+        since: Offset from which it may be changed.
+        speller: Of its language.
+        may_go_on: Asked before each reading that is followed.
+    """
+    words = list(words_of(text, speller.terminals, speller.loose))
+    for last in _Search(words, since, speller, may_go_on).found():
+        changes = list(_in_order(last))
+        choices = product(*(c.texts or ("",) for c in changes))
+        for texts in islice(choices, SPELLINGS_TRIED) if changes else ():
+            yield _joined(text, words, changes, texts)
+
+
+class _Search:
+    """Readings of some words, followed in the order of what their changes cost."""
+
+    def __init__(
+        self, words: list[Word], since: int, speller: Speller, may_go_on: Callable[[], bool]
+    ) -> None:
+        self.words, self.speller, self.may_go_on = words, speller, may_go_on
+        self.since = sum(w.begin < since for w in words)
+        self.heap: list[tuple[float, int, int, Stack, _Change | None, int]] = []
+        self.costs: dict[tuple[int, Stack, int], list[float]] = {}
+        self.meanings: dict[int, Sequence[Meaning]] = {}
+        self.offered: dict[Stack, list[tuple[float, tuple[str, ...], Stack]]] = {}
+        self.order = count()
+
+    def found(self) -> Iterator[_Change | None]:
+        """The changes of each reading that comes to the end, linked from the last."""
+        self.push(0.0, 0, (self.speller.automaton.first,), None, 0)
+        while self.heap and self.may_go_on():
+            cost, behind, _, stack, change, put = heappop(self.heap)
+            at = -behind
+            if at == len(self.words) and self.speller.automaton.step(stack, END) is not None:
+                yield change
+            self.read_on(cost, at, stack, change)
+            if at >= self.since:
+                self.put_in(cost, at, stack, change, put)
+                self.leave_out(cost, at, stack, change)
+
+    def push(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
+        """Follow a reading, unless enough are followed that come to the same and cost no more."""
+        costs = self.costs.setdefault((at, stack, put), [])
+        if len(costs) < ALIKE or cost < costs[-1]:
+            insort(costs, cost)
+            del costs[ALIKE:]
+            heappush(self.heap, (cost, -at, next(self.order), stack, change, put))
+
+    def read_on(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
+        """The next word, as it is or as it may be meant."""
+        if at == len(self.words):
+            return
+        step = self.speller.automaton.step
+        for terminal in self.words[at].terminals:
+            after = step(stack, terminal)
+            if after is not None:
+                self.push(cost, at + 1, after, change, 0)
+                break
+        for terminal in self.words[at].nearly:
+            after = step(stack, terminal)
+            if after is not None:
+                self.push(cost + NEARLY, at + 1, after, change, 0)
+        for meant in self.meant_at(at) if at >= self.since else ():
+            after = self.steps(stack, meant.terminals)
+            if after is not None:
+                new = _Change(at, meant.words, (meant.text,), change)
+                self.push(cost + meant.cost, at + meant.words, after, new, 0)
+
+    def meant_at(self, at: int) -> Sequence[Meaning]:
+        """What may be meant by the words from one on."""
+        if at not in self.meanings:
+            self.meanings[at] = self.speller.meant(self.words, at)
+        return self.meanings[at]
+
+    def steps(self, stack: Stack, terminals: Iterable[str]) -> Stack | None:
+        """The stack after several terminals; None where one of them cannot come."""
+        after: Stack | None = stack
+        for terminal in terminals:
+            after = None if after is None else self.speller.automaton.step(after, terminal)
+        return after
+
+    def put_in(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
+        """Each word that may stand before the next one."""
+        if put >= MOST_PUT_IN_A_ROW:
+            return
+        if stack not in self.offered:
+            self.offered[stack] = list(self.offers(stack))
+        for price, texts, after in self.offered[stack]:
+            self.push(cost + price, at, after, _Change(at, 0, texts, change), put + 1)
+
+    def offers(self, stack: Stack) -> Iterator[tuple[float, tuple[str, ...], Stack]]:
+        """What may be put in: what it costs, how it may be written, and what follows."""
+        for terminal in self.speller.automaton.offered(stack):
+            price, texts = self.speller.put.get(terminal, (0.0, ()))
+            after = self.speller.automaton.step(stack, terminal) if texts else None
+            if after is not None:
+                yield price, texts, after
+
+    def leave_out(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
+        """The next word left out; what was put in stands behind it just as well."""
+        if at < len(self.words):
+            price = self.speller.drop(self.words[at])
+            self.push(cost + price, at + 1, stack, _Change(at, 1, (), change), 0)
+
+
+def _in_order(last: _Change | None) -> Iterator[_Change]:
+    if last is not None:
+        yield from _in_order(last.before)
+        yield last
+
+
+def _joined(text: str, words: list[Word], changes: list[_Change], texts: tuple[str, ...]) -> Repair:
+    """All changes as one, of the part of the text that holds them."""
+    first, last = changes[0].at, changes[-1].at + changes[-1].words
+    parts: list[str] = []
+    at = first
+    for change, new in zip(changes, texts, strict=True):
+        parts += [w.text for w in words[at : change.at]] + ([new] if new else [])
+        at = change.at + change.words
+    if first == last:  # something is put in
+        begin = end = words[first - 1].end if first else 0
+        new = spaced(parts)
+        if first and new not in _NO_BLANK_BEFORE and not (new == "(" or text[begin - 1] in "(["):
+            new = f" {new}"
+        if end < len(text) and not text[end].isspace() and new.strip() not in _NO_BLANK_AFTER:
+            new = new if text[end] in ",)]:" else f"{new} "
+        return Repair(begin, end, new)
+    return Repair(words[first].begin, words[last - 1].end, spaced(parts))
+
+
+def spaced(parts: Sequence[str]) -> str:
+    """Words as one writes them, with blanks where they belong.
+
+    >>> spaced(["touching", "(", "a", ",", "b", ")", "for", "2", "s"])
+    'touching(a, b) for 2 s'
+    """
+    said = ""
+    for before, part in zip(["", *parts], parts, strict=False):
+        called = part in ("(", "[") and before[-1:].isidentifier()
+        glued = part in _NO_BLANK_BEFORE or before in _NO_BLANK_AFTER or called
+        said += part if glued or not said else f" {part}"
+    return said

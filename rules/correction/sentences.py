@@ -1,0 +1,73 @@
+"""What is said of things in plain words, `the arm holds the part`, as a call: `coupled(arm, part)`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterator, Sequence
+
+from visup.rules.correction.everyday import FILLERS
+
+LONGEST = 9
+"""Words of a sentence, those that say nothing included."""
+_BETWEEN = FILLERS | frozenset(
+    [
+        "with",
+        "from",
+        "by",
+        "into",
+        "onto",
+        "in",
+        "on",
+        "and",
+        "each",
+        "other",
+        "against",
+        "toward",
+        "towards",
+        "between",
+    ]
+)
+
+Verb = Callable[[str, int], str | None]
+"""The relation of so many things that is meant by a word, or None."""
+
+
+def sentences(
+    words: Sequence[str], names: Container[str], verb: Verb
+) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """How many words say something of one thing or of two, and what: the relation and the things.
+
+    >>> list(sentences("a is touching b".split(), ["a", "b"], lambda w, n: w if n == 2 else None))
+    [(4, ('touching', 'a', 'b'))]
+
+    Args:
+        words: From the first word of the sentence on.
+        names: What things are called.
+        verb: The relation that a word means.
+    """
+    content = [(n, w) for n, w in enumerate(_run(words)) if w in names or w not in _BETWEEN]
+    said = [w for _, w in content]
+    for shape in ((0, 1, 2), (1, 0, 2), (2, 0, 1), (1, 0), (0, 1)):
+        if len(said) <= max(shape) or (content[0][0] > 0 and shape[0] > 0):
+            continue
+        name, things = said[shape[0]], [said[n] for n in shape[1:]]
+        meant = verb(name, len(things)) if all(t in names for t in things) else None
+        if meant is not None and name not in names and len(set(things)) == len(things):
+            yield content[max(shape)][0] + 1, (meant, *things)
+
+
+def _run(words: Sequence[str]) -> Iterator[str]:
+    """The words up to the first sign."""
+    for word in words[:LONGEST]:
+        if not word.isidentifier():
+            return
+        yield word
+
+
+def called(said: Sequence[str]) -> str:
+    """A relation of things, as it is written."""
+    return f"{said[0]}({', '.join(said[1:])})"
+
+
+def terminals_of_call(things: int) -> tuple[str, ...]:
+    """The terminals of a call with so many names."""
+    return ("NAME", "LPAR", "NAME", *("COMMA", "NAME") * (things - 1), "RPAR")

@@ -1,0 +1,271 @@
+"""How words of task files are put in, left out and taken for others, to bring one into the grammar."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from types import MappingProxyType
+
+from visup.agent.model.did_you_mean import closest
+from visup.rules.correction.automaton import LrAutomaton
+from visup.rules.correction.everyday import FILLERS, meant_by
+from visup.rules.correction.search import Meaning, Speller
+from visup.rules.correction.sentences import LONGEST, called, sentences, terminals_of_call
+from visup.rules.correction.words import Terminals, Word, terminals_of
+from visup.rules.formula.units import UNITS_MEANT
+from visup.rules.language.synonyms import synonym
+from visup.tasks.actions.actions import ACTIONS, known_actions
+from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
+from visup.tasks.diagnostics.recovery import KEYWORDS
+from visup.tasks.grammar.parser import parser
+from visup.tasks.grammar.statement import NAME
+
+SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
+"""What it costs to take a word for another: written so but for its case; said so; spelt nearly so."""
+NOISE, PLAIN, KNOWN = 0.2, 0.7, 2.5
+"""What it costs to leave out a word that says nothing, one that is not known, and one that is."""
+LONGEST_NAME = 4
+"""Words that may have been meant as one name."""
+ANY_NAME = ("NAME", "UNIT", "MODEL")
+"""Terminals that any word may be."""
+_PUT_IN = {
+    ")": 1.0, "(": 1.0, ",": 1.0, ":": 1.0, "&": 1.6, "=": 1.2, "when": 0.8, "order": 0.5, "of": 0.6,
+    "each": 0.8, "to": 0.9, "least": 0.8, "most": 0.8, "times": 0.5, "than": 0.5, "first": 0.5, "from": 0.5,
+    "ignored": 0.5, "is": 0.9, "and": 1.3, "for": 1.3, "within": 1.4, "at": 1.0, "the": 0.4, "largest": 1.6,
+    "red": 1.6, "what": 1.0, "<": 1.5, "5": 2.0, "2": 1.6, "any": 1.0, "new": 1.0, "left": 1.5,
+    "actor": 1.3, "during": 1.5, '"dock"': 2.0, "larger": 1.4, "enters": 1.4, "moves": 1.4, "part": 1.2,
+    "zone": 1.3, "parameter": 1.3, "never": 1.5,
+}  # fmt: skip
+"""What it costs to put in a word."""
+_BRACKETS = {"[": "(", "]": ")", "{": "(", "}": ")"}
+_BEGINNINGS = {
+    "actor": "object|entity|robot|agent|player|model|item|thing|body|actors",
+    "parameter": "param|params|const|constant|let|set|define|def|var|variable|parameters|value",
+    "zone": "area|region|place|rect|rectangle|polygon|zones",
+    "ground": "floor|plane",
+    "include": "import|use|load|using|includes",
+    "never": "forbid|forbidden|avoid|prohibit|prevent|not|nie|jamais|nunca|no|exclude|disallow",
+    "always": "ensure|require|requires|must|invariant|assert|keep|maintain|immer|toujours|siempre",
+    "bystander": "ignore|bystanders|ignored|ignoring",
+}
+_STATEMENT = {word: meant for meant, words in _BEGINNINGS.items() for word in words.split("|")}
+_RANKS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
+          "topmost": "highest", "uppermost": "highest", "top": "highest", "bottom": "lowest",
+          "nearest": "lowest", "bottommost": "lowest"}  # fmt: skip
+_LASTING = {"bigger": "larger", "longer": "larger", "taller": "larger", "shorter": "smaller",
+            "moved": "moves", "starts": "moves", "comes": "enters", "came": "enters",
+            "arrives": "enters", "appears": "enters", "entered": "enters", "stays": "rests",
+            "stands": "rests", "lies": "rests", "who": "what", "which": "what"}  # fmt: skip
+_CALLS = re.compile(rf"({NAME})\s*\(([^()<>]*)\)")
+
+
+def speller(text: str) -> Speller:
+    """How the words of a task file are spelt.
+
+    Args:
+        text: The whole file, for the names in it.
+    """
+    calls = [(m[1], re.findall(NAME, m[2])) for m in _CALLS.finditer(text)]
+    actors = tuple(dict.fromkeys(a for _, names in calls for a in names if a not in KEYWORDS))
+    stages = frozenset(re.findall(rf"<\s*({NAME})\s*>\s*:", text))
+    put = {**_put(), "NAME": (2.2, (*actors[:3], "other"))}
+    meanings = _Meanings(stages)
+    return Speller(
+        _automaton(), _terminals(), put, _drops({*actors, *stages}), meanings, ("MODEL",)
+    )
+
+
+@lru_cache(maxsize=1)
+def _automaton() -> LrAutomaton:
+    return LrAutomaton.of(parser(), "start")
+
+
+def _terminals() -> Terminals:
+    return terminals_of(parser())
+
+
+@lru_cache(maxsize=512)
+def _terminals_of(word: str) -> tuple[str, ...]:
+    """The terminals that a word of the language may be, whatever follows."""
+    return tuple(t.name for t in _terminals() if t.name not in ANY_NAME and t.alone.fullmatch(word))
+
+
+@lru_cache(maxsize=1)
+def _put() -> Mapping[str, tuple[float, tuple[str, ...]]]:
+    found: dict[str, tuple[float, tuple[str, ...]]] = {}
+    for word, cost in _PUT_IN.items():
+        for terminal in _terminals_of(word):
+            found.setdefault(terminal, (cost, (word,)))
+    found["HEAD"] = (3.0, ("<task> ::=",))
+    found["UNIT"] = (0.8, ("s", "px", "px/s", "m", "%"))
+    found["MODEL"] = (2.2, ("other",))
+    return MappingProxyType(found)
+
+
+def _drops(names: set[str]) -> Callable[[Word], float]:
+    known = names | set(known_actions())
+
+    def drop(word: Word) -> float:
+        if word.text in known or word.text[0] in '<"':
+            return KNOWN
+        if word.text.casefold() in FILLERS or word.text in (";", ".", "->", "then", "next", "by"):
+            return NOISE
+        if not word.text[0].isalnum():
+            return 0.3 if not word.terminals else 1.0
+        if word.text[0].isdigit():
+            return 2.0
+        return 1.6 if word.text in KEYWORDS else PLAIN
+
+    return drop
+
+
+class _Things:
+    """What may be the name of a thing: any word that is none of the language and no relation."""
+
+    def __contains__(self, word: object) -> bool:
+        return (
+            isinstance(word, str)
+            and word.isidentifier()
+            and word not in KEYWORDS
+            and word not in FILLERS
+            and word not in known_actions()
+        )
+
+
+def plain_call(said: str) -> str:
+    """What is said in plain words as an action; the same words where they say none."""
+    words = said.split()
+    while words and words[0].casefold() in FILLERS:
+        words = words[1:]
+    found = sentences(words, _Things(), _verb)
+    return next((called(call) for n, call in found if n == len(words)), said)
+
+
+def _verb(word: str, things: int) -> str | None:
+    """The action of so many actors that is meant by a word."""
+    known = _of_arity(things)
+    return word if word in known else synonym(word, known)
+
+
+@lru_cache(maxsize=2)
+def _of_arity(things: int) -> tuple[str, ...]:
+    return tuple(
+        name
+        for name, action in {**ACTIONS, **known_actions()}.items()
+        if action.kinds == ("object",) * things and not action.measures
+    )
+
+
+def _head_of(said: Sequence[str]) -> tuple[int, str] | None:
+    """How many words begin a rule in another manner, and the name of its stage."""
+    line, ends = "", []
+    for word in said:
+        line += f" {word}"
+        ends.append(len(line))
+    m = _HEAD.match(line)
+    if m is None or m[1] in KEYWORDS:
+        return None
+    return sum(end <= m.end() for end in ends), _stage_name(m[1])
+
+
+def _stage_name(said: str) -> str:
+    """A name of a stage for words that are none."""
+    name = re.sub(r"\W+", "_", said.strip()).strip("_")
+    return name if name[:1].isalpha() else f"stage_{name}"
+
+
+_REFERENCE = re.compile(r"< (\w[\w \-.]*) >")
+_HEAD = re.compile(
+    r"(?: (?:task|stage|def|define|function|rule|step|phase|action|- ))?(?: \d+ [.)])?"
+    r"(?: <)? <?[ ]*([^\W_][\w \-.]*?)(?:(?<!\w) \( \)| \( \))?[ ]*>?(?: >)?"
+    r" (?:::=|: : =|: =|: :|:|=|- >|-> |→|=>|= >)(?= |\Z)"
+)
+
+
+class _Meanings:
+    """What words of a file may mean where they stand.
+
+    Args:
+        stages: That the file defines.
+    """
+
+    def __init__(self, stages: frozenset[str]) -> None:
+        self.stages = stages
+        self.names = _Things()
+
+    def __call__(self, words: Sequence[Word], at: int) -> list[Meaning]:
+        """See `Speller.meant`."""
+        said = [w.text for w in words[at : at + LONGEST]]
+        found = [
+            Meaning(length, (terminal,), meant, cost)
+            for length, meant, cost in self.of(said[:LONGEST_NAME], at == 0)
+            for terminal in (("NAME",) if meant.endswith("_1") else _kinds(meant))
+        ]
+        for length, call in sentences(said, self.names, _verb):
+            found.append(Meaning(length, terminals_of_call(len(call) - 1), called(call), LIKELY))
+        if said[0] in self.names and len(said) > 1 and said[1] in ("<", ">", "<=", ">="):
+            read = ("SIGNAL", "LPAR", "NAME", "RPAR")
+            found.append(Meaning(1, read, f"signal({said[0]})", GUESS))
+        if said[0] == "<" and (ref := _REFERENCE.match(" ".join(said))):
+            found.append(
+                Meaning(ref[0].count(" ") + 1, ("STAGE",), f"<{_stage_name(ref[1])}>", LIKELY)
+            )
+        if at == 0 and (head := _head_of(said)) is not None:
+            found.append(Meaning(head[0], ("HEAD",), f"<{head[1]}> ::=", LIKELY))
+        return found
+
+    def of(self, said: Sequence[str], first: bool) -> Iterator[tuple[int, str, float]]:
+        """How many of some words mean what, and how far-fetched that is."""
+        word, called = said[0], len(said) > 1 and said[1] == "("
+        low = word.casefold()
+        for length, meant in meant_by(said):
+            if not (called and length == 1):
+                yield length, meant, LIKELY
+                yield from ((length, s, GUESS) for s in _IN_COURSES.get(meant, ()))
+        tables = (
+            UNITS_MEANT,
+            _BRACKETS,
+            _RANKS,
+            _LASTING,
+            SIGNS_MEANT,
+            _STATEMENT if first else {},
+        )
+        yield from ((1, table[low], LIKELY) for table in tables if low in table)
+        yield from ((1, sign, GUESS) for sign in _IN_COURSES.get(low, ()))
+        if low in ("=", ":", "as", "be", "has", "means"):
+            yield 1, "is", LIKELY
+        if word[0].isalpha():
+            yield from self.of_name(said, called)
+
+    def of_name(self, said: Sequence[str], called: bool) -> Iterator[tuple[int, str, float]]:
+        """What is meant by a word of letters."""
+        word = said[0]
+        for length in range(2, len(said) + 1):
+            joined = "_".join(said[:length]).replace("_-_", "_")
+            if joined in known_actions():
+                yield length, joined, LIKELY
+        if word in self.stages and not called:
+            yield 1, f"<{word}>", LIKELY
+        if word in KEYWORDS:
+            if called or (len(said) > 1 and said[1] in ",)"):
+                yield 1, f"{word}_1", GUESS
+        elif word.casefold() in KEYWORDS:
+            yield 1, word.casefold(), SURE
+        elif not called and len(word) > 2 and (near := closest(word, KEYWORDS, 0.7)):
+            yield 1, near, GUESS
+        if called and word not in known_actions():
+            named = synonym(word, ACTIONS) or closest(word, known_actions())
+            if named is not None:
+                yield 1, named, LIKELY
+
+
+_IN_COURSES = {"and": ("&",), "or": ("|",), "/": ("|",), "||": ("|",), "&&": ("&",), "if": ("when",),
+               "while": ("when", "&"), "until": ("ends",)}  # fmt: skip
+"""Words of conditions and of other languages, as signs of courses."""
+
+
+def _kinds(meant: str) -> tuple[str, ...]:
+    if meant.startswith("<") and len(meant) > 2:
+        return ("STAGE",)
+    return _terminals_of(meant) or ("NAME",)
