@@ -35,7 +35,7 @@ class LrAutomaton:
     @classmethod
     def of(cls, parser: Lark, start: str) -> LrAutomaton:
         """The automaton of a parser, for one of its start symbols."""
-        table = parser.parser.parser._parse_table  # type: ignore[attr-defined]
+        table = parser.parser.parser._parse_table
         return cls(table.states, table.start_states[start], table.end_states[start])
 
     def offered(self, stack: Stack) -> list[str]:

@@ -125,14 +125,14 @@ def _meant(
 def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Meaning]:
     """Calls that are meant by words without brackets, or that are missing before what follows."""
     first, follows = said[0], said[1] if len(said) > 1 else ""
-    if first in _SAID and follows != "(":
-        takes = _SAID[first].takes
+    if first in _TAKES and follows != "(":
+        takes = _TAKES[first]
         given = [w for w in said[1 : len(takes) + 1] if w.isidentifier() and w not in KEYWORDS]
         for words in (given, list(variables)):
             if takes and len(words) >= len(takes):
                 call, read = (first, *words[: len(takes)]), len(takes) if words is given else 0
                 yield Meaning(1 + read, terminals_of_call(len(takes)), called(call), LIKELY)
-    if first.isidentifier() and first not in _SAID and follows in ("<", ">", "<=", ">="):
+    if first.isidentifier() and first not in _TAKES and follows in ("<", ">", "<=", ">="):
         yield Meaning(1, terminals_of_call(1), f"signal({first})", GUESS)
     if first in ("say", "hold", "cooldown", "unless") and variables:
         call = ("touching", *variables[:2]) if len(variables) > 1 else ("seen", *variables)
@@ -200,10 +200,11 @@ def _verb(word: str, things: int) -> str | None:
     return word if word in known else synonym(word, known) or closest(word, known, 0.8)
 
 
-_SAID = {**RULES.words, **RULES.quantities}
+_TAKES = {name: word.takes for name, word in RULES.words.items()} | {
+    name: quantity.takes for name, quantity in RULES.quantities.items()
+}
 _RELATIONS = [
-    [name for name, word in _SAID.items() if word.takes == ("object",) * things]
-    for things in (1, 2)
+    [name for name, takes in _TAKES.items() if takes == ("object",) * things] for things in (1, 2)
 ]
 
 
@@ -215,10 +216,10 @@ def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
         if meant.casefold() != first.casefold() or length > 1:
             yield Meaning(length, (_terminal(meant),), meant, LIKELY)
     if at and words[at - 1].text[0].isdigit():
-        near = get_close_matches(first.casefold(), _UNITS, n=2, cutoff=0.5)
+        units = get_close_matches(first.casefold(), _UNITS, n=2, cutoff=0.5)
         yield from (
             Meaning(1, ("UNIT",), unit, GUESS)
-            for unit in near
+            for unit in units
             if words[at].terminals[:1] != ("UNIT",)
         )
     if first.casefold() in UNITS_MEANT:
