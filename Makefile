@@ -15,6 +15,8 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	  --config-settings editable_mode=compat -e '.[dev]'
+	@echo 'Compiling the hot loops: once, for about a minute.'
+	$(BIN)/python -m visup.serving.warm_up
 	touch $@
 
 demo: setup
