@@ -11,7 +11,7 @@ from shutil import rmtree
 import pytest
 
 from tests.archive.recordings import record
-from tests.console.conftest import OPERATOR, VIEWER
+from tests.console.running import OPERATOR, VIEWER
 from tests.console.test_runs import SETTINGS, doubtful
 from tests.paths import ROOT
 from tests.teaching.browser import Browser, found_browser
