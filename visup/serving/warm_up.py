@@ -1,6 +1,6 @@
 """What a process does that has no job yet: what cameras need is loaded, and compiled loops with it.
 
-As a program (`python -m visup.serving.warm_up`) it has the loops compiled once, so that no run waits for that.
+As a program (`python -m visup.serving.warm_up`) it has the loops compiled, so that no run waits for that.
 """
 
 from __future__ import annotations
