@@ -17,11 +17,13 @@ from itertools import cycle
 from pathlib import Path
 from statistics import median
 
+import pytest
+
 from tests.archive.recordings import record
 from tests.console.running import OPERATOR, running_console
 from tests.console.test_runs import SETTINGS
 from tests.rules.scenes import box_region, seen
-from tests.teaching.browser import Browser
+from tests.teaching.browser import Browser, found_browser
 from visup.agent import Observation
 from visup.agent.storage.journal_reader import JOURNAL
 from visup.runs.demo import demo_settings
@@ -146,7 +148,12 @@ def agent_cost(scratch: Path, address: str, library: Path) -> float:
 
 
 def main() -> int:
-    """Measure, and say it as JSON."""
+    """Measure, and say it as JSON; where there is no browser, say that."""
+    try:
+        found_browser()
+    except pytest.skip.Exception as why:
+        print(why)
+        return 0
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         library, saved = scratch / "library", scratch / "saved"
