@@ -15,6 +15,8 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	  --config-settings editable_mode=compat -e '.[dev]'
+	@echo 'Compiling the hot loops: once, for about a minute.'
+	$(BIN)/python -m visup.serving.warm_up
 	touch $@
 
 demo: setup
@@ -41,6 +43,7 @@ oracles: setup
 
 bench: setup
 	$(BIN)/python -m visup.evaluation.bench
+	$(BIN)/python -m tests.console.pace
 	test ! -d ../shared/data || $(BIN)/python -m tests.story ../shared/data/worlds ../shared/data/machines
 
 # The documentation as a site in site/; every warning is an error.

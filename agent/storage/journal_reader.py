@@ -128,6 +128,17 @@ class Recording:
         rows = self._rows("SELECT frame_index, time FROM steps ORDER BY frame_index")
         return ((int(index), float(time)) for _, (index, time) in rows)
 
+    def summary_at(self, frame: int) -> dict[str, Any]:
+        """What was believed after one step, in short.
+
+        Raises:
+            OutputError: There is no such step, or it is damaged.
+        """
+        sql = "SELECT frame_index, time, summary FROM steps WHERE frame_index = ?"
+        for _, (index, time, text) in self._rows(sql, (frame,)):
+            return {"frame_index": index, "time": time, **self._record(text)}
+        raise self._no_step(frame)
+
     def step_at(self, frame: int) -> tuple[dict[str, Any], Observation]:
         """What was believed after one step, in short, and what was perceived in it.
 
@@ -138,7 +149,10 @@ class Recording:
         for path, (index, time, text, seen, crc) in self._rows(sql, (frame,)):
             told = {"frame_index": index, "time": time, **self._record(text)}
             return told, _perceived(path, index, seen, crc)
-        raise OutputError(f"frame {frame} was not judged in this run", where=str(self.path))
+        raise self._no_step(frame)
+
+    def _no_step(self, frame: int) -> OutputError:
+        return OutputError(f"frame {frame} was not judged in this run", where=str(self.path))
 
     def stamp(self) -> RecordStamp:
         """What is known of a record besides what it tells: camera, host, time by the clock of the wall."""

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,10 +9,10 @@ import pytest
 
 from tests.archive.recordings import meeting, record
 from tests.console.evidence_files import keep_evidence
+from tests.console.running import running_console
 from tests.console.test_runs import SETTINGS, doubtful
 from visup.api.recorded import open_run
 
-OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
 SECRET = "what stands outside of the folders"
 
 
@@ -37,24 +34,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="package")
 def console(folder: Path) -> Iterator[str]:
-    """The address of a console, ending in a slash; whatever is asked of it, it never fails inside."""
-    saved, told = folder.parent / "saved", folder.parent / "stderr"
+    """The address of a console, ending in a slash."""
+    saved = folder.parent / "saved"
     saved.mkdir()
-    tokens = {"VISUP_CONSOLE_TOKEN": OPERATOR, "VISUP_CONSOLE_VIEWER_TOKEN": VIEWER}
-    command = [sys.executable, "-m", "visup.cli", "console", str(folder), "--port", "0"]
-    with (
-        told.open("w") as errors,
-        subprocess.Popen(
-            [*command, "--save-to", str(saved)],
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            text=True,
-            env={**os.environ, **tokens},
-        ) as process,
-    ):
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert "token=" in line, told.read_text()
-        yield line.split()[-1].partition("?")[0]
-        process.terminate()
-    assert "Traceback" not in told.read_text(), told.read_text()[-3000:]
+    with running_console(folder, saved) as address:
+        yield address

@@ -13,7 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.console.conftest import OPERATOR, SECRET
+from tests.console.conftest import SECRET
+from tests.console.running import OPERATOR
 from visup.console.access import COOKIE
 from visup.console.library import run_key
 

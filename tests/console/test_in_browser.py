@@ -8,14 +8,18 @@ from importlib.resources import files
 from pathlib import Path
 from shutil import rmtree
 
+import numpy as np
 import pytest
 
 from tests.archive.recordings import record
-from tests.console.conftest import OPERATOR, VIEWER
+from tests.clips import write_clip
+from tests.console.running import OPERATOR, VIEWER
 from tests.console.test_runs import SETTINGS, doubtful
 from tests.paths import ROOT
 from tests.teaching.browser import Browser, found_browser
 from visup.console.feedback import read_feedback
+from visup.console.workbench.remembering import MODELS
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.runs.inputs.answer_box import ANSWERS
 from visup.runs.inputs.zones import load_zones
 
@@ -270,10 +274,13 @@ def test_why_an_object_looks_like_a_model_is_shown(
     browser: Browser, address: str, folder: Path
 ) -> None:
     models = ROOT / "visup" / "data" / "demo.models"
-    record(folder / "alike", doubtful(), replace(SETTINGS, models=models))
+    clip = write_clip(
+        folder.parent / "alike.avi", [np.full((480, 640, 3), 90, np.uint8)] * 60, 10.0
+    )
+    record(folder / "alike", doubtful(), replace(SETTINGS, models=models), source=str(clip))
     try:
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
-        browser.open(f"{address}?token={VIEWER}")
+        browser.open(f"{address}?token={OPERATOR}")
         follow(browser, "alike")
         browser.press("End")
         shows(browser, "frame 59")
@@ -284,6 +291,12 @@ def test_why_an_object_looks_like_a_model_is_shown(
         assert violations(browser) == []
         press(browser, "Close")
         browser.until("!document.querySelector('.likeness')")
+        browser.value("document.querySelector('[aria-label=\"Name of the model\"]').focus()")
+        browser.type("box")
+        press(browser, "Remember as a model")
+        shows(browser, "is known from now on")
+        known = ModelDatabase.open(folder.parent / "saved" / MODELS)
+        assert [v.name for v in known.taught] == ["box"]
     finally:
         rmtree(folder / "alike")
 

@@ -6,8 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.archive.recordings import meeting, record
+from tests.console.test_runs import SETTINGS
 from visup.agent.model.errors import ErrorGroup, OutputError, SourceLocation, TaskError
 from visup.console import state
+from visup.console.library import RunLibrary
+from visup.console.state import ConsoleState
 
 SECRET = TaskError("unexpected word", where=SourceLocation("/etc/keys", 1, 1, "swordfish", 9))
 
@@ -24,3 +28,14 @@ def test_no_line_of_a_file_that_only_a_run_names_is_quoted(
         state._opened(tmp_path)
     assert "swordfish" not in str(told.value)
     assert "/etc" not in str(told.value)
+
+
+def test_a_run_that_takes_the_place_of_another_is_read_anew(tmp_path: Path) -> None:
+    record(tmp_path / "runs" / "a", meeting(30), SETTINGS)
+    shared = ConsoleState(RunLibrary([tmp_path / "runs"]))
+    (entry,) = shared.library.scan()
+    assert len(shared.view(entry.key).frames) == 30
+    (tmp_path / "runs" / "a").rename(tmp_path / "old")
+    record(tmp_path / "runs" / "a", meeting(12), SETTINGS)
+    assert len(shared.view(entry.key).frames) == 12
+    assert len(shared.inquiry(entry.key).mind(12).objects) > 0

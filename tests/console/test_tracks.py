@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Alert, Event, Severity, Status
+from visup.agent.model.records import ReportState
 from visup.console.drawing.timeline_svg import timeline_svg
-from visup.console.tracks import PRESENCE, TimelineTrack, tracks_of
+from visup.console.tracks import PRESENCE, TimelineTrack, behaviour_tracks, tracks_of
 
 TIMES = st.floats(0.0, 50.0)
 STAGES = st.builds(
@@ -98,3 +99,29 @@ def test_objects_are_called_by_their_actors() -> None:
     ]
     (row,) = tracks_of(events, (), 5.0, {"arm": ("rms",)})
     assert (row.label, row.object_id) == ("1 arm", 1)
+
+
+STATES = st.lists(
+    st.dictionaries(
+        st.sampled_from(["motion", "shape", "closer_look"]),
+        st.sampled_from([s.value for s in ReportState]),
+        max_size=3,
+    ),
+    max_size=12,
+)
+
+
+@given(STATES)
+def test_a_behaviour_that_did_not_always_run_has_a_row_that_says_what_it_did(
+    states: list[dict[str, str]],
+) -> None:
+    seconds = float(len(states))
+    rows = behaviour_tracks([(float(k), now) for k, now in enumerate(states)], seconds)
+    told = {row.label: row.spans for row in rows}
+    for name in ("motion", "shape", "closer_look"):
+        moments = [(float(k), now[name]) for k, now in enumerate(states) if name in now]
+        spans = told.get(name.replace("_", " "), ())
+        assert bool(spans) == any(state != "ran" for _, state in moments)
+        for time, state in moments if spans else ():
+            assert [s.state for s in spans if s.start <= time < s.end] == [state]
+    ET.fromstring(timeline_svg(rows, seconds))

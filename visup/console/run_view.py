@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,7 +20,7 @@ from visup.api.recorded import open_run
 from visup.console.drawing.pictures import RunPictures, jpeg
 from visup.console.recorded_mind import recorded_mind
 from visup.console.run_files import flows_of, zones_of
-from visup.console.tracks import TimelineTrack, tracks_of
+from visup.console.tracks import TimelineTrack, behaviour_tracks, tracks_of
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.report.annotate import annotate
 from visup.runs.settings import WatchSettings
@@ -38,8 +39,8 @@ MOST_TRAIL = 60
 LOOKED_BACK = 20
 """Moments back to the last time that somebody looked what an object is."""
 
-MOST_SHARES = 240
-"""Moments at which the identity of an object is looked up for its curve."""
+MOST_SAMPLES = 240
+"""Moments at which what changes slowly is looked up for its curve or row."""
 
 
 class RunView:
@@ -110,7 +111,9 @@ class RunView:
     @cached_property
     def tracks(self) -> tuple[TimelineTrack, ...]:
         """What happened, laid out over time."""
-        return tracks_of(self.events, self.alerts, self.seconds, self.actors)
+        told = tracks_of(self.events, self.alerts, self.seconds, self.actors)
+        states = ((t, _states(told)) for t, told in self._samples())
+        return (*told, *behaviour_tracks(states, self.seconds))
 
     @cached_property
     def pictures(self) -> RunPictures:
@@ -218,13 +221,24 @@ class RunView:
         return jpeg(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8))
 
     def shares(self, object_id: int) -> Iterator[tuple[float, Mapping[str, float]]]:
-        """How sure each identity of an object was over time: time, and name -> share of the votes.
-
-        An approximation: it is looked up at a few hundred moments, so that shorter changes do not show.
-        """
-        step = max(1, len(self.frames) // MOST_SHARES)
-        for number in range(0, len(self.frames), step):
-            told, _ = self._run.recording.step_at(self.frames[number])
+        """How sure each identity of an object was over time: time, and name -> share of the votes."""
+        for time, told in self._samples():
             for line in told.get("objects", ()):
                 if line.get("id") == object_id:
-                    yield self.times[number], {str(n): float(s) for n, s in line["candidates"]}
+                    yield time, {str(n): float(s) for n, s in line["candidates"]}
+
+    def _samples(self) -> Iterator[tuple[float, Mapping[str, Any]]]:
+        """What was believed, in short, at a few hundred moments.
+
+        An approximation, for runs of days: changes that are shorter than that may not show.
+        """
+        step = max(1, len(self.frames) // MOST_SAMPLES)
+        for number in range(0, len(self.frames), step):
+            yield self.times[number], self._run.recording.summary_at(self.frames[number])
+
+
+def _states(told: Mapping[str, Any]) -> Mapping[str, str]:
+    """Behaviour -> what became of it in a step."""
+    found = told.get("behaviours")
+    rows = found.items() if isinstance(found, Mapping) else ()
+    return {str(name): str(said[0]) for name, said in rows if isinstance(said, list) and said}

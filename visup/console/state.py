@@ -9,6 +9,7 @@ from threading import Lock
 from typing import TypeVar
 
 from visup.agent.model.errors import ErrorGroup, OutputError, SourceLocation, VisupError
+from visup.agent.storage.journal_reader import JOURNAL
 from visup.console.library import RunLibrary
 from visup.console.reasoning.inquiry import Inquiry
 from visup.console.run_view import RunView
@@ -18,6 +19,8 @@ MOST_INQUIRIES = 4
 """Inquiries hold all minds of a run, so few are kept."""
 
 Kept = TypeVar("Kept")
+RunIdentity = tuple[str, int]
+"""A folder, and which file its journal is: another run may take the place of one that was deleted."""
 
 
 class ConsoleState:
@@ -30,8 +33,8 @@ class ConsoleState:
 
     def __init__(self, library: RunLibrary, save_to: Path | None = None) -> None:
         self.library, self.save_to = library, save_to
-        self._views: OrderedDict[str, RunView] = OrderedDict()
-        self._inquiries: OrderedDict[str, Inquiry] = OrderedDict()
+        self._views: OrderedDict[RunIdentity, RunView] = OrderedDict()
+        self._inquiries: OrderedDict[RunIdentity, Inquiry] = OrderedDict()
         self._lock, self._asking = Lock(), Lock()
 
     def view(self, key: str, *, refresh: bool = False) -> RunView:
@@ -45,9 +48,11 @@ class ConsoleState:
             OutputError: There is no such run, or it cannot be read.
         """
         with self._lock:
-            made = _kept(self._views, key, lambda: RunView(self.library.folder(key)), MOST_VIEWS)
+            folder = self.library.folder(key)
+            which = _identity(folder)
+            made = _kept(self._views, which, lambda: RunView(folder), MOST_VIEWS)
             if refresh:
-                made = self._views[key] = made.refreshed()
+                made = self._views[which] = made.refreshed()
             return made
 
     def inquiry(self, key: str) -> Inquiry:
@@ -59,7 +64,9 @@ class ConsoleState:
         with self._lock:
             folder = self.library.folder(key)
         with self._asking:  # tasks, rules and models are loaded: other pages need not wait for that
-            return _kept(self._inquiries, key, lambda: _opened(folder), MOST_INQUIRIES)
+            return _kept(
+                self._inquiries, _identity(folder), lambda: _opened(folder), MOST_INQUIRIES
+            )
 
 
 def _opened(folder: Path) -> Inquiry:
@@ -76,7 +83,16 @@ def _opened(folder: Path) -> Inquiry:
     raise OutputError(what, where=folder.name, hint="`visup task check FILE` tells what is wrong")
 
 
-def _kept(held: OrderedDict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
+def _identity(folder: Path) -> RunIdentity:
+    try:
+        return str(folder), (folder / JOURNAL).stat().st_ino
+    except OSError:
+        return str(folder), 0
+
+
+def _kept(
+    held: OrderedDict[RunIdentity, Kept], key: RunIdentity, make: Callable[[], Kept], most: int
+) -> Kept:
     """What is held under a key, made when it is not there; the ones used longest ago go."""
     if key not in held:
         held[key] = make()

@@ -49,7 +49,7 @@ class TimelineTrack:
     """A row of the timeline.
 
     Attributes:
-        group: 'stage', 'alert', 'object' or 'health'.
+        group: 'stage', 'alert', 'object', 'health' or 'behaviour'.
         label: What it is of.
         spans: By time.
         object_id: The object that it is of, or None.
@@ -84,6 +84,26 @@ def tracks_of(
     objects = _rows("object", _presence_changes(told, actors), seconds)
     health = _rows("health", _health_changes(told), seconds)
     return (*stages, *_alert_rows(alerts, seconds), *_longest(objects), *health)
+
+
+def behaviour_tracks(
+    states: Iterable[tuple[float, Mapping[str, str]]], seconds: float
+) -> tuple[TimelineTrack, ...]:
+    """Rows of the behaviours that did not always run: when they ran, and when what kept them from it.
+
+    Args:
+        states: Seconds, and behaviour -> what became of it then, as of `visup.agent.ReportState`; by time.
+        seconds: Where the run ends.
+    """
+    changes: list[Change] = []
+    last: dict[str, str] = {}
+    for time, now in states:
+        for name, state in now.items():
+            if last.get(name) != state:
+                changes.append((name.replace("_", " "), None, time, state, ""))
+                last[name] = state
+    rows = _rows("behaviour", changes, seconds)
+    return tuple(row for row in rows if {span.state for span in row.spans} != {"ran"})
 
 
 Change = tuple[str, int | None, float, str, str]

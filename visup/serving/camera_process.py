@@ -168,7 +168,7 @@ def main() -> None:
     """Read the job, and do it."""
     pipe = ReportPipe(int(sys.argv[1]))
     if not has_job():
-        warm_up()
+        warm_up(has_job)
     line = sys.stdin.buffer.readline()
     if not line:
         return  # the supervisor has gone, and there was nothing to do

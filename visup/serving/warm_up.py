@@ -1,9 +1,13 @@
-"""What a process does that has no job yet: what cameras need is loaded, and compiled loops with it."""
+"""What a process does that has no job yet: what cameras need is loaded, and compiled loops with it.
+
+As a program (`python -m visup.serving.warm_up`) it has the loops compiled, so that no run waits for that.
+"""
 
 from __future__ import annotations
 
 import select
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import islice
 
@@ -15,15 +19,19 @@ FRAMES = 12
 """Of the shipped clip: in these there is something that moves, is followed and is recognised."""
 
 
-def warm_up() -> None:
-    """Look at some frames of the shipped clip, as long as no job is there."""
+def warm_up(stop: Callable[[], bool] = lambda: False) -> None:
+    """Look at some frames of the shipped clip.
+
+    Args:
+        stop: Asked before each frame whether there is something better to do.
+    """
     with suppress(VisupError):
         settings = demo_settings()
         agent = build_agent(settings)
         try:
             with open_video(settings) as video:
                 for frame in islice(video, FRAMES):
-                    if has_job():
+                    if stop():
                         return
                     agent.step(frame)
         finally:
@@ -33,3 +41,7 @@ def warm_up() -> None:
 def has_job() -> bool:
     """Whether something was written to standard input, or nobody will."""
     return bool(select.select([sys.stdin], [], [], 0.0)[0])
+
+
+if __name__ == "__main__":
+    warm_up()

@@ -22,8 +22,9 @@ from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report.collector import Collector
 from visup.report.page.distance_figures import distance_figures, fitted_lines
 from visup.report.page.figures import vote_figures
-from visup.report.page.html import embedded, plotly_source, report_page, write_report
+from visup.report.page.html import report_page, write_report
 from visup.report.page.sections import flat, narrative, nearest
+from visup.report.page.shell import embedded, plotly_source
 from visup.report.page.summary import summary, title_of, verdict_words
 from visup.report.records import RunData, StateSpan
 from visup.terminal.narrator import verdict_line

@@ -6,15 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from string import Template
 
-from visup.agent.model.errors import OutputError
-from visup.agent.storage.atomic import write_whole
 from visup.archive.reporting.figures import all_figures, duration_figures, verdict_figure
 from visup.archive.reporting.statistics import LakeStatistics, StageDuration
 from visup.report.page.figures import Figure
-from visup.report.page.html import embedded, plotly_source, script_hash
 from visup.report.page.sections import figures
+from visup.report.page.shell import filled_page, write_page
 from visup.wording import printable
 
 DURATION_HEAD = ("task", "stage", "runs", "a tenth under", "median", "a tenth over", "longest")
@@ -28,20 +25,6 @@ def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
         OutputError: The file cannot be written.
     """
     write_page(lake_page(found, lake), path)
-
-
-def write_page(page: str, path: Path) -> None:
-    """Write a page whole or not at all.
-
-    Raises:
-        OutputError: The file cannot be written.
-    """
-    try:
-        write_whole(path, page.encode())
-    except OSError as fault:
-        raise OutputError(
-            f"the report cannot be written ({fault.strerror or fault})", where=str(path)
-        ) from fault
 
 
 def lake_page(found: LakeStatistics, lake: Path) -> str:
@@ -60,32 +43,24 @@ def lake_page(found: LakeStatistics, lake: Path) -> str:
         "drifts": _drifts(found),
         "failures": _failures(found),
     }
-    return filled_page("lake.html", text, list(all_figures(found)))
+    return archive_page("lake.html", text, list(all_figures(found)), "all runs")
 
 
-def filled_page(template: str, text: Mapping[str, str], drawn: list[Figure]) -> str:
-    """A page that holds all that it shows.
+def archive_page(template: str, text: Mapping[str, str], drawn: list[Figure], kind: str) -> str:
+    """A page about many runs.
 
     Args:
         template: Name of its file in this folder.
         text: What stands in its places, as HTML.
         drawn: All figures that it names.
+        kind: What it is about, in a word or two.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
     """
-    shared, own = files("visup.report.page"), files("visup.archive.reporting")
-    plotly = plotly_source() if drawn else ""
-    script = (shared / "figures.js").read_text(encoding="utf-8")
-    page = Template((own / template).read_text(encoding="utf-8"))
-    return page.substitute(
-        {name: printable(words) for name, words in text.items()},
-        figures=printable(embedded(drawn)),
-        style=(shared / "report.css").read_text(encoding="utf-8"),
-        plotly=plotly,
-        script=script,
-        scripts_allowed=" ".join(map(script_hash, (plotly, script))),
-    )
+    body = (files("visup.archive.reporting") / template).read_text(encoding="utf-8")
+    shown = {name: printable(words) for name, words in text.items()}
+    return filled_page(body, shown, drawn, f"{shown['title']} (visup, {kind})")
 
 
 def _tiles(found: LakeStatistics) -> str:

@@ -40,10 +40,10 @@ def calibrate(
 ) -> None:
     """Say how much confidences are worth: how often what was said so surely was right."""
     from visup.archive.asking.database import open_database
-    from visup.archive.reporting.page import write_page
     from visup.archive.storing.places import open_lake
     from visup.evaluation.archive.calibrating import read_truth, reliabilities, truth_by_run
     from visup.evaluation.archive.calibration_page import calibration_page
+    from visup.report.page.shell import write_page
     from visup.terminal.console import echo_json, make_console
 
     opened = open_lake(lake)

@@ -50,17 +50,20 @@ class RunPictures:
         Returns:
             (H, W, 3) uint8 BGR, of the size that was watched.
         """
-        width, height = mind.frame_size
-        if self._frames is not None:
-            try:
-                with self._lock:
-                    found = self._frames.at(mind.frame_index)
-            except SourceError as fault:
-                self.problem = str(fault)
-            else:
-                if found.shape[:2] == (height, width):
-                    return found
-        return np.full((height, width, 3), GREY, np.uint8)
+        found = self.source_frame(mind)
+        return np.full((*mind.frame_size[::-1], 3), GREY, np.uint8) if found is None else found
+
+    def source_frame(self, mind: Mind) -> Picture | None:
+        """The frame of a moment, or None where it cannot be had; (H, W, 3) uint8 BGR."""
+        if self._frames is None:
+            return None
+        try:
+            with self._lock:
+                found = self._frames.at(mind.frame_index)
+        except SourceError as fault:
+            self.problem = str(fault)
+            return None
+        return found if found.shape[:2] == mind.frame_size[::-1] else None
 
     def drawn(self, mind: Mind, *, plain: bool = False) -> bytes:
         """A moment as JPEG, with what is believed drawn over it unless it shall be plain."""

@@ -16,7 +16,8 @@ LEAST_WIDTH = 2.0
 """Of a bar, in units of the picture, so that what was short is seen."""
 
 HEALTH_COLOUR = "#96769e"
-FAINT = {"hidden": 0.35, "active": 0.55, "paused": 0.45}
+RAN_COLOUR = "#7a8b99"
+FAINT = {"hidden": 0.35, "active": 0.55, "paused": 0.45, "rested": 0.25, "blind": 0.25}
 """Opacity of states in which less is known, or nothing happens."""
 
 _STATUS = {s.value: css(STATUS_COLOURS[s]) for s in Status}
@@ -76,4 +77,6 @@ def colour_of(track: TimelineTrack, span: TrackSpan) -> str:
         return _SEVERITY.get(span.state, HEALTH_COLOUR)
     if track.object_id is not None:
         return css(object_colour(track.object_id))
+    if track.group == "behaviour" and span.state in ("ran", "rested", "blind"):
+        return RAN_COLOUR
     return HEALTH_COLOUR

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.archive.reporting.figures import BAND, LINE
-from visup.archive.reporting.page import filled_page, html_table
+from visup.archive.reporting.page import archive_page, html_table
 from visup.evaluation.archive.calibrating import Reliability
 from visup.report.page.figures import Figure, rounded
 from visup.report.page.sections import figures
@@ -39,7 +39,7 @@ def calibration_page(found: Sequence[Reliability], lake: Path, fitted: str) -> s
         "numbers": html_table(NUMBERS_HEAD, rows, "Nothing was said of which the truth is known."),
         "fitted": escape(fitted),
     }
-    return filled_page("calibration.html", text, drawn)
+    return archive_page("calibration.html", text, drawn, "confidences")
 
 
 def reliability_figure(one: Reliability) -> Figure:

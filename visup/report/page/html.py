@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from string import Template
 from types import MappingProxyType
 
-from visup.agent.model.errors import ExtraMissingError, OutputError
-from visup.agent.storage.atomic import write_whole
 from visup.report.page import sections
 from visup.report.page.distance_figures import distance_figures
 from visup.report.page.downloads import downloads
@@ -26,6 +20,7 @@ from visup.report.page.figures import (
 )
 from visup.report.page.lives import lives
 from visup.report.page.player import player
+from visup.report.page.shell import filled_page, write_page
 from visup.report.page.summary import title_of, verdict_words
 from visup.report.page.task_trees import courses
 from visup.report.records import RunData
@@ -77,15 +72,7 @@ def write_report(run: RunData, path: Path) -> None:
         ExtraMissingError: The run has figures, and Plotly is not installed.
         OutputError: The file cannot be written.
     """
-    page = report_page(run)
-    try:
-        write_whole(path, page.encode())
-    except OSError as fault:
-        raise OutputError(
-            f"the report cannot be written ({fault.strerror or fault})",
-            where=str(path),
-            hint="choose a folder that exists and that you may write to",
-        ) from fault
+    write_page(report_page(run), path)
 
 
 def report_page(run: RunData) -> str:
@@ -103,43 +90,9 @@ def report_page(run: RunData) -> str:
     """
     made = {name: [f for f in make(run) if f] for name, (make, _) in FIGURES.items()}
     drawn = [f for figures in made.values() for f in figures]
-    own = files("visup.report.page")
-    plotly = plotly_source() if drawn else ""
-    script = "".join((own / name).read_text(encoding="utf-8") for name in SCRIPTS)
-    page = Template((own / "report.html").read_text(encoding="utf-8"))
+    body = (files("visup.report.page") / "report.html").read_text(encoding="utf-8")
     text = {name: part(run) for name, part in PARTS.items()}
     text |= {name: sections.figures(made[name], empty) for name, (_, empty) in FIGURES.items()}
-    text["figures"] = embedded(drawn)
-    return page.substitute(
-        {name: printable(prose(words)) for name, words in text.items()},
-        style=(own / "report.css").read_text(encoding="utf-8"),
-        plotly=plotly,
-        script=script,
-        scripts_allowed=" ".join(map(script_hash, (plotly, script))),
-    )
-
-
-def script_hash(script: str) -> str:
-    """A script as a content security policy allows it, and no other."""
-    digest = hashlib.sha256(script.encode()).digest()
-    return f"'sha256-{base64.b64encode(digest).decode()}'"
-
-
-def embedded(figures: list[Figure]) -> str:
-    """Figures as JSON that can stand inside a script element without ever ending it."""
-    values = [{"id": f.key, "data": f.traces, "layout": f.layout} for f in figures]
-    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
-    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
-
-
-def plotly_source() -> str:
-    """Plotly's own script, from the installed package.
-
-    Raises:
-        ExtraMissingError: It is not installed.
-    """
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as missing:
-        raise ExtraMissingError("the report", "report") from missing
-    return str(get_plotlyjs())
+    text = {name: printable(prose(words)) for name, words in text.items()}
+    title = f"{text['verdict_word']}: {text['title']} (visup report)"
+    return filled_page(body, text, drawn, title, SCRIPTS)

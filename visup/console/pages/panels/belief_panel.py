@@ -19,6 +19,7 @@ from visup.console.pages.frame import (
 )
 from visup.console.pages.panels.object_panel import Samples, show_object
 from visup.console.pages.panels.questions_panel import QuestionsPart
+from visup.console.pages.panels.remember_part import remember_part
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
 from visup.report.palette import STATUS_COLOURS, css, object_colour
@@ -52,6 +53,8 @@ def belief_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRol
                 known.clear()
                 known[which] = list(head.run.shares(number))
             show_object(head, key, number, known[which])
+            if role is ConsoleRole.OPERATOR and state.save_to is not None:
+                remember_part(head, number, state.save_to)
 
     now()
     identity()

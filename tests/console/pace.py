@@ -1,0 +1,183 @@
+"""How quick the console is, and what it costs the agent: `python -m tests.console.pace`.
+
+It drives a console in a real browser, over a run of two hours at ten frames a second (a scripted one of
+twelve minutes, ten times over) and a run of the shipped clip. Exit code 1 when a bar is missed.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
+from itertools import cycle
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+from tests.archive.recordings import record
+from tests.console.running import OPERATOR, running_console
+from tests.console.test_runs import SETTINGS
+from tests.rules.scenes import box_region, seen
+from tests.teaching.browser import Browser, found_browser
+from visup.agent import Observation
+from visup.agent.storage.journal_reader import JOURNAL
+from visup.runs.demo import demo_settings
+from visup.runs.inputs.audience import Audience
+from visup.runs.runner import supervise, supervised
+from visup.runs.settings import RunOptions
+
+FRAMES, TIMES, FPS = 7_200, 10, 10.0
+CLICKS = 15
+BLOCKS, BLOCK, STEP_S = 8, 25, 0.3
+"""Steps of the agent are taken in blocks, by turns without and with pages open, one each 0.3 s."""
+
+BARS = {"first_paint_s": 1.5, "click_ms": 150.0, "open_s": 2.0, "agent_cost": 0.05}
+
+MEASURED = ("first_paint_s", "open_s", "click_ms", "click_most_ms")
+
+WATCHED = """
+window.opened = null; window.clicked = null;
+const shown = () => {
+  const p = document.querySelector('img.picture');
+  return p && p.complete && p.naturalWidth > 0 ? p.src + document.querySelector('.controls').innerText : null;
+};
+const look = () => {
+  const now = shown();
+  if (now && window.opened === null) window.opened = performance.now();
+  const c = window.clicked;
+  if (c && c.end === null && now && now !== c.before) {
+    const [, src] = c.before.match(/^(.*?jpg)/) || [];
+    const text = document.querySelector('.controls').innerText;
+    if (!now.startsWith(src) && text !== c.text) c.end = performance.now();
+  }
+  requestAnimationFrame(look);
+};
+addEventListener('click', () => {
+  const text = document.querySelector('.controls')?.innerText;
+  window.clicked = {begin: performance.now(), end: null, before: shown() || '', text};
+}, true);
+requestAnimationFrame(look);
+"""
+
+
+def scripted(frames: int) -> Iterator[Observation]:
+    """An arm that comes up to a satellite and goes back, again and again."""
+    for i in range(frames):
+        k = i % 120
+        regions = [
+            box_region(1, (100.0 + 6.0 * min(k, 120 - k), 200, 80, 60)),
+            box_region(2, (500, 180, 90, 100)),
+        ]
+        names = {1: [("arm", 0.9), ("spartan", 0.3)], 2: [("spartan", 0.9), ("arm", 0.2)]}
+        yield seen(i, regions, FPS, names)
+
+
+def long_run(folder: Path) -> None:
+    """A run of two hours: what was recorded once is repeated in its journal."""
+    record(folder, scripted(FRAMES), SETTINGS)
+    with closing(sqlite3.connect(folder / JOURNAL)) as db:
+        for k in range(1, TIMES):
+            db.execute(
+                "INSERT INTO steps SELECT frame_index + ?, time + ?, summary, seen, crc FROM steps"
+                " WHERE frame_index < ?",
+                (k * FRAMES, k * FRAMES / FPS, FRAMES),
+            )
+        db.commit()
+
+
+def opened(browser: Browser, address: str, name: str) -> float:
+    """Open a run from the list; seconds until its first picture is there."""
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=WATCHED)
+    browser.open(f"{address}?token={OPERATOR}")
+    link = f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}')"
+    browser.until(f"!!{link}")
+    browser.open(browser.value(f"{link}.href"))
+    browser.until("document.querySelectorAll('.bars').length > 0 && window.opened !== null")
+    return float(browser.value("window.opened")) / 1000.0
+
+
+def first_paint(browser: Browser) -> float:
+    """Seconds until the page that is open had something to show."""
+    browser.until("performance.getEntriesByName('first-contentful-paint').length > 0")
+    return float(
+        browser.value("performance.getEntriesByName('first-contentful-paint')[0].startTime / 1000")
+    )
+
+
+def clicks(browser: Browser) -> list[float]:
+    """Milliseconds from clicks on the timeline until frame and belief are there."""
+    took = []
+    for k in range(CLICKS):
+        x, y, w = browser.value(
+            "(() => { const r = document.querySelector('.bars').getBoundingClientRect();"
+            "return [r.x, r.y, r.width]; })()"
+        )
+        browser.click(x + w * (0.05 + 0.9 * ((7 * k) % CLICKS) / CLICKS), y + 8)
+        browser.until("window.clicked && window.clicked.end !== null")
+        took.append(float(browser.value("window.clicked.end - window.clicked.begin")))
+    return took
+
+
+def agent_cost(scratch: Path, address: str, library: Path) -> float:
+    """Share that three open pages add to a step of an agent that watches the shipped clip."""
+    options = RunOptions(video=False, report=False)
+    (library / "live").mkdir()
+    run = supervised(demo_settings(), library / "live", Audience(), options)
+    took: dict[bool, list[float]] = {False: [], True: []}
+    next(run)
+    with ExitStack() as stack:
+        stack.callback(run.close)
+        for block, pages in zip(range(BLOCKS), cycle((False, True)), strict=False):
+            with ExitStack() as open_pages:
+                for k in range(3 if pages else 0):
+                    profile = scratch / f"page-{block}-{k}"
+                    page = open_pages.enter_context(Browser(profile))
+                    opened(page, address, "live")
+                    page.press("End")  # it follows the run from here on
+                for _ in range(BLOCK):
+                    begin = time.perf_counter()
+                    next(run)
+                    took[pages].append(time.perf_counter() - begin)
+                    time.sleep(max(0.0, STEP_S - took[pages][-1]))
+    return median(took[True]) / median(took[False]) - 1.0
+
+
+def main() -> int:
+    """Measure, and say it as JSON; where there is no browser, say that."""
+    try:
+        found_browser()
+    except pytest.skip.Exception as why:
+        print(why)
+        return 0
+    with tempfile.TemporaryDirectory() as name:
+        scratch = Path(name)
+        library, saved = scratch / "library", scratch / "saved"
+        saved.mkdir()
+        long_run(library / "long")
+        supervise(demo_settings(6), _made(library / "short"), options=RunOptions(video=False))
+        with running_console(library, saved) as address:
+            with Browser(scratch / "profile", (1280, 860)) as browser:
+                told: dict[str, list[float]] = {name: [] for name in MEASURED}
+                for run in ("short", "long"):
+                    told["open_s"].append(round(opened(browser, address, run), 2))
+                    told["first_paint_s"].append(round(first_paint(browser), 2))
+                    took = clicks(browser)
+                    told["click_ms"].append(round(median(took)))
+                    told["click_most_ms"].append(round(max(took)))
+            told["agent_cost"] = [round(agent_cost(scratch, address, library), 3)]
+    print(json.dumps(told))
+    return int(any(max(told[name]) > bar for name, bar in BARS.items()))
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    return folder
+
+
+if __name__ == "__main__":
+    sys.exit(main())

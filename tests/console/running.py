@@ -1,0 +1,41 @@
+"""A console in a process of its own, over a folder of runs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
+
+
+@contextmanager
+def running_console(folder: Path, saved: Path) -> Iterator[str]:
+    """The address of a console, ending in a slash; whatever is asked of it, it never fails inside.
+
+    Args:
+        folder: Of recorded runs.
+        saved: An empty folder for what operators save; what it says of trouble is kept beside it.
+    """
+    told = saved.parent / "stderr"
+    tokens = {"VISUP_CONSOLE_TOKEN": OPERATOR, "VISUP_CONSOLE_VIEWER_TOKEN": VIEWER}
+    command = [sys.executable, "-m", "visup.cli", "console", str(folder), "--port", "0"]
+    with (
+        told.open("w") as errors,
+        subprocess.Popen(
+            [*command, "--save-to", str(saved)],
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            env={**os.environ, **tokens},
+        ) as process,
+    ):
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert "token=" in line, told.read_text()
+        yield line.split()[-1].partition("?")[0]
+        process.terminate()
+    assert "Traceback" not in told.read_text(), told.read_text()[-3000:]
