@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.clips import moving_disc, write_clip
 from tests.console.test_runs import SETTINGS, doubtful
 from tests.paths import ROOT
 from tests.report.scene import frame_at
-from tests.runs.test_resume import BARE, moving_disc, write_clip
+from tests.runs.test_resume import BARE
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.model.step import Step
@@ -31,7 +32,8 @@ FRAME = frame_at(0)
 def told_of(folder: Path, said: dict[int, list[str]], box_from: int = 0) -> list[tuple[int, str]]:
     """What an agent reports of answers that are put before given steps: frame and who it is."""
     agent = reasoning_agent(SETTINGS)
-    box, troubles, told = None, [], []
+    box, told = None, []
+    troubles: list[str] = []
     for number, seen in enumerate(SEEN):
         for name in said.get(number, ()):
             put_answer(folder, 1, name)
@@ -69,7 +71,8 @@ def test_what_was_said_before_a_run_goes_on_is_taken_up_and_what_is_known_is_not
 
 @pytest.mark.parametrize("line", ["1=nobody", "what?", "\x00\xff", "=arm", "1="])
 def test_a_line_that_is_no_answer_is_told_once(tmp_path: Path, line: str) -> None:
-    agent, troubles = reasoning_agent(SETTINGS), []
+    agent = reasoning_agent(SETTINGS)
+    troubles: list[str] = []
     box = AnswerBox(agent, lambda: tmp_path, troubles.append)
     (tmp_path / ANSWERS).write_text(f"{line}\n1=arm", encoding="latin-1")
     for seen in SEEN[:5]:
