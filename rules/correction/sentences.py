@@ -51,7 +51,7 @@ def sentences(
             continue
         name, things = said[shape[0]], [said[n] for n in shape[1:]]
         meant = verb(name, len(things)) if all(t in names for t in things) else None
-        if meant is not None and name not in names and len(set(things)) == len(things):
+        if meant is not None and name not in things and len(set(things)) == len(things):
             yield content[max(shape)][0] + 1, (meant, *things)
 
 

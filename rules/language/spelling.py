@@ -101,7 +101,9 @@ def _drops(variables: Sequence[str]) -> Callable[[Word], float]:
 COST_OF_LEAVING_OUT: Mapping[str, float] = MappingProxyType(
     {
         **dict.fromkeys(("RPAR", "COMMA", "COLON", "PLUS", "OVER", "TIMES", "RSQB", "LSQB"), 0.9),
-        **dict.fromkeys(("NUMBER", "STRING", "RULE", "WHEN", "SAY"), 2.0),
+        "UNIT": 0.8,
+        "NUMBER": 1.5,
+        **dict.fromkeys(("STRING", "RULE", "WHEN", "SAY"), 2.0),
         "LPAR": 1.1,
     }
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -252,8 +253,9 @@ class _Meanings:
                 yield 1, f"{word}_1", GUESS
         elif word.casefold() in KEYWORDS:
             yield 1, word.casefold(), SURE
-        elif not called and len(word) > 2 and (near := closest(word, KEYWORDS, 0.7)):
-            yield 1, near, GUESS
+        elif not called and len(word) > 2:
+            near = get_close_matches(word.casefold(), KEYWORDS, n=3)
+            yield from ((1, meant, GUESS) for meant in near)
         if called and word not in known_actions():
             named = synonym(word, ACTIONS) or closest(word, known_actions())
             if named is not None:
