@@ -40,7 +40,7 @@ class LrAutomaton:
 
     def offered(self, stack: Stack) -> list[str]:
         """Terminals that may come next, and perhaps some that may not."""
-        return [name for name in self.states[stack[-1]] if name.isupper() or name == END]
+        return sorted(name for name in self.states[stack[-1]] if name.isupper() or name == END)
 
     def step(self, stack: Stack, terminal: str) -> Stack | None:
         """The stack after a terminal; None where it cannot come."""
