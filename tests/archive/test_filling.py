@@ -20,7 +20,7 @@ from visup.archive.filling.filling import FillResult, begin_anew, fill, only_fil
 from visup.archive.filling.plan import Plan, make_plan
 from visup.archive.filling.pool import Pool, open_pool
 from visup.archive.filling.pool_settings import PoolSettings
-from visup.archive.filling.watching import Watch, watch_job
+from visup.archive.filling.watching import ClipOutcome, Watch, watch_job
 from visup.archive.lake import Lake
 from visup.archive.schema import TABLES
 from visup.runs.settings import WatchSettings
@@ -148,6 +148,31 @@ def test_workers_of_dask_fill_the_same_lake_and_survive_a_deadly_clip(tmp_path: 
     }
     filled(alone, [c for c in some if Path(str(c.source)).read_text().isdecimal()])
     assert rows(lake) == rows(alone)
+
+
+def test_workers_that_are_all_gone_are_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process that workers are forked from is killed, and they with it: nobody can take their place."""
+    psutil = pytest.importorskip("psutil", reason="processes are found with psutil")
+    pytest.importorskip("distributed", reason="needs the extra `cluster`")
+    monkeypatch.setattr("visup.archive.filling.pool.STARVED_S", 3.0)
+    some = clips(tmp_path / "clips", *map(str, range(1, 9)))
+    lake = Lake.create(tmp_path / "lake")
+
+    def kill(outcome: ClipOutcome) -> None:
+        for process in psutil.Process().children(recursive=True):
+            if "forkserver" in " ".join(process.cmdline()):
+                process.kill()
+
+    with (
+        pytest.raises(SettingsError, match="all workers"),
+        open_pool(PoolSettings(workers=2)) as pool,
+    ):
+        fill(lake, make_plan(lake, some, SETTINGS), pool, kill, scripted)
+    begin_anew(lake, retry=True)
+    filled(lake, some)
+    assert len(lake.runs()) == len(some)
 
 
 def test_a_scheduler_that_is_not_there_is_told() -> None:

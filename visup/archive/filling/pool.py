@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
+from threading import Event, Thread
 from typing import Any
 
 from visup.agent.execution.runners import error_line
@@ -29,6 +31,9 @@ WAITING_PER_WORKER = 3
 """Jobs handed over for each worker: while one is watched, the next is there."""
 CONNECT_S = 20
 MOST_RESUBMISSIONS = 5
+STARVED_S = 60.0
+"""How long workers of this machine may all be away, before one no longer waits for them."""
+LOOK_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +43,12 @@ class Pool:
     Attributes:
         client: Of Dask, or None for this process.
         dashboard: Address of Dask's dashboard, or None.
+        own: Whether the workers were started for this, so that none are to be waited for once all are gone.
     """
 
     client: Any = None
     dashboard: str | None = None
+    own: bool = False
 
     def outcomes(
         self, lake: Lake, jobs: Sequence[Job], watch: Watch = watch_into
@@ -49,7 +56,7 @@ class Pool:
         """Run jobs and give what becomes of each, in the order in which they end."""
         if self.client is None:
             return _here(lake, jobs, watch)
-        return _on_dask(self.client, lake, jobs, watch)
+        return _on_dask(self, lake, jobs, watch)
 
 
 @contextmanager
@@ -84,7 +91,7 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
-        yield Pool(client, cluster.dashboard_link if has_dashboard else None)
+        yield Pool(client, cluster.dashboard_link if has_dashboard else None, own=True)
 
 
 @contextmanager
@@ -132,8 +139,36 @@ def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome
             yield outcome
 
 
-def _on_dask(client: Any, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
-    distributed = imported("distributed")
+@contextmanager
+def _not_for_nobody(pool: Pool, running: Collection[Any]) -> Iterator[None]:
+    """Meanwhile jobs are taken back when all workers of this machine are gone, and none comes after them.
+
+    Dask replaces a worker that dies, unless the process dies that workers are forked from.
+    """
+    over = Event()
+
+    def look() -> None:
+        seen = time.monotonic()
+        while not over.wait(LOOK_S):
+            if pool.client.ncores():
+                seen = time.monotonic()
+            elif time.monotonic() - seen > STARVED_S:
+                pool.client.cancel(list(running), force=True)
+                return
+
+    watcher = Thread(target=look, name="workers", daemon=True)
+    if pool.own:
+        watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        if pool.own:
+            watcher.join()
+
+
+def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
+    distributed, client = imported("distributed"), pool.client
     book, running = PieceBook(jobs), dict[Any, tuple[ClipPiece, int]]()
     completed = distributed.as_completed(raise_errors=False)
 
@@ -153,16 +188,17 @@ def _on_dask(client: Any, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iter
 
     for _ in range(max(1, len(client.ncores())) * WAITING_PER_WORKER):
         submit(book.next())
-    for future in completed:
-        piece, again = running.pop(future)
-        outcome = _outcome(lake, piece, future, again)
-        if outcome is None:
-            submit(piece, again + 1)
-            continue
-        finished = book.done(piece, outcome)
-        submit(book.next())
-        if finished:
-            yield finished
+    with _not_for_nobody(pool, running):
+        for future in completed:
+            piece, again = running.pop(future)
+            outcome = _outcome(lake, piece, future, again)
+            if outcome is None:
+                submit(piece, again + 1)
+                continue
+            finished = book.done(piece, outcome)
+            submit(book.next())
+            if finished:
+                yield finished
 
 
 def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutcome | None:
@@ -175,7 +211,7 @@ def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutco
         return given_up(lake, piece)
     if future.status != "error":
         raise SettingsError(
-            "the scheduler was lost",
+            "the scheduler was lost, or all workers",
             hint="run the same command again: what is in the lake is kept, and the rest is done",
         )
     if again >= MOST_RESUBMISSIONS:
