@@ -34,7 +34,7 @@ def acquire_lock(
     """
     if not path.parent.is_dir() or not path.name:
         raise _unwritable(path, what, "there is no such folder")
-    lock = FileLock(path.with_name(f".{path.name}.lock"), is_singleton=again)
+    lock = FileLock(lock_path(path), is_singleton=again)
     try:
         lock.acquire(timeout=wait_s, poll_interval=0.02)
     except Timeout as held:
@@ -46,6 +46,11 @@ def acquire_lock(
     except OSError as fault:
         raise _unwritable(path, what, fault.strerror or str(fault)) from fault
     return lock
+
+
+def lock_path(path: Path) -> Path:
+    """The hidden file that carries the lock of a file."""
+    return path.with_name(f".{path.name}.lock")
 
 
 def _unwritable(path: Path, what: str, why: str) -> OutputError:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -14,8 +15,10 @@ from hypothesis import strategies as st
 
 from tests.clips import moving_disc, write_clip
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.journal_reader import Recording
+from visup.agent.storage.file_lock import lock_path
+from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.runs.inputs.audience import Audience
+from visup.runs.recorder import Recorder
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import fresh_folder, supervised
 from visup.runs.settings import RunOptions, WatchSettings
@@ -111,6 +114,32 @@ def test_every_step_is_in_one_run_and_beliefs_go_on(camera: Camera) -> None:
     ids = [o["id"] for o in opened if o["record"] == "alert" and o["state"] == "opened"]
     assert ids
     assert ids == sorted(set(ids))
+
+
+def test_a_next_run_that_cannot_be_begun_leaves_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a disk that is full for a while: the run goes on, and the next try succeeds."""
+    camera = Camera(tmp_path)
+    refused: list[Path] = []
+
+    def begun(settings: Any, source: Any, folder: Path, *rest: Any, **more: Any) -> Recorder:
+        if any(tmp_path.rglob(JOURNAL)) and not refused:
+            refused.append(folder)
+            (folder / JOURNAL).touch()
+            lock_path(folder / JOURNAL).touch()
+            raise OutputError("the journal cannot be written (database or disk is full)")
+        return Recorder(settings, source, folder, *rest, **more)
+
+    monkeypatch.setattr("visup.runs.runner.Recorder", begun)
+    monkeypatch.setattr("visup.runs.unattended.next_run.TRY_AGAIN_S", 0.0)
+    camera.watch(60)
+    assert refused
+    folders = [f for f in camera.store.folder.iterdir() if f.is_dir()]
+    assert len(folders) >= 2
+    assert all((f / JOURNAL).stat().st_size for f in folders)
+    frames = [s["frame_index"] for run in camera.runs() for s in run.summaries()]
+    assert sorted(frames) == sorted(camera.seen)
 
 
 def test_a_run_that_goes_on_elsewhere_is_not_taken_up(camera: Camera) -> None:

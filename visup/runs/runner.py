@@ -22,7 +22,7 @@ from visup.runs.evidence.keeper import EvidenceKeeper
 from visup.runs.inputs.answer_box import AnswerBox
 from visup.runs.inputs.audience import Audience, RunFigures, RunProgress
 from visup.runs.inputs.preflight import check_cast, told_of_actors
-from visup.runs.inputs.run_folder import fresh_folder
+from visup.runs.inputs.run_folder import discard_unbegun, fresh_folder
 from visup.runs.inputs.run_sinks import sinks_of
 from visup.runs.inputs.stop_signals import stop_signals
 from visup.runs.monotonic_clock import MonotonicFrames
@@ -159,9 +159,8 @@ class _Run:
         self._alarms = VerdictMonitor(past.verdict if past else None)
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
-        self._options = options
+        self._options, self._stopped = options, False
         self._last: Step | None = None  # while none is under way
-        self._stopped = False
 
     def _recorder_in(
         self, folder: Path | None, options: RunOptions, *, resume: bool
@@ -314,14 +313,17 @@ class _Run:
             OutputError: They cannot be written.
         """
         folder = fresh_folder(places.place(), self._settings.source)
-        new = Recorder(self._settings, self.source, folder, self._options)
+        new: Recorder | None = None
         try:
+            new = Recorder(self._settings, self.source, folder, self._options)
             new.journal.note(continues=old.folder.name, clock=self._stamp.clock.anchors)
             checkpoints = CheckpointWriter(folder, self._options.state_every_s)
             checkpoints.keep(self._agent, step, recorder_state(new))
             places.go_on_with(folder)
         except OutputError:
-            new.close()
+            if new:
+                new.close()
+            discard_unbegun(folder)
             raise
         with suppress(OutputError):
             old.journal.note(next_run=folder.name)

@@ -27,6 +27,7 @@ from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.redaction import has_secret
 from visup.runs.inputs.audience import Audience, RunFigures
+from visup.runs.inputs.run_folder import discard_unbegun
 from visup.runs.result import ExitCode, RunResult
 from visup.runs.resume import InterruptedRun, interrupted_run
 from visup.runs.runner import fresh_folder, supervise
@@ -131,8 +132,7 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
             at_once=False,
         )
     except VisupError as fault:
-        with suppress(OSError):
-            job.folder.rmdir()  # what is refused before its first frame leaves no folder behind
+        discard_unbegun(job.folder)  # what is refused before its first frame leaves none behind
         pipe.send(ReportKind.REFUSED, text=str(fault), source=isinstance(fault, SourceError))
         return ExitCode.BAD_INPUT
     _tell(result, result.folder or folder, pipe)

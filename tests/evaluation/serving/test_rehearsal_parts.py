@@ -73,6 +73,9 @@ def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) 
     seen = Observation(0, 6.0, (8, 8), ())
     journal.record(Step(0, 6.0, seen, Mind(time=6.0), alerts=tuple(alerts)))
     journal.close()
+    unbegun = tmp_path / "cell" / "20260101T000500Z"
+    unbegun.mkdir()
+    (unbegun / "journal.sqlite").touch()  # killed before its first line
     taken = [
         record(1, "opened", "a"),
         record(1, "closed", "b"),

@@ -68,6 +68,8 @@ def _key(record: Mapping[str, Any]) -> Told:
 def _recorded(camera: Path) -> Iterator[Told]:
     """What the journals of all runs say; an alert that was open when a run was followed is in two."""
     for journal in sorted(camera.glob("*/journal.sqlite")):
+        if not journal.stat().st_size:
+            continue  # killed before its first line, or on a full disk: nothing was told of it
         for alert in Recording.open(journal.parent).alerts().values():
             known = camera.name, int(alert["id"]), round(float(alert["opened"]), 3)
             yield (*known, "opened")

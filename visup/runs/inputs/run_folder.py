@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.atomic import sync
-from visup.agent.storage.file_lock import acquire_lock
+from visup.agent.storage.file_lock import acquire_lock, lock_path
 from visup.agent.storage.journal_reader import JOURNAL
 from visup.redaction import redacted
 
@@ -40,6 +41,18 @@ def fresh_folder(out: Path | None, source: str) -> Path:
             hint="choose a folder that you may write to with --out",
         ) from fault
     return out
+
+
+def discard_unbegun(folder: Path) -> None:
+    """Take away a folder in which no run could be begun, as on a full disk; what holds anything stays."""
+    journal = folder / JOURNAL
+    with suppress(OSError):
+        if journal.stat().st_size == 0:
+            journal.unlink()
+    with suppress(OSError):
+        if not journal.exists():
+            lock_path(journal).unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def _numbered_folder(source: str) -> Path:
