@@ -11,7 +11,7 @@ import logging
 import multiprocessing
 import time
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from threading import Event, Thread
@@ -140,7 +140,7 @@ def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome
 
 
 @contextmanager
-def _not_for_nobody(pool: Pool, running: Collection[Any]) -> Iterator[None]:
+def _lost_when_starved(pool: Pool, running: Collection[Any]) -> Iterator[None]:
     """Meanwhile jobs are taken back when all workers of this machine are gone, and none comes after them.
 
     Dask replaces a worker that dies, unless the process dies that workers are forked from.
@@ -149,12 +149,14 @@ def _not_for_nobody(pool: Pool, running: Collection[Any]) -> Iterator[None]:
 
     def look() -> None:
         seen = time.monotonic()
-        while not over.wait(LOOK_S):
-            if pool.client.ncores():
-                seen = time.monotonic()
-            elif time.monotonic() - seen > STARVED_S:
-                pool.client.cancel(list(running), force=True)
-                return
+        # That the scheduler is gone is told where it is asked.
+        with suppress(OSError, RuntimeError):
+            while not over.wait(LOOK_S):
+                if pool.client.ncores():
+                    seen = time.monotonic()
+                elif time.monotonic() - seen > STARVED_S:
+                    pool.client.cancel(list(running), force=True)
+                    return
 
     watcher = Thread(target=look, name="workers", daemon=True)
     if pool.own:
@@ -164,7 +166,7 @@ def _not_for_nobody(pool: Pool, running: Collection[Any]) -> Iterator[None]:
     finally:
         over.set()
         if pool.own:
-            watcher.join()
+            watcher.join(CONNECT_S)
 
 
 def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
@@ -188,7 +190,7 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
 
     for _ in range(max(1, len(client.ncores())) * WAITING_PER_WORKER):
         submit(book.next())
-    with _not_for_nobody(pool, running):
+    with _lost_when_starved(pool, running):
         for future in completed:
             piece, again = running.pop(future)
             outcome = _outcome(lake, piece, future, again)
