@@ -44,9 +44,13 @@ LISTEN = (
 )
 
 
-def open_run(browser: Browser, address: str, token: str = OPERATOR, name: str = "evening") -> None:
+def enter(browser: Browser, address: str, token: str = OPERATOR) -> None:
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
     browser.open(f"{address}?token={token}")
+
+
+def open_run(browser: Browser, address: str, token: str = OPERATOR, name: str = "evening") -> None:
+    enter(browser, address, token)
     browser.until("document.querySelectorAll('.runs tbody a').length == 4")
     follow(browser, name)
 
@@ -79,8 +83,7 @@ def shows(browser: Browser, text: str) -> None:
 
 
 def test_a_run_is_found_and_opened(browser: Browser, address: str) -> None:
-    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
-    browser.open(f"{address}?token={OPERATOR}")
+    enter(browser, address)
     browser.until("document.querySelectorAll('.runs tbody tr').length == 4")
     shows(browser, "<b>morning")
     assert "token" not in browser.value("location.href")
@@ -258,8 +261,7 @@ def test_a_question_is_answered_to_see_what_would_have_followed(
 def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: Path) -> None:
     record(folder / "live", doubtful(), SETTINGS, ended=None)
     try:
-        browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
-        browser.open(f"{address}?token={OPERATOR}")
+        enter(browser, address)
         follow(browser, "live")
         browser.press("End")
         shows(browser, "answer:")
@@ -279,8 +281,7 @@ def test_why_an_object_looks_like_a_model_is_shown(
     )
     record(folder / "alike", doubtful(), replace(SETTINGS, models=models), source=str(clip))
     try:
-        browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
-        browser.open(f"{address}?token={OPERATOR}")
+        enter(browser, address)
         follow(browser, "alike")
         browser.press("End")
         shows(browser, "frame 59")

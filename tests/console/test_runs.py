@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import cv2
@@ -14,6 +16,7 @@ from tests.rules.scenes import box_region, seen
 from visup.agent import Observation
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import JOURNAL
 from visup.console.library import RunLibrary, run_key
 from visup.console.pages.playhead import Playhead
 from visup.console.pages.wall_page import latest_by_camera
@@ -185,3 +188,14 @@ def test_the_playhead_stays_within_the_run_and_jumps_to_what_was_told(
     assert (head.number, head.playing) == (59, False)
     head.toggle()
     assert (head.number, head.playing) == (0, True)
+
+
+def test_a_moment_that_cannot_be_read_does_not_take_the_timeline_away(tmp_path: Path) -> None:
+    record(tmp_path / "a", meeting(), SETTINGS)
+    whole = [t.label for t in RunView(tmp_path / "a").tracks]
+    with closing(sqlite3.connect(tmp_path / "a" / JOURNAL)) as db:
+        db.execute("UPDATE steps SET summary = '{' WHERE frame_index = 20")
+        db.commit()
+    view = RunView(tmp_path / "a")
+    assert [t.label for t in view.tracks] == whole
+    assert len(list(view.shares(1))) == len(view.frames) - 1

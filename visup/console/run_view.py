@@ -230,11 +230,16 @@ class RunView:
     def _samples(self) -> Iterator[tuple[float, Mapping[str, Any]]]:
         """What was believed, in short, at a few hundred moments.
 
-        An approximation, for runs of days: changes that are shorter than that may not show.
+        An approximation, for runs of days: changes that are shorter than that may not show. Moments that
+        cannot be read any more are left out.
         """
         step = max(1, len(self.frames) // MOST_SAMPLES)
         for number in range(0, len(self.frames), step):
-            yield self.times[number], self._run.recording.summary_at(self.frames[number])
+            try:
+                told = self._run.recording.summary_at(self.frames[number])
+            except OutputError:
+                continue
+            yield self.times[number], told
 
 
 def _states(told: Mapping[str, Any]) -> Mapping[str, str]:
