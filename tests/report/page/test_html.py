@@ -391,3 +391,10 @@ def test_titles_are_short(source: str, title: str) -> None:
 def test_facts_are_flattened_in_order() -> None:
     facts = {"a_b": 1.0, "c": {"d": [1, 2], "e": {}, "f": None}, "g": True}
     assert flat(facts) == [("a b", "1"), ("c, d", "1, 2"), ("g", "True")]
+
+
+@pytest.mark.parametrize("videos", [(), ("annotated.webm",)])
+def test_only_a_page_with_a_video_may_load_one(videos: tuple[str, ...]) -> None:
+    page = report_page(replace(data(), videos=videos, source="<video src=x>"))
+    policy = page.partition("Content-Security-Policy")[2].partition(">")[0]
+    assert ("media-src" in policy) == bool(videos)

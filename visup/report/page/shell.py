@@ -20,6 +20,8 @@ SAID = {
     "whole": "Written by visup. This page holds all that it shows and asks nothing of the network.",
 }
 """What bodies of pages may name, and every page says alike."""
+MEDIA = " media-src 'self' file:;"
+"""What a page with a video may load besides itself; any other loads nothing."""
 
 
 def filled_page(
@@ -44,9 +46,11 @@ def filled_page(
     own = files("visup.report.page")
     plotly = plotly_source() if drawn else ""
     script = "".join((own / name).read_text(encoding="utf-8") for name in scripts)
+    filled = Template(body).substitute(text, **SAID).rstrip()
     return Template((own / "shell.html").read_text(encoding="utf-8")).substitute(
         title=title,
-        body=Template(body).substitute(text, **SAID).rstrip(),
+        body=filled,
+        media=MEDIA if "<video" in filled else "",
         figures=embedded(drawn),
         style=(own / "report.css").read_text(encoding="utf-8"),
         plotly=plotly,
