@@ -18,7 +18,8 @@ from tests.percepts.motion.clips import clip, texture
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.commands.eval.catalogue import eval_app
 from visup.evaluation.cross_validation.runner import FoldPlan, evaluate_folds, tried_changes
-from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_and_spread
+from visup.evaluation.families import family_of, mean_and_spread
+from visup.evaluation.motion.folds import chosen, dealt, gains
 from visup.evaluation.motion.mask_scores import region_similarity
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
 

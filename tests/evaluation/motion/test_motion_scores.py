@@ -7,12 +7,14 @@ import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tests.percepts.motion.clips import SIZE, clip, texture
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.evaluation.motion.mask_scores import (
     MaskOverlaps,
+    PixelCounts,
     boundary,
     boundary_measure,
     has_ghost,
@@ -82,6 +84,23 @@ def test_f_forgives_a_pixel_and_not_ten() -> None:
     assert boundary_measure(square(10, 10), square(10, 10)) == 1
     assert boundary_measure(square(10, 10), square(11, 10)) == 1
     assert boundary_measure(square(10, 10), square(20, 20, 30)) < 0.5
+
+
+@given(st.lists(st.tuples(masks, masks, masks), min_size=1, max_size=4))
+def test_the_f_measure_is_of_all_scored_pixels_at_once(
+    frames: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+) -> None:
+    counts = PixelCounts()
+    for seen, true, scored in frames:
+        counts = counts.with_frame(seen, true, scored)
+    seen, true, scored = (np.concatenate([f[k].ravel() for f in frames]) for k in range(3))
+    found, there = seen[scored], true[scored]
+    assert (counts.right, counts.false) == (np.sum(found & there), np.sum(found & ~there))
+    assert counts.missed == np.sum(there & ~found)
+    union = np.sum(found | there)
+    j = np.sum(found & there) / union if union else 1.0
+    assert counts.f_measure == pytest.approx(2 * j / (1 + j))  # as Dice and Jaccard are related
+    assert counts == PixelCounts().with_frame(seen, true, scored)  # in whatever frames they came
 
 
 def test_a_ghost_overlaps_no_object_by_a_tenth() -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import itertools
 import json
 import random
+from collections.abc import Sequence
+from dataclasses import replace
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.percepts.detections.boxes import Box, Detection, overlap
-from visup.percepts.detections.numbering import PATIENCE_FRAMES, BoxNumbering
+from visup.percepts.detections.numbering import LEAST_OVERLAP, PATIENCE_FRAMES, BoxNumbering
 
 BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.floats(5, 40))
 NAMES = st.sampled_from([None, "cup", "hand"])
@@ -57,14 +60,51 @@ def test_numbers_go_on_so_that_boxes_overlap_the_most_in_all(
     numbering = BoxNumbering()
     numbering.number(0, found([(b, None) for b in before]))
     kept = numbering.number(1, found([(b, None) for b in now]))
-    # All that lie upon each other at all, whatever is thought too little afterwards.
+
+    def shared(i: int, j: int) -> float:
+        both = overlap(before[i], now[j])
+        return both if both >= LEAST_OVERLAP else 0.0
+
     best = max(
-        sum(overlap(before[i], now[j]) for i, j in enumerate(order) if j is not None)
+        sum(shared(i, j) for i, j in enumerate(order) if j is not None)
         for order in itertools.permutations([*range(len(now)), *[None] * len(before)], len(before))
     )
-    got = sum(overlap(before[d.track - 1], d.box) for d in kept if 1 <= d.track <= len(before))
-    least = 0.2 * min(len(before), len(now))
-    assert best - least <= got + 1e-9 <= best + 2e-9
+    pairs = [(d.track - 1, j) for j, d in enumerate(kept) if 1 <= d.track <= len(before)]
+    assert sum(shared(i, j) for i, j in pairs) == pytest.approx(best)
+
+
+def walker(frames: int, scores: Sequence[float]) -> list[list[Detection]]:
+    """Boxes of one thing that goes on at a pixel a frame, with scores in turn; none where one is 0."""
+    return [
+        [Detection(0, (20.0 + k, 10.0, 10.0, 24.0), s)] if (s := scores[k % len(scores)]) else []
+        for k in range(frames)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("scores", "told"),
+    [
+        ([0.9], True),
+        ([0.6], True),  # believed when it comes again
+        ([0.6, 0.3, 0.3], True),  # what was believed goes on as unsure boxes
+        ([0.6, 0.0, 0.0, 0.0], False),  # and is given up while nothing comes again
+        ([0.3], False),  # begins nothing
+    ],
+)
+def test_what_is_told_of_a_thing_follows_from_scores_and_from_its_coming_again(
+    scores: list[float], told: bool
+) -> None:
+    numbering = BoxNumbering()
+    numbered = [numbering.number(k, boxes) for k, boxes in enumerate(walker(6, scores))]
+    assert {d.track for boxes in numbered for d in boxes} == ({1} if told else set())
+
+
+def test_a_sure_box_goes_before_a_nearer_one_that_is_unsure() -> None:
+    numbering = BoxNumbering()
+    numbering.number(0, [Detection(0, (20.0, 10.0, 10.0, 24.0), 0.9)])
+    near = Detection(0, (20.0, 10.0, 10.0, 24.0), 0.2)
+    sure = Detection(0, (23.0, 10.0, 10.0, 24.0), 0.8)
+    assert numbering.number(1, [near, sure]) == (replace(sure, track=1),)
 
 
 def test_who_passes_behind_another_keeps_its_number_by_how_it_moves() -> None:

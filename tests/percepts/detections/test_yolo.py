@@ -178,7 +178,7 @@ def test_names_that_cannot_be_read_are_none(tmp_path: Path, told: str) -> None:
 
 def test_a_network_sees_in_place_of_visup(tmp_path: Path) -> None:
     pytest.importorskip("onnxruntime", reason="visup[onnx] is not installed")
-    clip = write_clip(tmp_path / "clip.avi", moving_disc(12))
+    clip = write_clip(tmp_path / "clip.avi", moving_disc(24))
     network = bright_spot_network(tmp_path / "lamps.onnx")
     run: Any = visup.watch(clip, detections=network).finish()
     assert run.steps[-1].mind.present()

@@ -19,7 +19,13 @@ from tests.percepts.motion.clips import clip, texture
 from visup.agent import Frame, HealthStatus
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.health.camera_faults import EXPECTED, inject
-from visup.evaluation.health.runner import evaluate_health, find_sources, plan, statuses
+from visup.evaluation.health.runner import (
+    evaluate_health,
+    find_sources,
+    plan,
+    statuses,
+    to_and_fro,
+)
 from visup.percepts.health.frame_timing import ArrivalMonitor
 from visup.percepts.health.image_quality import measure_quality
 from visup.percepts.health.repeated_frames import Repeat
@@ -291,3 +297,14 @@ def test_shared_video_keeps_the_bar_in_a_quick_look() -> None:
     total = evaluate_health(SHARED / "video" / "static", faults=7, limit=200)["total"]
     assert total["named"] == 1.0
     assert total["false_reports"] == 0
+
+
+@given(st.integers(2, 9), st.integers(1, 60))
+def test_a_short_clip_is_shown_to_and_fro(count: int, length: int) -> None:
+    images = [np.full((2, 2, 3), k, np.uint8) for k in range(count)]
+    shown = to_and_fro([Frame(k, 0.04 * k, image) for k, image in enumerate(images)], length)
+    tones = [int(f.image[0, 0, 0]) for f in shown]
+    assert len(shown) == length
+    assert tones[:count] == list(range(count))[:length]
+    assert all(abs(b - a) == 1 for a, b in pairwise(tones))
+    assert all(b.index == a.index + 1 and b.time > a.time for a, b in pairwise(shown))

@@ -74,14 +74,14 @@ def motion_closing(figures: Figures) -> Iterator[str]:
 
 MOTION = EvaluationCommand(
     "motion",
-    """Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.
+    """Segmentation and tracking: J, F, F-measure of pixels, ghosts, id switches, MOTA, IDF1, time.
 
     With --folds each family of sequences is scored with settings that were chosen on the others.
     """,
     "visup.commands.eval.motion:motion",
     "segmenting",
     (
-        *("fold", "J", "F", "J_object", "ghost", "id_switches", "mota", "idf1"),
+        *("fold", "J", "F", "f_measure", "J_object", "ghost", "id_switches", "mota", "idf1"),
         *("gain", "moved", "most", "ms", "ratio"),
     ),
     (

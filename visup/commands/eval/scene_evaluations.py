@@ -148,10 +148,11 @@ SCENE_EVALUATIONS = (
         "visup.evaluation.health.runner:evaluate_health",
         "watching",
         (
-            *("clips", "found", "named", "latency_s", "early"),
+            *("clips", "found", "named", "spread", "families", "latency_s", "early"),
             *("false_reports", "hours", "false_reports_per_hour", "ms"),
         ),
         (
+            Setting("also", list[Path] | None, None, Option("Further folder with sound video.")),
             count("faults", 100, "How many faults are injected."),
             _SEED,
             count("limit", None, "Frames of each video when it is run unharmed."),

@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError, SourceError
+from visup.evaluation.families import family_of, mean_and_spread
 from visup.evaluation.figures import Progress, mean_of, silent
 from visup.evaluation.motion.code_digest import code_digest, files_digest
-from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_and_spread
+from visup.evaluation.motion.folds import chosen, dealt, gains
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences, score_sequence
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
 from visup.evaluation.training.closed_loop import train

@@ -17,6 +17,7 @@ import numpy as np
 
 from visup.agent import Frame, HealthStatus, Observation
 from visup.agent.model.errors import SettingsError, VisupError
+from visup.evaluation.families import family_of, mean_and_spread
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.health.camera_faults import EXPECTED, inject
 from visup.percepts.health import HealthBehaviour
@@ -28,6 +29,8 @@ WITHIN_S = 1.0
 SOUND_S = (0.6, 1.4)
 """A fault begins this long after the start of its clip: drawn from this range."""
 FAULTY_S = 1.2
+UNTOLD = ("frames", "img1", "video", "clip")
+"""Names of files and folders that say nothing of what they show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,7 @@ class TrialResult:
 def evaluate_health(
     folder: Path,
     *,
+    also: Sequence[Path] | None = None,
     faults: int = FAULTS,
     seed: int = 0,
     limit: int | None = None,
@@ -80,6 +84,7 @@ def evaluate_health(
 
     Args:
         folder: Video files and folders of images stand anywhere below it.
+        also: Further such folders.
         faults: How many faults; they go round the kinds and the videos.
         seed: Of the campaign.
         limit: Most frames of each video when it is run unharmed, or None for all.
@@ -88,23 +93,28 @@ def evaluate_health(
     Returns:
         `items` by kind of fault, and `total`, with the keys `clips`, `found` (share reported within
         1 s), `named` (share of them with the right status), `latency_s` (median), `early` (reports
-        before the fault); `total` also has `false_reports`, `hours`, `false_reports_per_hour`, and
-        `ms` (median time of a frame). `missed` lists the trials that were not found or not named.
+        before the fault); `total` also has `spread` (standard error of the share found and named, over
+        `families` of videos, which fail together), `false_reports`, `hours`, `false_reports_per_hour`,
+        and `ms` (median time of a frame). `missed` lists the trials that were not found or not named.
 
     Raises:
         SettingsError: There is no video below the folder.
     """
-    sources = find_sources(folder)
+    sources = sorted(p for place in (folder, *(also or ())) for p in find_sources(place))
     told: list[TrialResult] = []
+    right: dict[str, float] = {}
     missed: list[dict[str, Any]] = []
     for number, trial in enumerate(plan(sources, faults, seed)):
         progress(f"fault {number + 1} of {faults}")
         told.append(result := run_trial(trial))
+        right[f"{number}/{clip_name(trial.source)}"] = float(result.found and result.named)
         if not (result.found and result.named):
-            name = str(trial.source.relative_to(folder)) if trial.source != folder else folder.name
+            name = clip_name(trial.source)
             missed.append({"source": name, "kind": trial.kind, "number": number, **_plain(result)})
     items = {k: _scores([t for t in told if t.kind == k]) for k in EXPECTED}
     total = _scores(told)
+    total["families"] = len({family_of(n) for n in right})
+    total["spread"] = mean_and_spread(right)[1]
     total |= _unharmed(sources, limit, progress)
     return {"total": total, "items": {k: v for k, v in items.items() if v}, "missed": missed}
 
@@ -126,6 +136,11 @@ def find_sources(folder: Path) -> list[Path]:
             "no video was found", where=str(folder), expected="video files or folders of images"
         )
     return sorted(found)
+
+
+def clip_name(source: Path) -> str:
+    """What the clip is called whose video or frames these are: files of all clips may have one name."""
+    return source.parent.name if source.stem.lower() in UNTOLD else source.stem
 
 
 def _opens(path: Path) -> bool:
@@ -155,10 +170,8 @@ def plan(sources: Sequence[Path], faults: int, seed: int) -> Iterator[CameraFaul
 def run_trial(trial: CameraFaultTrial) -> TrialResult:
     """Inject one fault and tell how it was reported."""
     frames = _clip(trial)
-    # A short video leaves less time before the fault: what counts is the second after it.
-    longest = frames[-1].time - frames[0].time - FAULTY_S
-    begin = frames[0].time + max(SOUND_S[0], min(trial.sound_s, longest))
-    start = next((n for n, f in enumerate(frames) if f.time >= begin), len(frames) // 2)
+    begin = frames[0].time + trial.sound_s
+    start = next(n for n, f in enumerate(frames) if f.time >= begin)
     since = frames[start].time
     seen = [(f.time, s) for f, s in statuses(inject(frames, start, trial.kind, trial.seed))]
     bad = [(t, s) for t, s in seen if s is not HealthStatus.OK]
@@ -173,11 +186,26 @@ def run_trial(trial: CameraFaultTrial) -> TrialResult:
 
 
 def _clip(trial: CameraFaultTrial) -> list[Frame]:
-    """The frames of a trial; all of a video that is not longer."""
+    """The frames of a trial; a video that is too short is shown to and fro until it is long enough."""
     with open_source(str(trial.source)) as source:
         length = round((trial.sound_s + FAULTY_S) * source.fps) + 1
         spare = max(0, (source.frame_count or length) - length)
-        return list(islice(source, round(trial.skip * spare), None))[:length]
+        frames = list(islice(source, round(trial.skip * spare), None))[:length]
+    return to_and_fro(frames, length)
+
+
+def to_and_fro(frames: Sequence[Frame], length: int) -> list[Frame]:
+    """So many frames of a clip of at least two, played backwards and forwards again after its end.
+
+    What moves goes on at its pace, so that a clip of a second can show what is told of a fault within one.
+    """
+    step = frames[1].time - frames[0].time
+    out = list(frames[:length])
+    for k in range(len(frames), length):
+        turn, place = divmod(k, len(frames) - 1)
+        image = frames[len(frames) - 1 - place if turn % 2 else place].image
+        out.append(Frame(out[-1].index + 1, out[-1].time + step, image))
+    return out
 
 
 def statuses(frames: Iterator[Frame] | Sequence[Frame]) -> Iterator[tuple[Frame, HealthStatus]]:

@@ -1,4 +1,4 @@
-"""Figures on what was left out: families of sequences, folds of families, choice by the rest, spreads.
+"""Figures on what was left out: folds of families, and choice by the rest.
 
 Two sequences of one family (the same scene, camera or film) never stand on both sides of a fold. All
 functions are pure; `visup.evaluation.cross_validation` measures what they judge.
@@ -6,29 +6,10 @@ functions are pure; `visup.evaluation.cross_validation` measures what they judge
 
 from __future__ import annotations
 
-import math
-import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-Scores = Mapping[str, float]
-"""A figure of each sequence, by name."""
-
-_FIRST_WORD = re.compile(r"[^\W\d_]+")
-
-
-def family_of(name: str) -> str:
-    """The family of a sequence: the first word of the last part of its name.
-
-    Data sets name sequences of one scene, camera or film alike, and this says so too often rather than too
-    seldom: two sets' `tennis` are one family.
-
-    >>> [family_of(n) for n in ("moseg/cars4", "davis/drift-straight", "09")]
-    ['cars', 'drift', '09']
-    """
-    last = name.rsplit("/", 1)[-1].lower()
-    found = _FIRST_WORD.match(last)
-    return found[0] if found else last
+from visup.evaluation.families import Scores, family_of
 
 
 def dealt(names: Iterable[str], folds: int) -> dict[str, int]:
@@ -49,28 +30,6 @@ def dealt(names: Iterable[str], folds: int) -> dict[str, int]:
         fold[family] = min(range(folds), key=lambda i: (filled[i], i))
         filled[fold[family]] += sizes[family]
     return {n: fold[family_of(n)] for n in names}
-
-
-def mean_and_spread(scores: Scores) -> tuple[float, float]:
-    """The mean over sequences, and its standard error when families are what was drawn.
-
-    Sequences of one family fail together, so their deviations are summed before they are squared.
-
-    Args:
-        scores: Of at least one sequence.
-
-    Returns:
-        Mean and standard error; the latter is infinite where there is only one family.
-    """
-    mean = sum(scores.values()) / len(scores)
-    off: dict[str, float] = defaultdict(float)
-    for name, value in scores.items():
-        off[family_of(name)] += value - mean
-    families = len(off)
-    if families < 2:
-        return mean, math.inf
-    total = sum(d * d for d in off.values())
-    return mean, math.sqrt(total * families / (families - 1)) / len(scores)
 
 
 def chosen(tried: Sequence[Scores], fold: Mapping[str, int]) -> dict[int, int]:

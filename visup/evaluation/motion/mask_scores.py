@@ -77,6 +77,36 @@ def _grown(mask: Mask, radius: int) -> Mask:
     return np.asarray(cv2.dilate(mask.astype(np.uint8), disk) > 0)
 
 
+@dataclass(frozen=True, slots=True)
+class PixelCounts:
+    """Pixels over all frames of a sequence, as CDnet counts them (Goyette et al. 2012).
+
+    Attributes:
+        right: Of objects, and within regions.
+        false: Within regions, and of no object.
+        missed: Of objects, and within no region.
+    """
+
+    right: int = 0
+    false: int = 0
+    missed: int = 0
+
+    def with_frame(self, seen: Mask, true: Mask, scored: Mask) -> PixelCounts:
+        """With those of one more frame that are scored."""
+        right = int(np.count_nonzero(seen & true & scored))
+        return PixelCounts(
+            self.right + right,
+            self.false + int(np.count_nonzero(seen & scored)) - right,
+            self.missed + int(np.count_nonzero(true & scored)) - right,
+        )
+
+    @property
+    def f_measure(self) -> float:
+        """Harmonic mean of precision and recall, 0 to 1; 1 where nothing is to be found and nothing was."""
+        pixels = 2 * self.right + self.false + self.missed
+        return 2 * self.right / pixels if pixels else 1.0
+
+
 def has_ghost(regions: Iterable[Mask], objects: Sequence[Mask]) -> bool:
     """Whether some region overlaps no object by a tenth of the region."""
     for region in regions:

@@ -24,6 +24,7 @@ from visup.evaluation.motion.mask_pairs import mask_pairs
 from visup.evaluation.motion.mask_scores import (
     UNSCORED,
     MaskOverlaps,
+    PixelCounts,
     boundary_measure,
     has_ghost,
     object_scores,
@@ -38,7 +39,7 @@ from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import open_source
 from visup.percepts.video.image_folder import images_in
 
-KEYS = ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
+KEYS = ("J", "F", "f_measure", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,7 @@ class SequenceMeasurements:
 
     j: list[float] = field(default_factory=list)
     f: list[float] = field(default_factory=list)
+    pixels: PixelCounts = field(default_factory=PixelCounts)
     ghosts: list[bool] = field(default_factory=list)
     overlaps: list[MaskOverlaps] = field(default_factory=list)
     boxes: dict[int, dict[int, Box]] = field(default_factory=dict)
@@ -90,9 +92,9 @@ def evaluate_motion(
         progress: Shows what is being done.
 
     Returns:
-        `total` and `items` by name, with the keys J, F, J_object, ghost, id_switches, mota, idf1,
-        ms and ratio; a key is absent where there is no such truth. A mission's item also has
-        `objects`: J and id switches of each.
+        `total` and `items` by name, with the keys J, F, f_measure (of pixels, as CDnet has it), J_object,
+        ghost, id_switches, mota, idf1, ms and ratio; a key is absent where there is no such truth. A
+        mission's item also has `objects`: J and id switches of each.
 
     Raises:
         SettingsError: There is nothing to score below the folder.
@@ -257,7 +259,7 @@ def _tally_masks(
     *,
     inner: bool,
 ) -> None:
-    """J and F of a frame that is neither first nor last, and whether it shows a ghost."""
+    """J and F of a frame that is neither first nor last, the pixels of any, and whether it shows a ghost."""
     scored = labels != UNSCORED
     true = (labels > 0) & scored
     seen = np.zeros(labels.shape, dtype=bool)
@@ -266,6 +268,7 @@ def _tally_masks(
     j = region_similarity(seen, true, scored)
     if j is None:
         return
+    tally.pixels = tally.pixels.with_frame(seen, true, scored)
     if inner:
         tally.j.append(j)
         tally.f.append(boundary_measure(seen & scored, true))
@@ -283,6 +286,7 @@ def _scores(sequence: LabelledSequence, tally: SequenceMeasurements) -> dict[str
     out: dict[str, Any] = {}
     if tally.j:
         out |= {"J": statistics.fmean(tally.j), "F": statistics.fmean(tally.f)}
+        out["f_measure"] = tally.pixels.f_measure
     if tally.ghosts:
         out["ghost"] = statistics.fmean(tally.ghosts)
     if sequence.truth is not None:
