@@ -3,13 +3,13 @@
 Rooms, in the order in which to read them:
 
 1. `model/`: the records that flow through a step, and the mental model.
-2. `contract/`: what may be plugged in, and what is promised to it.
+2. `contract/`: the interface of plug-ins, and its guarantees.
 3. `cycle/`: the cycle on one screen (`cycle/agent.py`).
-4. `execution/`: how behaviours are run and contained.
-5. `plugins/`: how behaviours are found and made.
+4. `execution/`: how behaviours are run, and their faults contained.
+5. `plugins/`: how behaviours are found and created.
 6. `storage/`: journals and checkpoints.
 
-Names are loaded when they are first used: errors, which everything raises, come without the rest.
+Names are loaded when they are first used, so that importing an error class does not load the rest.
 """
 
 from typing import TYPE_CHECKING

@@ -1,20 +1,20 @@
-"""visup, the visual supervisor: it watches machines work and says in plain words whether it goes well.
+"""visup, the visual supervisor: watches machines work and reports whether the work goes well.
 
     import visup
 
     for event in visup.watch("clip.mp4", task="dock", models="things.models").narrate():
         print(f"{event.time:6.1f} s  {event.text}")
 
-What stands in `__all__` is the public API; docs/api.md lists it with examples. Names are loaded when they
-are first used, so that `import visup` costs next to nothing.
+`__all__` is the public API; docs/api.md documents it with examples. Names are loaded when they
+are first used, so that `import visup` takes next to no time.
 
-To read the source, begin here:
+To read the source, start here:
 
-1. `visup/agent/model/`: what flows (`records.py`) and what is believed (`mind.py`).
+1. `visup/agent/model/`: the records of a step (`records.py`) and the mental model (`mind.py`).
 2. `visup/agent/cycle/agent.py`: the cogitation-action cycle on one screen.
-3. `visup/percepts/`: seeing (video, motion, shape, depth, health), each as a behaviour.
-4. `visup/rules/` and `visup/tasks/`: interpreting what is seen, and verifying tasks.
-5. `visup/runs/wiring.py`: all of it wired together; `visup/cli.py`: the command.
+3. `visup/percepts/`: perception (video, motion, shape, depth, health), each part a behaviour.
+4. `visup/rules/` and `visup/tasks/`: interpretation of the scene, and verification of tasks.
+5. `visup/runs/wiring.py`: how everything is wired together; `visup/cli.py`: the command.
 
 `docs/tour.md` follows one frame through all of it, and `docs/architecture.md` is the map.
 """
@@ -98,7 +98,7 @@ _HOMES = {
 
 
 def _check_room(module: str) -> None:
-    """Say so, before the libraries are loaded, when there is too little memory for them."""
+    """Report too little memory before the libraries are loaded."""
     if module not in _LIGHT:
         from visup.agent.memory_limit import check_memory
 

@@ -44,7 +44,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 app = typer.Typer(
     name="visup",
     cls=Overview,
-    help="The visual supervisor: it watches machines work and says in plain words whether it goes well.",
+    help="The visual supervisor: watches machines work and reports whether the work goes well.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help: drawing it with rich would double the time to start
@@ -63,15 +63,19 @@ app.command("query")(query)
 app.command("find")(find)
 app.command("render")(render)
 app.command("doctor")(doctor)
-app.add_typer(serve_app, name="serve", help="Many cameras under one supervisor.")
-app.add_typer(task_app, name="task", help="Check, show and list task files.")
-app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
+app.add_typer(serve_app, name="serve", help="Watch many cameras as a service.")
+app.add_typer(task_app, name="task", help="Check, show, simulate and learn task files.")
+app.add_typer(rules_app, name="rules", help="Check, list and explain safety rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
-app.add_typer(archive_app, name="archive", help="Fill lakes: tables of many recorded runs.")
-app.add_typer(behaviours_app, name="behaviours", help="List, check and begin behaviours.")
-app.add_typer(eval_app(), name="eval", help="Compute figures against ground truth.")
-app.add_typer(train_app, name="train", help="Make the files of what was learnt from labelled data.")
-app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")
+app.add_typer(archive_app, name="archive", help="Lakes: many recorded runs, stored as tables.")
+app.add_typer(
+    behaviours_app, name="behaviours", help="List, check and create behaviours (plug-ins)."
+)
+app.add_typer(eval_app(), name="eval", help="Measure accuracy and speed against ground truth.")
+app.add_typer(train_app, name="train", help="Train the learned parts of visup on labelled data.")
+app.add_typer(
+    debug_app, name="debug", help="Visualise intermediate results, for developers of visup."
+)
 
 
 def _version(wanted: bool) -> None:
@@ -88,11 +92,11 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """The visual supervisor: it watches machines work and says whether it goes well."""
+    """The visual supervisor: watches machines work and reports whether the work goes well."""
 
 
 def main() -> None:
-    """Run the command; every error that is the user's to mend is one message and exit code 2."""
+    """Run the command; an error that the user can fix is printed as one message, with exit code 2."""
     try:
         if not {"-h", "--help", "--version"} & set(sys.argv):
             check_memory()
@@ -101,8 +105,8 @@ def main() -> None:
         complain(str(error))
         sys.exit(BAD_INPUT)
     except MemoryError as fault:
-        hint = "use smaller frames or files; a run that was begun can be resumed"
-        complain(str(VisupError(f"there is no memory left: {fault}".rstrip(": "), hint=hint)))
+        hint = "use smaller frames or files; a run that had started can be resumed"
+        complain(str(VisupError(f"out of memory: {fault}".rstrip(": "), hint=hint)))
         sys.exit(FAILED)
     except BrokenPipeError:
         # The reader (such as `head`) went away; nothing more can be said to it.

@@ -1,4 +1,4 @@
-"""How events are told to people, on the terminal and in the report alike."""
+"""The wording of events for people, on the terminal and in the report."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from visup.agent import Event, Severity
 DANGEROUS = re.compile(
     "[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff\\ufeff]+"
 )
-"""What a terminal obeys instead of showing it: control characters but for tabs and ends of line, marks that
-turn the reading order, and halves of characters, which cannot be printed."""
+"""Characters that a terminal interprets instead of showing: control characters except tab and newline, marks
+that change the reading order, and lone surrogates."""
 
 EVENT_KINDS: Mapping[str, str] = {
-    "entry": "an object comes into view over the border",
-    "noticed": "an object is seen that was not seen before, and did not come over the border",
-    "exit": "an object leaves over the border",
+    "entry": "an object enters the view across the border",
+    "noticed": "a new object appears that did not cross the border",
+    "exit": "an object leaves the view across the border",
     "occlusion": "an object is hidden by another, or by something unknown",
     "reappearance": "a hidden object is seen again",
-    "lost": "an object is no longer seen, and nothing tells why",
+    "lost": "an object is no longer seen, for no apparent reason",
     "found": "a lost object is seen again",
     "coupled": "two objects move as one",
     "decoupled": "two objects no longer move as one",
-    "relation": "two objects approach each other, move apart, and so on",
-    "identified": "an object is believed to be something, or something else than before",
-    "question": "an operator is asked",
-    "answer": "an operator has answered",
+    "relation": "two objects begin to converge, diverge, or keep their distance",
+    "identified": "the identity of an object is established, or changes",
+    "question": "a question to the operator",
+    "answer": "an answer of the operator",
     "alert": "an alert opens",
     "alert_closed": "an alert is resolved",
-    "task_active": "a task is inferred to be going on",
-    "task_inactive": "a task turns out not to be going on",
+    "task_active": "a task is inferred to be in progress",
+    "task_inactive": "a task turns out not to be in progress",
     "stage_started": "a stage has begun",
-    "stage_progressing": "a stage goes well",
+    "stage_progressing": "a stage makes progress",
     "stage_paused": "a stage is paused",
-    "stage_resumed": "a stage goes on after a pause",
+    "stage_resumed": "a stage resumes after a pause",
     "stage_stalled": "a stage makes no progress",
     "stage_failing": "a stage is failing",
     "stage_failed": "a stage has failed",
     "stage_done": "a stage is complete",
     "stage_unknown": "a stage cannot be judged",
-    "stage_revised": "a stage that was said to be complete is believed not to have been",
-    "invariant_broken": "what a task says must never, or must always, be so is violated",
+    "stage_revised": "a stage that was reported complete is now believed not to have happened",
+    "invariant_broken": "an invariant of a task (`never`, `always`) is violated",
     "verdict": "the verdict on a task changes",
 }
-"""Kind of event -> when visup itself tells it; plug-ins may tell more."""
+"""Kind of event -> when visup reports it; plug-ins may report further kinds."""
 
 
 def worded_once(events: Sequence[Event]) -> list[Event]:
-    """Events for people: what has one cause in a step is told once, by the gravest of its events.
+    """Events for people: events of one step with the same cause are merged into the most severe one.
 
     With the same words (a stage fails, an alert opens) one is told; so it is with grave ones of the same
     reason (a stage and its task fail, since something was not to be); and a stage that begins and goes on
@@ -66,7 +66,7 @@ def worded_once(events: Sequence[Event]) -> list[Event]:
 
 
 def _cause(event: Event) -> str:
-    """What two events of a step must share to be told as one, whatever its first letter."""
+    """What two events of a step must share to be merged, regardless of case of the first letter."""
     _, _, reason = event.text.partition(": ")
     if reason and event.severity > Severity.INFO:
         return reason.casefold()
@@ -76,7 +76,7 @@ def _cause(event: Event) -> str:
 
 
 def prose(text: str) -> str:
-    """A sentence as people read it: names of tasks and stages in quotes.
+    """A sentence for people: names of tasks and stages in quotes.
 
     >>> prose("Stage `captured` is failing.")
     "Stage 'captured' is failing."
@@ -85,7 +85,7 @@ def prose(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    r"""A text without what a terminal, or a reader, would be led astray by.
+    r"""A text without characters that would mislead a terminal or a reader.
 
     >>> printable("the \x1b[2Jarm\u202e")
     'the [2Jarm'
@@ -94,7 +94,7 @@ def printable(text: str) -> str:
 
 
 def escaped_json(value: Any, **options: Any) -> str:
-    """A value as JSON; what `printable` takes out stands in it as an escape, so that nothing is lost.
+    """A value as JSON, with the characters that `printable` removes escaped, so that nothing is lost.
 
     Args:
         value: JSON-like.

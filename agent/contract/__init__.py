@@ -1,4 +1,4 @@
-"""What may be plugged into an agent, and what an agent promises it.
+"""The contract between an agent and its plug-ins: behaviours and reasoners.
 
 Read `contract.py` (what a behaviour declares), `behaviour.py` (the protocols of behaviours and
 reasoners), `limits.py` (the limits of time and memory that behaviours are held to), `phases.py` (the

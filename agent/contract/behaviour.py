@@ -1,4 +1,4 @@
-"""The contracts of what runs inside the cycle: behaviours perceive, reasoners reason."""
+"""The interfaces of what runs inside the cycle: behaviours perceive, reasoners reason."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ __all__ = ["Behaviour", "Contract", "Outcome", "Reasoner"]
 class Behaviour(Protocol):
     """A perception routine: frames in, percepts out. May keep state between frames.
 
-    A method `start(self)`, if there is one, is called once before the first run, in the process in
-    which the behaviour runs: the place to open what cannot be sent to another process, such as a
+    A method `start(self)`, if it exists, is called once before the first run, in the process in
+    which the behaviour runs: the place to open resources that cannot be sent to another process, such as a
     model, a socket or a device.
     """
 
@@ -33,12 +33,12 @@ class Behaviour(Protocol):
 
         Args:
             frame: The frame; its image cannot be written to.
-            observation: What behaviours before this one reported of the same frame;
-                `observation.past` holds as many earlier frames as the contract's `history` asks for.
-            directives: What cogitation asked for after the last step.
+            observation: What earlier behaviours reported about the same frame;
+                `observation.past` holds as many past frames as the contract's `history` requests.
+            directives: Requests from reasoning after the last step.
 
         Returns:
-            Percepts of the kinds that the contract names.
+            Percepts of the kinds in the contract's `gives`.
         """
         ...
 
@@ -48,10 +48,10 @@ class Outcome:
     """What a reasoner concludes.
 
     Attributes:
-        mind: The mind after it.
+        mind: The mind after this reasoner.
         events: What happened.
         conditions: Reasons for alerts that hold now; an alert whose condition is not renewed is closed.
-        directives: What is asked of behaviours.
+        directives: Requests to behaviours.
     """
 
     mind: Mind
@@ -61,8 +61,8 @@ class Outcome:
 
 
 Reasoner = Callable[[Mind, Observation], Outcome]
-"""A pure function of the mind and of what was observed. It keeps nothing to itself: what it must
-remember goes into the mind under its own `MemoryKey`, so that minds can be saved and restored."""
+"""A pure function of the mind and the observation. It has no state of its own: what it must
+remember is stored in the mind under its own `MemoryKey`, so that minds can be saved and restored."""
 
 
 enable_display(Outcome)

@@ -1,4 +1,4 @@
-"""What a behaviour declares of itself, checked as soon as it is written down."""
+"""The contract of a behaviour: what it declares about itself, validated when it is created."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from visup.agent.model.errors import BehaviourError
 from visup.agent.model.records import Frame, Percept
 
 CONTRACT_VERSION = 1
-"""Of the contract itself; it grows when a plug-in written for an older one would no longer run."""
+"""Version of the contract; raised when plug-ins written for an older one would no longer run."""
 
 COMPILING_HANG_S = 600.0
-"""`hang_s` of behaviours whose loops are compiled in their first runs: minutes on a busy machine."""
+"""`hang_s` of behaviours that compile loops in their first runs, which takes minutes on a busy machine."""
 
 MOST_HISTORY = 64
-"""Past frames that a behaviour may ask for: they are whole images, and all of them are kept."""
+"""Limit on `history`, since past frames are complete images held in memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contract:
-    """What a behaviour declares of itself.
+    """What a behaviour declares about itself.
 
     Attributes:
         name: Its name, unique within an agent.
-        gives: Kinds of percept that it reports.
-        needs: Kinds of percept that must be there before it runs in a step.
+        gives: Kinds of percept that it may report.
+        needs: Kinds of percept that must have been observed before it runs in a step.
         every_s: Least time between two runs, seconds of video; 0 for every frame.
-        cost_ms: Its budget: what one run takes at most, milliseconds; None when it does not say.
-        hang_s: After how many seconds one run counts as hanging where there is time, as on a recording; None
-            for the limit of the agent. For what is compiled or loaded at its first use.
-        history: How many past frames, with what was reported of them, it wants in `observation.past`.
+        cost_ms: Time budget of one run, milliseconds; None to state none.
+        hang_s: Seconds after which one run counts as hanging (on recordings; live sources have a shorter
+            limit); None for the agent's limit. For behaviours that compile or load something at first use.
+        history: Number of past frames, with their percepts, that it wants in `observation.past`.
         deterministic: Whether the same frames give the same percepts.
-        isolate: Whether it runs in a process of its own, with hard limits.
-        memory_mb: How much memory it may take, megabytes; None when it does not say.
-        most_percepts: How many percepts one run may report.
+        isolate: Whether it runs in its own process, with hard limits.
+        memory_mb: Memory limit, megabytes; None for the default.
+        most_percepts: Most percepts that one run may report.
         version: Version of the contract that it was written for.
         awake: When it is awake: a condition of the rule language about one object `a`, such as
             "expected(a)" or "exists b: gap(a, b) < 60 px"; it runs on frames that follow a step in
-            which that held of some object, and 'wake' directives say of which. Empty for always.
-        relieves: Names of behaviours that rest while this one runs, coarse ones whose work it does
-            more closely; where it fails they do it again.
+            which that held for some object, named by 'wake' directives. Empty for always.
+        relieves: Names of coarser behaviours that rest while this one runs in their place; if it
+            fails, they take over again.
 
     Raises:
-        BehaviourError: A field is not as it should be.
+        BehaviourError: A field is invalid.
     """
 
     name: str
@@ -94,8 +94,8 @@ class Contract:
 
         Args:
             frame: The frame it is about.
-            value: What was perceived.
-            kind: Its kind; the first that the contract gives when left out.
+            value: The value of the percept.
+            kind: Its kind; by default the first in `gives`.
             confidence: 0 to 1.
         """
         return Percept(kind or self.gives[0], value, frame.time, self.name, confidence)

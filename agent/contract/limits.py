@@ -65,7 +65,7 @@ class Limits:
         return budget if self.hang_s is None else min(budget, self.hang_s)
 
     def sleeps(self, contract: Contract) -> bool:
-        """Whether it runs only while it is asked to look."""
+        """Whether it runs only while it is awake."""
         return bool(contract.awake) and contract.name not in self.wakeful
 
     def megabytes(self, contract: Contract) -> float:

@@ -1,4 +1,4 @@
-"""The phases of a step, and an agent between two steps: what stepping and rewinding stand on."""
+"""The phases of a step, and snapshots of an agent: the basis of stepping and rewinding."""
 
 from __future__ import annotations
 

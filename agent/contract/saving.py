@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 @runtime_checkable
 class Saveable(Protocol):
-    """A behaviour whose state can be kept, so that a run that was killed can go on from it."""
+    """A behaviour whose state can be saved, so that a run that was killed can be resumed from it."""
 
     def save(self) -> Mapping[str, Any]:
         """All that it holds from frame to frame, by name; what its settings determine is left out."""
@@ -23,7 +23,7 @@ class Stateless:
     """A behaviour that holds nothing from frame to frame: saved, it is as it was made."""
 
     def save(self) -> Mapping[str, Any]:
-        """Nothing: each frame stands for itself."""
+        """No state: each frame is processed on its own."""
         return {}
 
     def load(self, state: Mapping[str, Any]) -> None:

@@ -1,8 +1,8 @@
 """The cogitation-action cycle: perceive, update, cogitate, match, attend, act.
 
-Read `agent.py` (the cycle on one screen), `outcomes.py` (conclusions of reasoners are merged),
-`alerts.py` (alerts open and close), `answers.py` (what the operator says becomes a fact) and
-`own_troubles.py` (which alerts are about visup itself).
+Read `agent.py` (the cycle on one screen), `outcomes.py` (merging the conclusions of reasoners),
+`alerts.py` (opening and closing alerts), `answers.py` (the operator's answers become facts) and
+`system_alerts.py` (alerts about visup itself).
 """
 
 from visup.agent.cycle.agent import Agent, Reasoners

@@ -14,7 +14,7 @@ from visup.agent.contract.saving import Saveable
 from visup.agent.cycle.alerts import alert_events, fault_conditions, update_alerts
 from visup.agent.cycle.answers import apply_answers, resolve_answer
 from visup.agent.cycle.outcomes import merge_outcomes
-from visup.agent.cycle.own_troubles import REASONING_FAILED
+from visup.agent.cycle.system_alerts import REASONING_FAILED
 from visup.agent.execution.behaviour_slot import BehaviourSlot
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.execution.runners import error_line
@@ -27,14 +27,14 @@ from visup.agent.model.step import Observer, Step
 
 @dataclass(frozen=True, slots=True)
 class Reasoners:
-    """What reasons in an agent, by phase; within a phase in this order.
+    """The reasoners of an agent by phase, each in the order in which they run.
 
     Attributes:
         update: Percepts enter the mind.
         cogitate: Relations and rules are evaluated, events derived.
         match: Stages of tasks are matched and verified.
-        attend: What deserves a closer look is chosen, behaviours are called, and faults of the runtime
-            become conditions of alerts.
+        attend: Objects that need closer observation are chosen, behaviours are activated, and runtime
+            faults become alert conditions.
     """
 
     update: tuple[Reasoner, ...] = ()
@@ -43,7 +43,7 @@ class Reasoners:
     attend: tuple[Reasoner, ...] = ()
 
     def by_phase(self) -> tuple[tuple[Phase, tuple[Reasoner, ...]], ...]:
-        """The phases that reason, in order, each with its reasoners."""
+        """The reasoning phases in order, each with its reasoners."""
         return (
             (Phase.UPDATE, self.update),
             (Phase.COGITATE, self.cogitate),
@@ -58,21 +58,21 @@ class Reasoners:
 
 @dataclass(slots=True)
 class Agent:
-    """A mind with what perceives and reasons for it.
+    """A mind with the behaviours and reasoners that maintain it.
 
-    Two agents never meet: ids, time and state belong to the instance, and the same frames give the
+    Agents share nothing: ids, time and state belong to the instance, and the same frames give the
     same steps.
 
     Attributes:
-        behaviours: What perceives.
-        reasoners: What reasons.
+        behaviours: The perception routines.
+        reasoners: The reasoners, by phase.
         actors: Actor name -> model names, known before the first frame.
         zones: Parts of the scene that rules can name.
-        observers: Told of each step.
-        models: Names of models that the operator may answer with, besides those spoken of.
-        cast: Actors of the tasks with the models that they may be; the operator may answer with them too.
-        limits: What behaviours are held to.
-        mind: The mental model now.
+        observers: Called after each step.
+        models: Further names of models that the operator may answer with.
+        cast: Actors of the tasks with their models; the operator may also answer with these.
+        limits: Limits of time and memory for behaviours.
+        mind: The current mental model.
     """
 
     behaviours: Sequence[Behaviour] = ()
@@ -100,7 +100,7 @@ class Agent:
             frame: The next frame; its time must not be before that of the last one.
 
         Returns:
-            The whole record of the step; `mind` has become `Step.mind`.
+            The complete record of the step; `mind` is now `Step.mind`.
         """
         step = self.reason(self.perceive(frame))
         for observer in self.observers:
@@ -108,19 +108,19 @@ class Agent:
         return step
 
     def perceive(self, frame: Frame) -> Observation:
-        """Perceive only: behaviours see the frame, the mind stays as it is."""
+        """Perceive only: run the behaviours on the frame, without changing the mind."""
         return perceive(self._slots, frame, self.directives)
 
     def reason(self, observation: Observation, answers: Mapping[int, str] | None = None) -> Step:
-        """Reason about what was perceived, now or in a recorded run; observers are not called.
+        """Reason about an observation, live or recorded; observers are not called.
 
         Args:
-            observation: What was perceived of the next frame.
-            answers: What the operator had said before that step of a recorded run: object id ->
-                model name, as 'answer' events tell it. None when there is no such run.
+            observation: The percepts of the next frame.
+            answers: The operator's answers before that step of a recorded run: object id ->
+                model name, as in its 'answer' events. None for a live run.
 
         Returns:
-            The whole record of the step; `mind` has become `Step.mind`.
+            The complete record of the step; `mind` is now `Step.mind`.
         """
         *_, (_, thought) = self.phases(observation, answers)
         return self.act(observation, thought)
@@ -128,14 +128,14 @@ class Agent:
     def phases(
         self, observation: Observation, answers: Mapping[int, str] | None = None
     ) -> Iterator[tuple[Phase, Outcome]]:
-        """Update, cogitate, match, attend: one after the other, to look in between; the mind stays as it is.
+        """Run update, cogitate, match and attend one by one, for inspection; the mind does not change.
 
         Args:
-            observation: What was perceived of the next frame.
-            answers: As of `reason`.
+            observation: The percepts of the next frame.
+            answers: As in `reason`.
 
         Yields:
-            Each phase that is over, with all that was concluded up to there; the last one is for `act`.
+            Each completed phase, with all conclusions so far; pass the last one to `act`.
         """
         begin = replace(
             self.mind,
@@ -153,7 +153,7 @@ class Agent:
                         outcome, reasoner(outcome.mind, observation), observation
                     )
                 except (Exception, SystemExit) as fault:
-                    # The half-made mind is dropped: beliefs stay as they were and count as unknown.
+                    # The unfinished mind is dropped: beliefs stay as they were, and observations are unknown.
                     yield (
                         phase,
                         replace(
@@ -164,7 +164,7 @@ class Agent:
             yield phase, outcome
 
     def act(self, observation: Observation, thought: Outcome) -> Step:
-        """The last phase: alerts and directives; what was thought becomes the mind."""
+        """The last phase: alerts and directives; the conclusions become the mind."""
         conditions = (*thought.conditions, *fault_conditions(observation))
         alerts, opened, closed = update_alerts(
             self.mind.alerts,
@@ -191,17 +191,17 @@ class Agent:
         return step
 
     def snapshot(self) -> AgentSnapshot:
-        """What it believes now, to go back to with `restore`; a few references, no copy."""
+        """The current beliefs, to return to with `restore`; a few references, no copy."""
         answers = MappingProxyType(dict(self._answers))
         return AgentSnapshot(self.mind, self.directives, self._alerts_opened, answers)
 
     def restore(self, was: AgentSnapshot) -> None:
-        """Believe again what it, or another agent, believed then; behaviours stay as they are."""
+        """Return to the beliefs of a snapshot, of this or another agent; behaviours are not affected."""
         self.mind, self.directives = was.mind, was.directives
         self._alerts_opened, self._answers = was.alerts_opened, dict(was.answers)
 
     def close(self) -> None:
-        """Let go of threads and processes of behaviours; they would also go with the agent itself."""
+        """Release the threads and processes of behaviours, which would also end with the agent itself."""
         for slot in self._slots:
             slot.runner.close()
 
@@ -211,8 +211,8 @@ class Agent:
         """Step over frames until they end or a condition holds.
 
         Args:
-            frames: A source; it is left where the run stopped, so a further run goes on from there.
-            until: Looked at after each step.
+            frames: A source; a further run continues where this one stopped.
+            until: Evaluated after each step.
 
         Returns:
             The last step, or None when there was no frame.
@@ -235,17 +235,17 @@ class Agent:
             name: A model, an actor, or 'unknown' for none of the models.
 
         Raises:
-            SettingsError: There is no such object, or nobody knows such a name.
+            SettingsError: There is no such object, or the name is unknown.
         """
         self._answers[object_id] = resolve_answer(
             self.mind, object_id, name, self.models, self.cast
         )
 
     def save(self) -> Mapping[str, Any]:
-        """All that this agent has become, to be frozen by `visup.agent.storage.checkpoint`.
+        """The complete state of this agent, for `visup.agent.storage.checkpoint`.
 
         Returns:
-            `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
+            `mind`, and `behaviours` by name, or None if one of them cannot save its state.
         """
         whole = all(s.is_saveable for s in self._slots)
         saveable = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.is_saveable}
@@ -256,10 +256,10 @@ class Agent:
         }
 
     def load(self, state: Mapping[str, Any]) -> bool:
-        """Become what an agent of the same settings was; `state` is used up.
+        """Load the state of an agent with the same settings; `state` is consumed.
 
         Returns:
-            Whether behaviours too are as they were; else they are new, and only the mind is.
+            Whether the behaviours were restored as well; otherwise only the mind was.
         """
         self.mind, self.directives, self._alerts_opened, self._answers = state["mind"]
         behaviours = state["behaviours"]

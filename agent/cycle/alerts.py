@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from visup.agent.cycle.own_troubles import BEHAVIOUR_FAILED
+from visup.agent.cycle.system_alerts import BEHAVIOUR_FAILED
 from visup.agent.model.events import Alert, AlertCondition, Event, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import FAULT_STATES, Observation, ReportState
@@ -80,7 +80,7 @@ def update_alerts(
 def alert_events(
     opened: Iterable[Alert], closed: Iterable[Alert], time: float, frame_index: int
 ) -> tuple[Event, ...]:
-    """The events that tell of alerts that opened or closed."""
+    """The events of alerts that opened or closed."""
     told = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
     over = [
         _event("alert_closed", f"Resolved: {a.cause}", a, time, frame_index, Severity.INFO)

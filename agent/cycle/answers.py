@@ -92,7 +92,7 @@ def resolve_model(
 
 
 def apply_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[Event, ...]]:
-    """A mind that takes answers as facts, and the events that tell of them.
+    """A mind that takes answers as facts, and the events that report them.
 
     Args:
         mind: At the beginning of a step.

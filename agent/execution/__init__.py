@@ -1,9 +1,9 @@
-"""Behaviours run on a frame, each contained: whatever one does, the others and the mind go on.
+"""Execution of behaviours on a frame, with fault containment: a fault in one affects no other.
 
-Read `pipeline.py` (all behaviours of a step, in order), `behaviour_slot.py` (one of them: its turn, its
-failures, its suspensions), `validation.py` (percepts that make no sense are refused), `runners.py` (in
-this thread or in one that can be given up) and `process_runner.py` with its other end `worker.py` (in a
-process of its own).
+Read `pipeline.py` (all behaviours of a step, in order), `behaviour_slot.py` (one behaviour: scheduling,
+failures, suspensions), `validation.py` (checking of percepts), `runners.py` (in
+this thread, or in one that can be abandoned) and `process_runner.py` with its counterpart `worker.py` (in a
+separate process).
 """
 
 from visup.agent.execution.behaviour_slot import BehaviourSlot

@@ -80,7 +80,7 @@ class BehaviourSlot:
 
     @property
     def is_saveable(self) -> bool:
-        """Whether the behaviour can tell its state; that of another process is out of reach."""
+        """Whether the state of the behaviour can be saved; one in another process is out of reach."""
         return isinstance(self.behaviour, Saveable) and not self.limits.isolated(self.contract)
 
     def state_dict(self) -> dict[str, Any]:
@@ -117,7 +117,7 @@ class BehaviourSlot:
         if (waiting := self._waiting(frame.time, asleep)) is not None:
             return replace(idle, state=waiting, error=self.error)
         if asleep:
-            return replace(idle, error="asleep: nothing calls for it")
+            return replace(idle, error="asleep: nothing requires it")
         closer = [
             r.behaviour for r in observation.reports if r.behaviour in self.relieved_by and _ran(r)
         ]
@@ -145,7 +145,7 @@ class BehaviourSlot:
         return replace(idle, state=ReportState.RAN, percepts=percepts, elapsed_ms=self._ms(begin))
 
     def remember(self, frame: Frame, observation: Observation) -> None:
-        """Keep a frame that is over, if past frames were asked for."""
+        """Keep a past frame, if the contract requests any."""
         if self.past.maxlen:
             self.past.append(PastFrame(frame, observation))
 
@@ -184,7 +184,7 @@ class BehaviourSlot:
         most = self.limits.megabytes(self.contract)
         if self.grown_mb > most:
             self.grown_mb = 0.0
-            raise MemoryLimitError(f"its runs made the process grow by more than {most:g} MB")
+            raise MemoryLimitError(f"it made the process grow by more than {most:g} MB")
         return percepts
 
     def _fail(self, fault: Exception, now: float) -> None:

@@ -31,7 +31,7 @@ def read_contracts(
     asked = {"do": "contracts", "where": where, "settings": _plain(settings or {})}
     child = ChildProcess(asked)
     try:
-        answer = child.receive(READING_S, "its contract was not told")
+        answer = child.receive(READING_S, "its contract was not given")
     except BehaviourError as fault:
         raise BehaviourError(f"it does not run: {fault.what}", where=where) from fault
     finally:
@@ -53,7 +53,7 @@ def _tuples(told: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _refused(answer: Message, where: str) -> VisupError:
-    """The error that the process told, with all its parts."""
+    """The error that the process reported, with all its parts."""
     told = answer.get("refused")
     faults = [_error(f, where) for f in told if isinstance(f, Mapping)] if told else []
     if len(faults) > 1:

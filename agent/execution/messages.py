@@ -40,7 +40,7 @@ class Channel:
         self._end = end
 
     def send(self, message: Message, seconds: float | None = None) -> None:
-        """Send a message, within so many seconds.
+        """Send a message within a time limit.
 
         Raises:
             TimeoutError: The other end does not read.
@@ -65,7 +65,7 @@ class Channel:
         return True
 
     def receive(self, seconds: float | None = None) -> Any:
-        """Wait for a message, the whole of it, for so many seconds.
+        """Wait for a complete message, with a time limit.
 
         Raises:
             TimeoutError: It did not come in time.

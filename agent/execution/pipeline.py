@@ -111,7 +111,7 @@ def perceive(
 
 
 def read_only(frame: Frame) -> Frame:
-    """The same frame with an image that cannot be written to: whoever tries fails, alone."""
+    """The same frame with a read-only image, so that a behaviour that writes to it fails alone."""
     image = frame.image.view()
     image.flags.writeable = False
     return Frame(frame.index, frame.time, image)

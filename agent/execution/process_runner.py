@@ -1,4 +1,4 @@
-"""A behaviour in a process of its own: hard limits of time and memory, whatever it does.
+"""A behaviour in its own process, with hard limits of time and memory.
 
 Images go over a file in memory, everything else as messages, which are data (`messages.py`): nothing that
 the process sends can run here. A process that hangs or dies is replaced by a new one, whose behaviour is as
@@ -37,7 +37,7 @@ PLUG_IN = "visup_plugin_"
 
 
 class ProcessRunner:
-    """Runs a behaviour in a process of its own.
+    """Runs a behaviour in its own process.
 
     Args:
         behaviour: What is run; it must not have run before.

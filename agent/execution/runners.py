@@ -58,7 +58,7 @@ class Runner(Protocol):
         directives: Sequence[Directive],
         seconds: float | None,
     ) -> tuple[Percept, ...]:
-        """Run it on a frame, for so many seconds at most.
+        """Run it on a frame, with a time limit in seconds.
 
         Raises:
             Exception: Whatever the behaviour raised, `BehaviourError` for nonsense, `RunTimeoutError`,
@@ -150,7 +150,7 @@ class _Job:
 
 
 class ThreadRunner:
-    """Runs a behaviour in a thread of its own, which is given up when it takes too long.
+    """Runs a behaviour in its own thread, which is abandoned if it takes too long.
 
     The next run gets a new thread, once the one given up has ended.
 

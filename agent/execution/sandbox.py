@@ -157,7 +157,7 @@ def _wrapped(lifeline: int) -> list[str]:
 
 
 def namespace_command() -> list[str]:
-    """What runs a command in namespaces of its own."""
+    """The prefix that runs a command in separate namespaces."""
     return [shutil.which("unshare") or "unshare", *NAMESPACES]
 
 

@@ -1,4 +1,4 @@
-"""What every folder raises: one tree of errors, worded for the user.
+"""The exceptions of visup: one hierarchy, with messages for the user.
 
 An error says what is wrong, where, what was expected and what to do. The command turns each into
 one clear message and exit code 2; none of them is ever shown as a traceback.
@@ -9,19 +9,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LONGEST_QUOTE = 200
-"""Characters of a faulty line that are shown, those round the fault."""
+"""Most characters of a faulty line to show, around the fault."""
 
 
 @dataclass(frozen=True, slots=True)
 class SourceLocation:
-    """Where in a text a fault stands.
+    """Position of a fault in a text.
 
     Attributes:
         file: Name of the file, as the user gave it.
         line: Line, counted from 1.
         column: Column, counted from 1.
         text: The line itself, for the caret.
-        length: How many characters the caret marks.
+        length: Number of characters to underline.
     """
 
     file: str
@@ -34,7 +34,7 @@ class SourceLocation:
         return f"{self.file}:{self.line}:{self.column}"
 
     def caret(self) -> str:
-        """The faulty line with carets under the fault; tabs are kept so that the carets line up."""
+        """The faulty line with carets under the fault; tabs are preserved so that they line up."""
         first = (
             max(0, self.column - 1 - LONGEST_QUOTE // 2) if len(self.text) > LONGEST_QUOTE else 0
         )
@@ -46,7 +46,7 @@ class SourceLocation:
 
 
 class VisupError(Exception):
-    """Base of all errors that are the user's to mend.
+    """Base class of all errors that the user can fix.
 
     Args:
         what: What is wrong, one sentence without a full stop.
@@ -56,7 +56,7 @@ class VisupError(Exception):
     """
 
     code: str | None = None
-    """The stable code of what is wrong, where there is one."""
+    """A stable error code, if there is one."""
 
     def __init__(
         self,
@@ -92,19 +92,19 @@ class DatabaseError(VisupError):
 
 
 class RuleError(VisupError):
-    """A rules file is not as it should be."""
+    """A rules file is invalid."""
 
 
 class TaskError(VisupError):
-    """A task file is not as it should be."""
+    """A task file is invalid."""
 
 
 class BehaviourError(VisupError):
-    """A behaviour does not keep its contract, or cannot be loaded."""
+    """A behaviour violates its contract, or cannot be loaded."""
 
 
 class SettingsError(VisupError):
-    """A setting or an argument is not as it should be."""
+    """A setting or an argument is invalid."""
 
 
 class OutputError(VisupError):
@@ -112,10 +112,10 @@ class OutputError(VisupError):
 
 
 class ExtraMissingError(VisupError):
-    """A part of visup was asked for that needs an extra which is not installed.
+    """A part of visup needs an extra that is not installed.
 
     Args:
-        what: What was asked for.
+        what: The part that was requested.
         extra: Name of the extra, as in ``visup[render]``.
     """
 
@@ -127,10 +127,10 @@ class ExtraMissingError(VisupError):
 
 
 class ErrorGroup(VisupError):
-    """All the faults of one file, reported together.
+    """All errors of one file, reported together.
 
     Args:
-        errors: At least one fault, in the order of their places.
+        errors: At least one error, in order of position.
     """
 
     def __init__(self, errors: list[VisupError]) -> None:

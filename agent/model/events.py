@@ -1,4 +1,4 @@
-"""What is said and asked: events, alerts with what keeps them open, directives to behaviours."""
+"""Events, alerts with their conditions, and directives to behaviours."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ WAKE = "wake"
 
 @dataclass(frozen=True, slots=True)
 class Directive:
-    """What cogitation asks of behaviours, with its reason.
+    """A request from reasoning to behaviours, with its reason.
 
     Attributes:
         kind: 'expect_regions' (data: count), 'look_at' (data: bbox), 'ignore' (data: bbox),

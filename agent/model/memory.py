@@ -1,4 +1,4 @@
-"""What reasoners remember from step to step: each under a typed key of its own."""
+"""The memory of reasoners from step to step, each under its own typed key."""
 
 from __future__ import annotations
 

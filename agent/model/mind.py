@@ -1,7 +1,7 @@
-"""The mental model: what is believed about objects, their identity, motion, presence and tasks.
+"""The mental model: beliefs about objects, their identity, motion and presence, and about tasks.
 
-A mind is an immutable value; a step makes a new one. All that reasoners remember from step to step
-stands in it too (`memory`), so that a snapshot of a mind is a snapshot of everything that reasons.
+A mind is an immutable value; each step creates a new one. The memory of the reasoners is
+part of it (`memory`), so that a snapshot of a mind is a snapshot of all reasoning.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ class Zone:
     """A part of the scene that rules can name, as drawn in the settings.
 
     Attributes:
-        name: What rules call it.
+        name: Its name in rules and tasks.
         polygon: Corners (x, y), pixels of the image, at least three, in order.
-        depth: (nearest, farthest) relative depth, or None when the zone is drawn in the image alone.
-        on_floor: Whether it lies on the floor: a body is in it where it stands, not where its outline is.
+        depth: (nearest, farthest) relative depth, or None for a zone without a range of depth.
+        on_floor: Whether it lies on the floor: an object is in it by its foot points, not by its outline.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class Mind:
-    """All that is believed at one moment.
+    """All beliefs at one moment.
 
     Attributes:
         time: Seconds of the last observation.
@@ -65,9 +65,9 @@ class Mind:
         unknown: Kinds of percept that could not be observed in this step (a behaviour failed).
         actors: Actor name -> model names, as bound by the user or the task.
         zones: Parts of the scene that rules can name.
-        questions: Those that wait for the operator's answer.
-        answers: Object id -> what the operator said it is.
-        memory: What reasoners remember, by the names of their keys (`MemoryKey`); immutable values only.
+        questions: Open questions to the operator.
+        answers: Object id -> the operator's answer.
+        memory: Memory of the reasoners, by the names of their keys (`MemoryKey`); immutable values only.
     """
 
     time: float = 0.0
@@ -88,7 +88,7 @@ class Mind:
     memory: Mapping[str, Any] = field(default_factory=empty)
 
     def recall(self, key: MemoryKey[Remembered]) -> Remembered:
-        """What a reasoner remembers, or the default of its key."""
+        """The memory of a reasoner, or the default of its key."""
         found: Remembered = self.memory.get(key.name, key.default)
         return found
 
@@ -96,8 +96,8 @@ class Mind:
         """The same mind with one reasoner's memory replaced, and other fields with it.
 
         Args:
-            key: Of the reasoner.
-            value: What it remembers; must be immutable.
+            key: The reasoner's key.
+            value: The new memory; must be immutable.
             changes: Field -> value.
         """
         memory = MappingProxyType({**self.memory, key.name: value})
@@ -127,30 +127,30 @@ class Mind:
         return any(a in parts and b in parts for task in self.tasks for parts in task.machines)
 
     def relation(self, name: str, *objects: int) -> Relation | None:
-        """The relation of that name between exactly these objects, or None when it is not judged.
+        """The relation of that name between exactly these objects, or None if it is not evaluated.
 
         The order of the objects matters only for relations that are not symmetric.
         """
         return self._table.find(name, *objects)
 
     def truth(self, name: str, a: int, b: int) -> Truth | None:
-        """Whether the relation of that name holds from a to b, or None when it is not judged."""
+        """Truth of the relation of that name from a to b, or None if it is not evaluated."""
         return self._table.truth(name, a, b)
 
     def holding(self, *names: str) -> tuple[Relation, ...]:
-        """The relations of some names that are true, by their objects."""
+        """The true relations with the given names, by their objects."""
         return self._table.holding(*names)
 
     def holding_objects(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
-        """Objects and names of the relations that `holding` gives."""
+        """Objects and names of the relations that `holding` returns."""
         return self._table.holding_objects(*names)
 
     def truth_codes(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
-        """A relation between all of some objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
+        """A relation between all pairs of the given objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
         return self._table.truth_codes(name, ids)
 
     def truth_tables(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
-        """Several relations between all of some objects: (k, n, n) codes as of `truths`."""
+        """Several relations between all pairs of the given objects: (k, n, n) codes as in `truth_codes`."""
         return self._table.truth_tables(names, ids)
 
     @property

@@ -78,7 +78,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What the operator is asked: which of some candidates an object is.
+    """A question to the operator: which of several candidates an object is.
 
     Attributes:
         object_id: The object.

@@ -1,4 +1,4 @@
-"""The records that flow through visup, from a frame to a step: frozen, typed, passive.
+"""The records of visup, from a frame to a step: frozen, typed, passive.
 
 Frames of reference: image coordinates are pixels with x to the right and y down, the origin at the
 centre of the top left pixel; boxes are half open (x, y, width, height); times are seconds since the
@@ -26,7 +26,7 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
 def empty() -> Mapping[str, Any]:
-    """The mapping with nothing in it; dataclasses want a factory for it."""
+    """The empty mapping, as a default factory for dataclasses."""
     return EMPTY
 
 
@@ -39,7 +39,7 @@ class Truth(StrEnum):
 
 
 class HealthStatus(StrEnum):
-    """What the camera's image is like; anything but OK makes motion untrustworthy."""
+    """State of the camera's image; with anything but OK, motion cannot be trusted."""
 
     OK = "ok"
     DARK = "dark"
@@ -86,9 +86,9 @@ class Region:
         velocity_sigma: Standard deviation of each velocity component, pixels per second.
         motion: (2, 3) float, affine motion of the region between the last frame and this one.
         cut: Whether the image border cuts the region.
-        confidence: How sure the segmenter is that this is a moving object, 0 to 1.
-        visible_since: Seconds since when it has been in view, moving or not, as far as one can look
-            back; None when nobody looked.
+        confidence: Confidence of the segmenter that this is a moving object, 0 to 1.
+        visible_since: Time since which it has been in view, moving or not, as far as can be traced
+            back; None if it was not traced.
     """
 
     id: int
@@ -137,9 +137,9 @@ class Hypothesis:
         rotation: In-plane rotation from view to region, radians, or None.
         scale: Region pixels per unit of the model (metres where the model has metres), or None.
         direction: Unit vector from the object to the viewer in the model's frame, or None.
-        fitted: Whether direction and rotation were fitted to the picture; else they are those of a stored
-            view, some ten degrees away.
-        of_kind: Whether the name is that of a kind, as detectors have it: several things may bear it at once.
+        fitted: Whether direction and rotation were fitted to the image; otherwise they are those of a stored
+            view, about ten degrees off.
+        of_kind: Whether the name is a class label, as from a detector, that several objects can have at once.
     """
 
     region_id: int
@@ -172,17 +172,17 @@ class Depth:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraMotion:
-    """How the picture of the resting scene moved because the camera did.
+    """Apparent motion of the static scene caused by motion of the camera.
 
     Attributes:
         motion: (2, 3) float, affine motion of the picture between the last frame and this one, pixels
-            to pixels; the identity for a camera that rests.
+            to pixels; the identity for a static camera.
     """
 
     motion: NDArray[np.float64]
 
     def displacement(self, at: tuple[float, float]) -> tuple[float, float]:
-        """(dx, dy) by which what rests at a place (x, y) of this frame was moved in the picture, pixels."""
+        """(dx, dy) by which a static point at (x, y) of this frame moved in the image, pixels."""
         (a, b, c), (d, e, f) = self.motion.tolist()
         x, y, turn = at[0] - c, at[1] - f, a * e - b * d
         return at[0] - (e * x - b * y) / turn, at[1] - (a * y - d * x) / turn
@@ -193,7 +193,7 @@ class Health:
     """State of the camera image.
 
     Attributes:
-        status: What the image is like.
+        status: The state.
         detail: One sentence for the user, empty when OK.
     """
 
@@ -203,10 +203,10 @@ class Health:
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """Whatever a behaviour reports about a frame.
+    """A report of a behaviour about a frame.
 
     Attributes:
-        kind: What it is: 'region', 'hypothesis', 'depth', 'camera', 'health', or a plug-in's own word.
+        kind: 'region', 'hypothesis', 'depth', 'camera', 'health', or a plug-in's own kind.
         value: `Region`, `Hypothesis`, `Depth`, `CameraMotion`, `Health`, or a plug-in's own value.
         time: Seconds, the frame's time.
         source: Name of the behaviour.
@@ -221,7 +221,7 @@ class Percept:
 
 
 class ReportState(StrEnum):
-    """What became of a behaviour in one step."""
+    """Whether and how a behaviour ran in one step."""
 
     RAN = "ran"
     RESTED = "rested"
@@ -232,7 +232,7 @@ class ReportState(StrEnum):
 
 
 FAULT_STATES = frozenset({ReportState.FAILED, ReportState.LATE, ReportState.SUSPENDED})
-"""States of a behaviour that is at fault itself; one that is blind only misses what it needs."""
+"""States of a behaviour that is itself at fault; a blind one only lacks its inputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,12 +241,12 @@ class Report:
 
     Attributes:
         behaviour: Its name.
-        state: Ran; rested (it was not its turn); blind (what it needs is unknown); failed; late (it
-            gave no answer in time); or suspended (waiting after it failed or was late).
-        gives: The kinds it would have reported.
-        percepts: What it reported; empty unless it ran.
+        state: Ran; rested (not due); blind (an input is unknown); failed; late (it
+            did not answer in time); or suspended (paused after a failure).
+        gives: The kinds of percept that it can report.
+        percepts: Its percepts; empty unless it ran.
         error: What went wrong, unless it ran.
-        elapsed_ms: Wall time; for people, never for decisions.
+        elapsed_ms: Wall time; for information, never used for decisions.
     """
 
     behaviour: str
@@ -259,15 +259,15 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """All that was perceived of one frame: what reasoners see instead of the frame itself.
+    """All percepts of one frame: what reasoners get instead of the frame itself.
 
     Attributes:
         frame_index: Number of the frame.
         time: Seconds.
         frame_size: (width, height) pixels.
         reports: One for each behaviour.
-        past: Frames before, oldest first, with what was observed of them: only for a behaviour that
-            asked for them; nobody else is given frames.
+        past: Past frames, oldest first, with their observations: only for behaviours whose contract
+            requests them.
     """
 
     frame_index: int
@@ -281,9 +281,9 @@ class Observation:
         return tuple(p.value for r in self.reports for p in r.percepts if p.kind == kind)
 
     def observed(self, kind: str) -> bool:
-        """Whether this kind was looked for; seeing none then means none is there.
+        """Whether this kind was observable, so that an absence of percepts means an absence of objects.
 
-        Somebody looked for it, and nobody who should have could not.
+        Some behaviour that reports it ran, and none that should have failed to.
         """
         ran = any(r.state is ReportState.RAN and kind in r.gives for r in self.reports)
         return ran and kind not in self.unknown
@@ -302,11 +302,11 @@ class Observation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PastFrame:
-    """A frame that is over, with what was observed of it.
+    """An earlier frame, with its observation.
 
     Attributes:
         frame: The frame.
-        observation: What was perceived of it.
+        observation: Its observation.
     """
 
     frame: Frame

@@ -45,7 +45,7 @@ class RelationTable(Sequence[Relation]):
         return RelationTable(self.ids, (*self.parts, cells), self.extra)
 
     def find(self, name: str, *objects: int) -> Relation | None:
-        """The relation of that name between exactly these objects, or None when it is not judged.
+        """The relation of that name between exactly these objects, or None if it is not evaluated.
 
         Args:
             name: Any relation, listed or not.
@@ -60,7 +60,7 @@ class RelationTable(Sequence[Relation]):
         return self._given.get((name, frozenset(objects))) if self.extra else None
 
     def truth(self, name: str, a: int, b: int) -> Truth | None:
-        """Whether the relation of that name holds from a to b, or None when it is not judged."""
+        """Truth of the relation of that name from a to b, or None if it is not evaluated."""
         for part in self.parts:
             at = part.columns.named.get(name)
             if at is not None:
@@ -84,7 +84,7 @@ class RelationTable(Sequence[Relation]):
         return [0 if t is None else _CODES[t] for t in truths]
 
     def holding(self, *names: str) -> tuple[Relation, ...]:
-        """The relations of some names that are true, by their objects."""
+        """The true relations with the given names, by their objects."""
         held = (self.find(name, *objects) for objects, name in self.holding_objects(*names))
         return tuple([r for r in held if r is not None])
 

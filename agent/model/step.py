@@ -1,4 +1,4 @@
-"""The record of one step of the cycle, and what is called with each."""
+"""The record of one step of the cycle, and the observers that receive it."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """The whole record of one step.
+    """The complete record of one step.
 
     Attributes:
         frame_index: Number of the frame.
         time: Seconds.
-        observation: What was perceived.
+        observation: The percepts.
         mind: The mind after the step.
         events: What happened, in order.
         alerts: Alerts that were opened or closed in this step.
-        directives: What is asked of behaviours in the next step.
-        frame: The frame itself, where whoever gives the step keeps it, as `visup.watch` does; else None.
+        directives: Requests to behaviours for the next step.
+        frame: The frame itself, in steps from `visup.watch`; else None.
     """
 
     frame_index: int
@@ -47,10 +47,10 @@ class Step:
         return self.observation.reports
 
     def draw(self, frame: Frame | None = None) -> NDArray[np.uint8]:
-        """The frame with what is believed drawn over it: contours, names, alerts, stages.
+        """The frame with the beliefs drawn over it: contours, names, alerts, stages.
 
         Args:
-            frame: The frame of this step; None for the one that the step carries.
+            frame: The frame of this step; by default the one that the step carries.
 
         Returns:
             (H, W, 3) uint8 BGR, a new image.
@@ -73,7 +73,7 @@ class Step:
 
 
 Observer = Callable[[Step, Frame], None]
-"""Told of each step after it is over: journal, console, report. It cannot change the agent."""
+"""Called after each step: journal, console, report. It cannot change the agent."""
 
 
 enable_display(Step)

@@ -1,4 +1,4 @@
-"""What is believed about a task: its stages, who plays its actors, its verdict."""
+"""Beliefs about a task: its stages, the objects that play its actors, its verdict."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from visup.agent.model.display import enable_display
 
 
 class Status(StrEnum):
-    """How a stage of a task stands."""
+    """Status of a stage."""
 
     PENDING = "pending"
     ACTIVE = "active"
@@ -23,7 +23,7 @@ class Status(StrEnum):
 
 
 class Verdict(StrEnum):
-    """How a task as a whole stands."""
+    """Verdict on a task as a whole."""
 
     IN_PROGRESS = "in_progress"
     SUCCEEDED = "succeeded"
@@ -53,7 +53,7 @@ class Binding:
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """An action that the current stage of a task asks for; rules are suspended by it.
+    """An action that the current stage of a task requires; it suspends rules.
 
     Attributes:
         relation: Name of the relation, such as 'converging'.
@@ -79,7 +79,7 @@ class Prospect:
 
 @dataclass(frozen=True, slots=True)
 class StageBelief:
-    """How one stage of a task stands.
+    """The belief about one stage of a task.
 
     Attributes:
         stage: Its name.
@@ -101,7 +101,7 @@ class StageBelief:
 
 @dataclass(frozen=True)
 class TaskBelief:
-    """How a task stands.
+    """The belief about one task.
 
     Attributes:
         task: Its name.

@@ -1,6 +1,6 @@
-"""Behaviours that are found by name, by file or by module path, and made with their settings.
+"""Discovery of behaviours by name, file or module path, and their creation with settings.
 
-Read `factory.py` (what makes a behaviour), `registry.py` (installed ones, by name) and `settings.py`
+Read `factory.py` (creates a behaviour), `registry.py` (installed behaviours, by name) and `settings.py`
 (their settings, from the command line or a TOML file).
 """
 

@@ -149,13 +149,13 @@ def as_behaviour(made: object, where: str) -> Behaviour:
 
 
 def module_name(path: Path) -> str:
-    """The name under which a file of behaviours is imported; files of one name are told apart."""
+    """The name under which a file of behaviours is imported; unique even for files of the same name."""
     place = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
     return f"visup_plugin_{path.stem}_{place}"
 
 
 def import_file(path: Path) -> ModuleType:
-    """A file of behaviours, imported anew.
+    """A file of behaviours, freshly imported.
 
     Raises:
         BehaviourError: It is not Python.

@@ -1,4 +1,4 @@
-"""A behaviour that is not imported here: what is known of one that runs in a process of its own."""
+"""A stand-in for a behaviour that runs in its own process and is not imported here."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class IsolatedBehaviour:
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """Refuse: it runs in a process of its own, and nowhere else.
+        """Refuse: it runs only in its own process.
 
         Raises:
             BehaviourError: Always.

@@ -15,7 +15,7 @@ GROUP = "visup.behaviours"
 
 
 class Registry:
-    """Behaviours that can be made, by name. Made by whoever wires an agent; never global."""
+    """Factories of behaviours by name. Created where an agent is wired; never global."""
 
     def __init__(self) -> None:
         self._offers: dict[str, BehaviourFactory | EntryPoint] = {}
@@ -29,7 +29,7 @@ class Registry:
         self._add(name, BehaviourFactory(kind, name))
 
     def add_entry_point(self, point: EntryPoint) -> None:
-        """Add what a package offers; it is imported when it is asked for.
+        """Add an entry point of a package, which is imported when first used.
 
         Raises:
             BehaviourError: The name is taken.
@@ -40,7 +40,7 @@ class Registry:
 
     def _add(self, name: str, offer: BehaviourFactory | EntryPoint) -> None:
         if name in self._offers:
-            raise BehaviourError(f"a behaviour called '{name}' is registered already")
+            raise BehaviourError(f"a behaviour called '{name}' is already registered")
         self._offers[name] = offer
 
     def names(self) -> list[str]:

@@ -173,7 +173,7 @@ def encode_percept(p: Percept) -> list[Any]:
 
 
 def decode_percept(written: list[Any]) -> Percept:
-    """The percept that was encoded; whether it makes sense is not looked at.
+    """Decode a percept, without validating it.
 
     Raises:
         ValueError, TypeError, KeyError: It was not.

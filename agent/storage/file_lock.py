@@ -1,4 +1,4 @@
-"""One writer at a time for a file or a run folder: a lock that dies with whoever holds it.
+"""One writer at a time for a file or a run folder, by a lock that is released when its process ends.
 
 The lock is the operating system's, on a hidden file beside what is locked (`.NAME.lock`), which may stay: a
 process that was killed holds nothing. Reading needs no lock.
@@ -21,7 +21,7 @@ WAIT_S = 60.0
 def acquire_lock(
     path: Path, what: str, wait_s: float = 0.0, *, again: bool = False
 ) -> BaseFileLock:
-    """Become the only writer of a file; to be released by whoever asked.
+    """Acquire the write lock of a file, which the caller must release.
 
     Args:
         path: What is written; it need not exist.

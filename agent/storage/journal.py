@@ -54,7 +54,7 @@ Statement = tuple[str, tuple[Any, ...]]
 
 @dataclass(frozen=True, slots=True)
 class JournalLimits:
-    """How a journal is cut into segments, and how much of it is kept.
+    """How a journal is split into segments, and how much of it is retained.
 
     Attributes:
         segment_bytes: A segment that holds more of steps is followed by a new one.
@@ -156,7 +156,7 @@ class Journal:
     def _begin(self) -> None:
         if self.path.is_file() and self.path.stat().st_size:
             raise OutputError(
-                "a run is recorded here already",
+                "a run is already recorded here",
                 where=str(self.path),
                 hint="choose another folder, or delete this one",
             )

@@ -40,7 +40,7 @@ def _nearest_run(run: Path) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A run on disk; it may still go on. Nothing is read before it is asked for.
+    """A run on disk, possibly live. Data are read on demand.
 
     Attributes:
         path: The first file of its journal.
@@ -90,7 +90,7 @@ class Recording:
                 number, name = int(event["objects"][0]), str(event["data"]["name"])
                 found.setdefault(int(event["frame_index"]), {})[number] = name
             except (KeyError, IndexError, TypeError, ValueError) as fault:
-                raise _damaged(str(self.path), "an answer is not as it should be") from fault
+                raise _damaged(str(self.path), "an answer is invalid") from fault
         return found
 
     def alerts(self) -> dict[int, dict[str, Any]]:
@@ -152,10 +152,10 @@ class Recording:
         raise self._no_step(frame)
 
     def _no_step(self, frame: int) -> OutputError:
-        return OutputError(f"frame {frame} was not judged in this run", where=str(self.path))
+        return OutputError(f"frame {frame} was not processed in this run", where=str(self.path))
 
     def stamp(self) -> RecordStamp:
-        """What is known of a record besides what it tells: camera, host, time by the clock of the wall."""
+        """The common fields of a record: camera, host, wall-clock time."""
         facts = self.facts()
         stamp = RecordStamp(clock=WallClock.read(facts.get("clock")))
         stamp.named = {key: str(facts[key]) for key in ("camera", "host") if key in facts}

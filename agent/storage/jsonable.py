@@ -80,13 +80,13 @@ def _number(x: float) -> float | str:
 
 
 def event_record(event: Event) -> dict[str, Any]:
-    """An event as it stands in `events.jsonl`."""
+    """An event as written to `events.jsonl`."""
     line: dict[str, Any] = to_jsonable(event)
     return line
 
 
 def object_summary(belief: ObjectBelief) -> dict[str, Any]:
-    """What is believed about an object, short, as it stands in the journal."""
+    """A summary of the beliefs about an object, as written to the journal."""
     region = belief.region
     return {
         "id": belief.id,

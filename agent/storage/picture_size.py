@@ -43,7 +43,7 @@ def check_picture_size(data: bytes) -> None:
 
 
 def check_pixels(width: float, height: float) -> None:
-    """Refuse a picture of so many pixels.
+    """Refuse a picture with too many pixels.
 
     Raises:
         ValueError: They are too many.

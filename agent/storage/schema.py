@@ -159,7 +159,7 @@ class StepDocument(_Strict):
 
 
 def schema_text() -> str:
-    """The JSON Schema of a recorded step, as it stands in the docs."""
+    """The JSON Schema of a recorded step, as in the documentation."""
     schema = StepDocument.model_json_schema()
     named = {"$id": f"visup-step-{VERSION}", "title": f"visup: a recorded step, version {VERSION}"}
     return json.dumps({**schema, **named}, indent=1, sort_keys=True) + "\n"

@@ -25,7 +25,7 @@ class SealError(ValueError):
 
 
 def key_path() -> Path:
-    """Where the key of this user is kept."""
+    """Path of this user's key."""
     if named := os.environ.get(KEY_FILE):
         return Path(named)
     state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"

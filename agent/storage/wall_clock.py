@@ -51,7 +51,7 @@ class WallClock:
         return cls(anchors if ascends else ())
 
     def seconds(self, time_s: float) -> float | None:
-        """Seconds since 1970 at a time of the source, or None where nobody knows.
+        """Seconds since 1970 at a time of the source, or None if unknown.
 
         >>> WallClock(((0.0, 1000.0), (60.0, 5000.0))).seconds(61.5)
         5001.5
@@ -100,7 +100,7 @@ def utc_text(seconds: float) -> str:
 
 
 class RecordStamp:
-    """What stands in every record besides what it tells: camera, host, and when it was.
+    """The fields common to all records: camera, host, and wall-clock time.
 
     An observer of the steps of a camera; other sources tell no time of the wall.
 

@@ -1,4 +1,4 @@
-"""Things that were shown once: found in the picture, and followed at rest and in motion.
+"""Taught objects: detected in the image, and tracked at rest and in motion.
 
 Read `looks/` (what a thing looks like: patch, mask, colours, correlation filter), `tracking/` (finding
 it, following it, telling rest from motion and from being covered, which pixels are whose), `output/`

@@ -1,4 +1,4 @@
-"""Boxes that somebody else found, in place of visup's own eyes: a detector's file, its network, or its code.
+"""Boxes from an external detector or tracker, in place of motion segmentation: a file, a network, or code.
 
 Read `boxes.py` (a box), `files.py` (MOT and COCO files), `yolo.py` and `network.py` (ONNX files of the YOLO
 family), `supervision.py` (the boxes of that library, in and out), `numbering.py` (the same thing keeps its

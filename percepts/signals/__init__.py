@@ -1,4 +1,4 @@
-"""Signals that are not from the image: a battery, a door, a mode, told beside the video.
+"""Signals that do not come from the image, such as a battery, a door or a mode.
 
 Read `files.py` (tables), `mqtt.py` (messages of a broker) and `behaviour.py` (what is reported for a frame).
 """

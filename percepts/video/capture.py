@@ -77,7 +77,7 @@ def frame_rate(capture: Capture, wanted: float | None) -> tuple[float, tuple[str
     fps = float(capture.get(cv2.CAP_PROP_FPS))
     if math.isfinite(fps) and 0.0 < fps <= HIGHEST_FPS:
         return fps, ()
-    return DEFAULT_FPS, (f"The source tells no frame rate; {DEFAULT_FPS:g} fps are assumed.",)
+    return DEFAULT_FPS, (f"The source states no frame rate; {DEFAULT_FPS:g} fps is assumed.",)
 
 
 def announced_frames(capture: Capture) -> int | None:

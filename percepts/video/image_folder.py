@@ -236,10 +236,10 @@ def _hint(folder: Path) -> str:
     inside = sorted(folder.iterdir())
     for path in inside:
         if path.suffix.lower() in VIDEO_SUFFIXES:
-            return f"it holds a video, name that: {path}"
+            return f"it contains a video; give that: {path}"
     for path in inside:
         if path.is_dir() and images_in(path):
-            return f"a folder inside it has images, name that: {path}"
+            return f"a folder inside it contains images; give that: {path}"
     return "name a video file or a folder of images"
 
 
@@ -265,6 +265,6 @@ def _rate(images: Path) -> tuple[float, tuple[str, ...]]:
             rate = math.nan
         if math.isfinite(rate) and rate > 0:
             return rate, ()
-        note = f"seqinfo.ini gives no usable frame rate ({text}); {DEFAULT_FPS:g} fps are assumed."
+        note = f"seqinfo.ini gives no usable frame rate ({text}); {DEFAULT_FPS:g} fps is assumed."
         return DEFAULT_FPS, (note,)
-    return DEFAULT_FPS, (f"Images carry no frame rate; {DEFAULT_FPS:g} fps are assumed.",)
+    return DEFAULT_FPS, (f"Images have no frame rate; {DEFAULT_FPS:g} fps is assumed.",)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from visup.agent import AlertCondition, Frame, Severity
-from visup.agent.cycle.own_troubles import SOURCE_DROPPED
+from visup.agent.cycle.system_alerts import SOURCE_DROPPED
 from visup.agent.model.errors import SourceError
 from visup.percepts.video.capture import Capture, frame_rate, take
 from visup.percepts.video.source import Ending, VideoSource
@@ -79,7 +79,7 @@ class LiveSource(VideoSource):
         if first is None:
             capture.release()
             raise SourceError(
-                "it is open but delivers no frame",
+                "it is open but delivers no frames",
                 where=name,
                 expected="a camera or stream that delivers frames",
                 hint="check that nothing else uses it",
@@ -120,7 +120,7 @@ class LiveSource(VideoSource):
         if again is None or again.patience_s <= 0:
             return False
         if self.notify:
-            self.notify(f"{self.name} delivers nothing; it is tried again.")
+            self.notify(f"{self.name} delivers no frames; trying again.")
         since, pause = self._clock(), FIRST_WAIT_S
         while (gone := self._clock() - since) < again.patience_s:
             self._capture.release()

@@ -130,7 +130,7 @@ def _open_loop(source: str, opening: _Opening) -> LiveSource:
     path = Path(source.removeprefix(LOOP)).expanduser()
     if not path.is_file():
         raise SourceError(
-            "there is no such clip to play over and over",
+            "there is no such clip to loop",
             where=source,
             expected=f"{LOOP}CLIP, a video file",
             hint=_nearest(path),

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 
 from visup.agent import AlertCondition, Frame, Severity
-from visup.agent.cycle.own_troubles import FRAMES_DROPPED
+from visup.agent.cycle.system_alerts import FRAMES_DROPPED
 from visup.percepts.video.source import VideoSource
 
 WINDOW_S = 5.0

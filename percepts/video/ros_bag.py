@@ -209,7 +209,7 @@ class RosBag(VideoSource):
             every=every,
             notes=()
             if rate
-            else (f"A single picture has no rate; {DEFAULT_FPS:g} fps are assumed.",),
+            else (f"A single picture has no rate; {DEFAULT_FPS:g} fps is assumed.",),
         )
 
     def _next(self) -> Frame | None:

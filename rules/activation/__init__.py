@@ -1,7 +1,7 @@
-"""Which behaviours are needed, and of what: coarse ones first, closer looks where they matter.
+"""Which behaviours are needed, and for which objects: coarse ones first, finer ones where they matter.
 
-Read in this order: `activation.py` (behaviours that are called by a condition of the rule language),
-`attention.py` (objects known well enough are matched less often).
+Read in this order: `activation.py` (behaviours activated by a condition of the rule language),
+`attention.py` (objects whose identity is certain are matched less often).
 """
 
 from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active

@@ -1,4 +1,4 @@
-"""Who is awake: behaviours that are called when the scene asks for them, coarse ones first.
+"""Activation: behaviours that run only when the scene requires them, coarse ones first.
 
 A behaviour's contract says when it is awake, as a condition of the rule language about one object `a`:
 "expected(a)" for one that a stage of a task asks something of now, "exists b: gap(a, b) < 60 px" for one that
@@ -52,7 +52,7 @@ def _rule(contract: Contract) -> Rule:
 
 
 def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[str]:
-    """Names of behaviours that must not sleep: safety rules read what nobody else gives all the time.
+    """Names of behaviours that must not sleep, since safety rules depend on them alone.
 
     Args:
         contracts: Of all behaviours.

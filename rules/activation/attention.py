@@ -1,4 +1,4 @@
-"""Attention: who is known well enough is looked at less closely, with the reason for it.
+"""Attention: objects whose identity is certain are observed less closely, with the reason.
 
 Coarse to fine: motion and health see every frame, always; what a silhouette looks like is matched
 again and again only where that may still change anything: for objects whose identity is not settled,
@@ -72,5 +72,7 @@ class AttentionReasoner:
     def _asked(self, resting: list[ObjectBelief]) -> Iterator[Directive]:
         for b in resting:
             data = {"behaviour": "shape", "region": b.region.id, "every_s": self.settings.every_s}
-            reason = f"Object {b.id} is known to be the {b.name}, and nothing is asked of it now."
+            reason = (
+                f"Object {b.id} is known to be the {b.name}, and no further observation is needed."
+            )
             yield Directive("rest", reason, MappingProxyType(data))

@@ -1,4 +1,4 @@
-"""Which objects move as one body, and when they part.
+"""Coupling: which objects move as one body, and when they part.
 
 Read in this order: `reasoner.py` (the sequential test of rest, and its conditions), `evidence.py` (what is
 remembered of a pair), `contact.py` (outlines that meet, and whether that is meant), `relative_motion.py`

@@ -92,7 +92,7 @@ def common_speed(mind: Mind, pair: Pair) -> float:
 
 
 def own_speed(mind: Mind, number: int) -> float | None:
-    """How fast a body moves by itself, pixels per second; None while nothing tells.
+    """Speed of a body itself, pixels per second; None while unknown.
 
     The outline of what is being covered goes back as fast as what covers it comes on, and that of what
     comes nearer grows; image motion knows neither. So the slower of both is taken.

@@ -121,7 +121,7 @@ class CouplingReasoner:
         self._judged(mind, observation, log)
         coupled = {c.objects for c in mind.couplings}
         for pair in combinations(sorted(mind.objects), 2):
-            there = Condition("both are believed to be there", _both_present(pair, mind))
+            there = Condition("both are believed to be present", _both_present(pair, mind))
             log.setdefault(("coupled", pair), (there, _coupling_is(pair in coupled, False)))
             log.setdefault(("decoupled", pair), (there, _coupling_is(pair in coupled, True)))
         return log

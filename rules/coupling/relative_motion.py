@@ -138,7 +138,7 @@ def _from_box(points: Floats, box: tuple[int, int, int, int]) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetOutline:
-    """An outline upon which kept ones are laid.
+    """An outline with which stored ones are registered.
 
     Attributes:
         points: (M, 2) pixels; points no further apart than a few pixels.
@@ -161,7 +161,7 @@ def target_of(region: Region) -> TargetOutline:
 
 
 def registered(kept: OutlineTemplate, target: TargetOutline) -> OutlineTemplate | None:
-    """A kept outline moved onto a later one.
+    """A stored outline registered with a later one.
 
     Args:
         kept: The outline, with its shift so far.
@@ -280,7 +280,7 @@ class RelativeVelocity:
     span: float
 
     def rest_odds(self, still: float, moving: float) -> float:
-        """Logarithm of the odds of rest against motion that this velocity tells.
+        """Log odds of rest against motion, given this velocity.
 
         Args:
             still: Relative speed that still is rest, pixels per second.

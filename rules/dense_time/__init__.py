@@ -1,4 +1,4 @@
-"""Formulas over signals as time runs on between samples: exact, in pieces, with ends as one chooses.
+"""Formulas over signals in dense time: exact between samples, with a choice of semantics at the ends.
 
 `rules/monitoring` judges at samples, which is what frames of a camera are. Here a signal is a row of
 pieces of time, held or straight from sample to sample, and so is every formula of it.

@@ -129,7 +129,7 @@ class PastOperator:
 
 @dataclass(frozen=True, slots=True)
 class FutureOperator:
-    """`eventually[5 s] f`, `henceforth[5 s] f`: in a window that begins now; told when it is over."""
+    """`eventually[5 s] f`, `henceforth[5 s] f`: in a window that begins now; reported when it is over."""
 
     kind: str
     part: Formula
@@ -142,7 +142,7 @@ class FutureOperator:
 
 @dataclass(frozen=True, slots=True)
 class Previous:
-    """`previous f`: f was so at the sample before."""
+    """`previous f`: f held at the previous sample."""
 
     part: Formula
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -153,7 +153,7 @@ class Previous:
 
 @dataclass(frozen=True, slots=True)
 class Since:
-    """`f since g`: g was true, and f has been ever after; with a window, g was so in it."""
+    """`f since g`: g held, and f has held ever since; with a window, g held within it."""
 
     left: Formula
     right: Formula
@@ -166,7 +166,7 @@ class Since:
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """`f until[5 s] g`: g will be true within 5 s, and f is up to then; told 5 s late."""
+    """`f until[5 s] g`: g will hold within 5 s, and f holds up to then; reported 5 s late."""
 
     left: Formula
     right: Formula

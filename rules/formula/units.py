@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Where a node stands: lines and columns counted from 1, the end column exclusive.
+    """Position of a node: lines and columns counted from 1, the end column exclusive.
 
     Attributes:
         file: The included file in which it stands; empty for the file itself.

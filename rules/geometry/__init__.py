@@ -1,4 +1,4 @@
-"""The geometry of outlines, and the fits over time, that all reasoners share.
+"""Geometry of outlines and fits over time, shared by all reasoners.
 
 Read in this order: `regions.py` (boxes, masks, support functions), `outlines.py` (what is worked out
 once for a region or a pair) and `pairs.py` (pairs of objects as one flat list). `_outlines_jit.py` and

@@ -1,4 +1,4 @@
-"""The floor: where on it what is seen stands, by points of the image whose places on it are known.
+"""The floor: positions of objects on it, by image points whose positions on the floor are known.
 
 A plane and its image are related by a homography; four points of which no three lie in a line fix it.
 A body stands where the lowest part of its outline is.
@@ -61,7 +61,7 @@ def projected(points: Points | Floats, h: Floats) -> Floats:
 
 
 def foot_points(region: Region, frame_size: tuple[int, int]) -> Floats:
-    """Where a body stands, in the image: the lower edge of the lowest part of its outline.
+    """Foot points of a body in the image: the lower edge of the lowest part of its outline.
 
     Args:
         region: The body.

@@ -73,7 +73,7 @@ def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
     leave = node.leave
     assert leave is not None
     if node.operator in ("==", "!="):
-        yield leave.span, f"'leave' has no sense behind '{node.operator}'", "<, <=, > or >=", None
+        yield leave.span, f"'leave' makes no sense after '{node.operator}'", "<, <=, > or >=", None
     elif dimension and leave.dimension != dimension:
         meant = f"{number_text(leave.value)} {_base_unit(dimension) or ''}".rstrip()
         yield leave.span, f"'leave' wants {units_of(dimension)}", None, f"write `{meant}`"

@@ -1,4 +1,4 @@
-"""From the text of a rule file to rules, with every fault of the file told at once."""
+"""Parser of rule files, which reports all errors of a file at once."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ class RepairedText:
 def read_repaired(
     block: str, start: str, file: str, vocabulary: Vocabulary, patience: Patience
 ) -> RepairedText:
-    """Read a rule or a formula; what is a slip is told, mended, and read on.
+    """Read a rule or a formula; errors are reported, repaired, and parsing continues.
 
     Args:
         block: The text.

@@ -311,7 +311,7 @@ def rule(
 
 
 def _number(amount: TermBuilder) -> Number:
-    assert isinstance(amount.node, Number), "a plain number is wanted here"
+    assert isinstance(amount.node, Number), "a plain number is expected here"
     return amount.node
 
 

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from itertools import count
 
-from visup.agent.cycle.own_troubles import OWN_TROUBLES
+from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
 from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.nodes import (
     ZERO,
@@ -109,7 +109,7 @@ class TypeChecker:
         for word in (rule.name, *rule.variables):
             if word in KEYWORDS:
                 yield rule.span, f"'{word}' is a reserved word", "another name", None
-        if rule.name in OWN_TROUBLES:
+        if rule.name in SYSTEM_ALERTS:
             what = f"'{rule.name}' is an alert of visup about itself"
             own = f"write `my_{rule.name}` in place of `{rule.name}`"
             yield rule.span, what, "another name", own
@@ -157,7 +157,7 @@ class _FormulaChecker:
             case Variable():
                 yield from self.variable(node)
             case Arithmetic(operator="/", left=left, right=Variable(name=Unit.S) as unit):
-                what = "'s' is a unit, and stands right behind its number"
+                what = "'s' is a unit and must directly follow its number"
                 yield unit.span, what, "such as 3 px/s", "write `px/s` in place of `px / s`"
                 yield from self.node(left)
                 return
@@ -171,7 +171,7 @@ class _FormulaChecker:
             case FutureOperator(window=window, span=span) | Until(window=window, span=span):
                 word = node.kind if isinstance(node, FutureOperator) else "until"
                 if window is None:
-                    what = f"'{word}' without a window would wait without end"
+                    what = f"'{word}' without a window would wait forever"
                     bounded = replace(node, window=TimeWindow(ZERO, Number(5.0, Unit.S)))
                     yield span, what, f"such as {word}[5 s]", f"write `{bounded}`"
                 else:

@@ -1,4 +1,4 @@
-"""What formulas need beside windows: the sample before, what is told late, what begins or ends in a window.
+"""Operators beside windows: previous samples, delayed values, onsets and ends within a window.
 
 `since` with a lower bound asks its left side also after the window, `until` also before it;
 `always`, `once` and `since` without a window leave out what was told of the time before the first

@@ -33,7 +33,7 @@ from visup.rules.monitoring.compiler import Compiler, Scope, ValueRef, inner_sco
 
 @dataclass(frozen=True, slots=True)
 class EarlyValue:
-    """A value that is told as soon as anything can be known, and the one that is told in the end.
+    """An early value, as soon as it is decided, and the final one.
 
     Attributes:
         first: Its delay is the shortest after which anything can be decided.

@@ -45,7 +45,7 @@ AtEnd = Literal["unknown", "weak", "strong"]
 
 
 def as_ended(interval: Interval, view: AtEnd) -> Interval:
-    """What is told of an interval that nothing will narrow any more.
+    """The value of an interval that nothing will narrow any further.
 
     In the weak view what is undecided is true, in the strong view it is false (Eisner and others,
     "Reasoning with temporal logic on truncated paths", 2003).

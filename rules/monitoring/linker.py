@@ -1,4 +1,4 @@
-"""A program laid out for a number of objects: where every interval and every state stands.
+"""The layout of a program for a number of objects: the place of every interval and state.
 
 Most operations are done by `vm`. Those that keep windows are done one by one between its calls, on
 what these have made; few calls are enough, since windows rarely look at windows.

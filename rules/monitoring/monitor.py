@@ -121,7 +121,7 @@ class Monitor:
         return foreseen
 
     def finish(self, at_end: AtEnd = "unknown") -> list[tuple[float, Interval]]:
-        """What `step` would still tell if nothing more were seen; it may be asked at any time.
+        """What `step` would still report if there were no more samples; can be called at any time.
 
         Args:
             at_end: What becomes of what is not decided by then.

@@ -1,4 +1,4 @@
-"""Which way objects face and how they turn (paper, section 5, figure 5).
+"""Pose: the orientation of objects and their rotation (paper, section 5, figure 5).
 
 Read in this order: `reasoner.py` (what is believed, and when it is worked out), `interpretation_tree.py`
 (which view hypotheses belong together; its compiled loop is `_interpretation_tree_jit.py`),

@@ -1,4 +1,4 @@
-"""How fast an object turns, from the orientations that its views tell.
+"""Angular velocity of an object, from the orientations of its views.
 
 Over a window of time the object turns at one rate: R(t) = turned(w * (t - m)) R(m). Rate w and
 orientation R(m) are fitted together by least squares (Gauss-Newton on rotations,
@@ -142,7 +142,7 @@ def _refitted_change(
 
 
 def spin_of(rate: AngularVelocity, settings: SpinSettings) -> Spin | None:
-    """A rate in the words of the mind, or None when it is too uncertain to be told."""
+    """A rate as a record of the mind, or None if it is too uncertain to report."""
     length = float(np.linalg.norm(rate.vector))
     axis = rate.vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
     # The length of a scattered vector is too great.

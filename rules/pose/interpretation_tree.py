@@ -121,7 +121,7 @@ _NO_LEVEL = TreeLevel(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterpretationTree:
-    """The paths of one model that may still turn out cheapest, each by where it stands now.
+    """The paths of one model that may still turn out cheapest, each by its current end.
 
     Attributes:
         time: Seconds of the last level.
@@ -191,7 +191,7 @@ def levels_of(
 
 
 def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings) -> TreeLevel:
-    """One level of hypotheses of all models, which do not tell anything together yet."""
+    """One level of hypotheses of all models, not yet combined."""
     lost = (np.nan, np.nan, np.nan)
     similarity = np.array([h.similarity for h in hypotheses])
     orientation = orientations(
@@ -273,7 +273,7 @@ def extended_tree(
 
 
 def look_weight(waited: float, settings: TreeSettings) -> float:
-    """What a look counts for, so many seconds after the last: soon after it, the same is seen."""
+    """Weight of an observation by the time since the last one: shortly after it, the same is seen."""
     return min(1.0, max(waited, 0.0) / settings.independent_s)
 
 

@@ -214,7 +214,7 @@ class PoseReasoner:
         said: Mapping[int, tuple[Hypothesis, ...]],
         known: Mapping[int, PoseTrack],
     ) -> frozenset[int]:
-        """Objects whose trees grow now: looked at anew, not too soon, and within the budget."""
+        """Objects whose trees grow now: matched again, not too soon, and within the budget."""
         s = self.settings
         waiting = [
             (track.time, object_id)

@@ -1,4 +1,4 @@
-"""How sure it is that an object is a thing of its own, and that it is known what it is.
+"""Certainty that something is an object in its own right, and that its identity is known.
 
 A camera that sees motion cuts machines into pieces and takes shadows along. What is small, hardly seen, or
 close beside something larger may be a part of that; alarms that call for a person, or end a task, ask
@@ -34,7 +34,7 @@ KEEP_OUT = "keep_out"
 
 
 def standalone(facts: Snapshot) -> Codes:
-    """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones.
+    """Whether something is certainly an object of its own: not a speck, well seen, clear of larger ones.
 
     Nor does it move as one with one that is larger.
 

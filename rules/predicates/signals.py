@@ -1,4 +1,4 @@
-"""Signals that are not from the image, as words of rules; percepts of kind `signal` tell them."""
+"""Signals that do not come from the image, as words of rules; from percepts of kind `signal`."""
 
 from __future__ import annotations
 

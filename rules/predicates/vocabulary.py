@@ -64,7 +64,7 @@ SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it t
 
 @dataclass(frozen=True, slots=True)
 class PredicateDefinition:
-    """A word of the rule language that stands for something true, false or unknown.
+    """A predicate of the rule language: true, false or unknown.
 
     Attributes:
         takes: What its arguments are: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
@@ -81,7 +81,7 @@ class PredicateDefinition:
 
 @dataclass(frozen=True, slots=True)
 class QuantityDefinition:
-    """A word of the rule language that stands for a number.
+    """A quantity of the rule language.
 
     Attributes:
         takes: What its arguments are.
@@ -158,7 +158,7 @@ def is_bystander(facts: Snapshot) -> Codes:
 
 
 def one_machine(facts: Snapshot) -> Codes:
-    """Whether two objects are parts of one machine, as a task tells its parts."""
+    """Whether two objects are parts of one machine, as declared by a task."""
     codes, row = facts.pairs(NO), facts.row
     for parts in (m for task in facts.mind.tasks for m in task.machines):
         rows = [row[i] for i in parts if i in row]
@@ -190,7 +190,7 @@ def first_contact(facts: Snapshot) -> Codes:
 
 
 def lost(facts: Snapshot) -> Codes:
-    """Whether an object is out of sight and nothing tells why."""
+    """Whether an object is out of sight for no known reason."""
     known = presence_memory(facts.mind).of
     return facts.among([i for i in facts.ids if i in known and known[i].lost])
 
@@ -265,23 +265,25 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         ),
         "unexpected": PredicateDefinition(_ONE, unexpected, "no active task explains the object"),
         "actor": PredicateDefinition(_ONE, is_actor, "the object plays an actor of an active task"),
-        "bystander": PredicateDefinition(_ONE, is_bystander, "a task lets the object be"),
+        "bystander": PredicateDefinition(_ONE, is_bystander, "a task ignores the object"),
         "one_machine": PredicateDefinition(_TWO, one_machine, "they are parts of one machine"),
         "named": PredicateDefinition(
             ("object", "name"), is_named, "the object is believed to be that"
         ),
         "standalone": PredicateDefinition(
-            _ONE, certainty.standalone, "it is surely a thing of its own, no part of a larger one"
+            _ONE,
+            certainty.standalone,
+            "it is certainly an object of its own, not part of a larger one",
         ),
         "identified": PredicateDefinition(
-            _ONE, certainty.identified, "it is likelier a model known than none of them"
+            _ONE, certainty.identified, "it is more likely a known model than none of them"
         ),
         "of_kind": PredicateDefinition(
-            _ONE, certainty.of_kind, "only its kind is known, as a detector tells it"
+            _ONE, certainty.of_kind, "only its kind is known, as reported by a detector"
         ),
         "seen": PredicateDefinition(_ONE, _presence(Presence.SEEN), "the object is seen"),
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
-        "lost": PredicateDefinition(_ONE, lost, "it is out of sight and nothing tells why"),
+        "lost": PredicateDefinition(_ONE, lost, "it is out of sight for no known reason"),
         "moving": PredicateDefinition(_ONE, moving, "it moves in the image"),
         "came_in": PredicateDefinition(
             _ONE, certainty.came_in, "it came over the border of the image"
@@ -309,7 +311,7 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "stale": PredicateDefinition(
             ("kind",), stale, "percepts of that kind could not be observed"
         ),
-        "healthy": PredicateDefinition((), healthy, "the image is sound"),
+        "healthy": PredicateDefinition((), healthy, "the image is usable"),
         **{
             name: PredicateDefinition(
                 ("allen", *_TWO), along(axis), f"Allen's relation of boxes, {way}"

@@ -37,7 +37,7 @@ def hypotheses_by_object(
 
 
 def recognised(mind: Mind, observation: Observation) -> frozenset[int]:
-    """Objects that a behaviour found by their looks: it told a region and whose it is in one.
+    """Objects that a behaviour recognised by appearance: it reports a region together with its identity.
 
     Such a region is the object's own, however near another one is; of regions that merely move together
     nobody knows how many bodies they are.

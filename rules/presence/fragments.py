@@ -199,7 +199,7 @@ def share_within(region: Region, body: Region) -> float:
 
 
 def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, ObjectTrack]) -> bool:
-    """Whether a region stands where a known object should be that is hidden, in part at least."""
+    """Whether a region is where a known object should be that is hidden, at least in part."""
     for old in mind.objects.values():
         track = of.get(old.id)
         if not old.confirmed or old.presence is Presence.LEFT or track is None:

@@ -1,4 +1,4 @@
-"""Who comes: a region that has been seen steadily, and is no part of another object, enters."""
+"""Initiation: a region that has been seen steadily, and is not part of another object, enters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def confirm_new(context: StepContext) -> None:
         if belief.confirmed or not context.decide("entry", belief.id, _conditions(context, belief)):
             continue
         parts = parts_of(context, belief)
-        own = Condition("no known object was but a part of it", not parts)
+        own = Condition("no known object is only a part of it", not parts)
         if not context.decide("entry", belief.id, (own,)):
             absorb_parts(context, belief, parts)
             continue
@@ -34,14 +34,14 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
     """Of the entry of an object: seen often enough, no part of another, no speck, steadily."""
     s, track = context.settings, context.of[belief.id]
     yield at_least("sightings", track.sightings, s.least_sightings)
-    yield Condition("no part of another object", not context.may_be_part(belief))
+    yield Condition("not part of another object", not context.may_be_part(belief))
     named = belief.id in context.recognised
     hidden = not named and in_place_of_hidden(belief, context.mind, context.of)
     yield Condition("not in the place of a hidden object", not hidden)
     if not belief.candidates:
         width, height = context.mind.frame_size
         least = s.least_share * width * height
-        text = "area, while nobody says what it is,"
+        text = "area, while unidentified,"
         yield at_least(text, belief.region.area, least, " px")
     at_edge = at_border(track.region, context.mind.frame_size)
     needed = s.entry_s if at_edge or _is_early(context, belief) else s.entry_inside_s
@@ -56,7 +56,7 @@ def _is_early(context: StepContext, belief: ObjectBelief) -> bool:
 
 
 def _track_confidence(confidence: float) -> float:
-    """How sure it is that something is there of which each look is so sure.
+    """Confidence that something is there, from the confidence of each observation.
 
     It was seen steadily; looks that follow each other err together, so that all of them count as two.
     """

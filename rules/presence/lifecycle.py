@@ -1,4 +1,4 @@
-"""The life of an object: every change of its state is made, and told, here.
+"""The life cycle of an object: every change of its state is made, and reported, here.
 
     initiate -> TENTATIVE -- confirm --> VISIBLE -- occlude --> OCCLUDED
                     |                       |  ----- lose -----> LOST
@@ -25,7 +25,7 @@ EXIT_CONFIDENCE = 0.9
 
 
 class LifecycleState(StrEnum):
-    """Where an object stands in its life."""
+    """State of an object in its life cycle."""
 
     TENTATIVE = "tentative"
     VISIBLE = "visible"
@@ -50,7 +50,7 @@ TRANSITIONS = frozenset(
 
 
 def state_of(belief: ObjectBelief, track: ObjectTrack | None) -> LifecycleState:
-    """Where an object stands, by what is believed of it."""
+    """The life-cycle state of an object, from the beliefs about it."""
     if not belief.confirmed:
         return LifecycleState.TENTATIVE
     if belief.presence is Presence.SEEN:
@@ -63,7 +63,7 @@ def state_of(belief: ObjectBelief, track: ObjectTrack | None) -> LifecycleState:
 def confirm(
     context: StepContext, belief: ObjectBelief, kind: str, template: str, confidence: float
 ) -> None:
-    """It is an object of its own, and enters."""
+    """Confirm it as an object, which enters."""
     context.put(replace(belief, confirmed=True))
     context.tell(kind, template, belief.id, confidence=confidence)
 
@@ -83,9 +83,9 @@ def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief |
 
 
 def lose(context: StepContext, belief: ObjectBelief) -> None:
-    """It is no longer seen, and nothing tells why."""
+    """It is no longer seen, for no apparent reason."""
     _go(context, belief, Presence.HIDDEN, lost=True)
-    template = "{0} {is} lost: it is no longer seen, and nothing tells why."
+    template = "{0} {is} lost: it is no longer seen, for no apparent reason."
     context.tell("lost", template, belief.id)
 
 

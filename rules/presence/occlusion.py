@@ -1,4 +1,4 @@
-"""Who hides, goes and comes back: a little of an object shows, most of it again, or nothing.
+"""Occlusion, exit and reappearance: how much of an object is visible.
 
 The gate that decides that an object has left stands here too (`_exit_conditions` for one of which a
 little still shows, `_missing_exit_conditions` for one of which nothing does): what goes over the border
@@ -61,14 +61,14 @@ def _check_hiding(context: StepContext, belief: ObjectBelief) -> None:
 def _occlusion_conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
     """Of an object being hidden of which a little shows."""
     visible, s = context.of[belief.id].visible_share, context.settings
-    yield less_than("share of it that shows", visible, s.hidden_share)
+    yield less_than("visible share", visible, s.hidden_share)
     yield Condition("another object covers it", _occluder(context, belief) is not None)
 
 
 def _exit_conditions(context: StepContext, track: ObjectTrack, hiding: bool) -> Iterator[Condition]:
     """Of an object having left of which a little shows."""
     size = context.mind.frame_size
-    yield less_than("share of it that shows", track.visible_share, context.settings.leaving_share)
+    yield less_than("visible share", track.visible_share, context.settings.leaving_share)
     yield Condition("it is at the border of the image", at_border(track.region, size))
     yield Condition("it is moving over the border", heading_out(track, size))
     yield Condition("no other object hides it", not hiding)
@@ -102,7 +102,7 @@ def _reappearance_conditions(
         needed = s.shown_share
         if _occluder(context, belief) is None:
             needed = min(s.shown_share, s.hidden_share)
-    yield more_than("share of it that shows", track.visible_share, needed)
+    yield more_than("visible share", track.visible_share, needed)
 
 
 def update_missing(context: StepContext) -> None:
@@ -166,18 +166,20 @@ def _missing_occlusion_conditions(
     covered = shared_pixels(occluder.region, track.region) / max(1.0, track.region.area)
     showing = track.visible_share * (1.0 - covered)
     if showing < s.hidden_share:
-        yield less_than("share of it that would show", showing, s.hidden_share)
+        yield less_than("share that would be visible", showing, s.hidden_share)
     else:
-        text = "missing, though much of it would show, for"
+        text = "missing, although much of it should be visible, for"
         yield at_least(text, context.now - track.seen_at, s.missed_s, " s", slack=1e-6)
 
 
 def _loss_conditions(
     context: StepContext, track: ObjectTrack, explained: bool
 ) -> Iterator[Condition]:
-    yield Condition("nothing tells why", not explained)
+    yield Condition("no known reason", not explained)
     missing = context.now - track.seen_at
-    yield at_least("missing for no reason for", missing, context.settings.lost_s, " s", slack=1e-6)
+    yield at_least(
+        "missing without a known reason for", missing, context.settings.lost_s, " s", slack=1e-6
+    )
 
 
 def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None:

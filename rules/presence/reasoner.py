@@ -1,4 +1,4 @@
-"""Who is there: entry, exit, occlusion, reappearance (paper, section 5).
+"""Presence of objects: entry, exit, occlusion, reappearance (paper, section 5).
 
 An entry is reported when a region has been seen steadily; an object without a region was hidden when
 another one stands where it should be, left when it was going over the image border, merged with
@@ -37,7 +37,7 @@ __all__ = ["PresenceReasoner", "PresenceSettings", "visible_share"]
 
 @dataclass(frozen=True, slots=True)
 class PresenceReasoner:
-    """Reasoner of the cogitate phase: who is there; reports who comes, goes, hides and shows.
+    """Reasoner of the cogitate phase: presence of objects; reports entry, exit, occlusion and reappearance.
 
     When no behaviour looked for regions in this step, nothing is concluded.
     """
@@ -96,8 +96,8 @@ DECISIONS = ("entry", "exit", "occlusion", "loss", "reappearance")
 def _not_considered(
     kind: str, belief: ObjectBelief, after: ObjectBelief | None, observation: Observation
 ) -> Iterator[Condition]:
-    """What must be so before anything is decided about an object, by what was believed of it."""
-    yield Condition("somebody looked for regions", observation.observed("region"))
+    """Preconditions for any decision about an object, from previous beliefs about it."""
+    yield Condition("regions were looked for", observation.observed("region"))
     yield Condition("it is no known object seen again", after is not None)
     seen = after is not None and after.last_seen == observation.time
     if kind == "entry":

@@ -1,4 +1,4 @@
-"""What is said of two bodies from the states and quantities of one step, compiled."""
+"""Relations of two bodies from the states and quantities of one step, compiled."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def classify_trend(
     limits: tuple[float, float],
     sigmas: tuple[float, float],
 ) -> int:
-    """Which trend a rate of change stands for, with hysteresis.
+    """The trend that corresponds to a rate of change, with hysteresis.
 
     Args:
         rate: Pixels per second; NaN unknown.

@@ -128,7 +128,7 @@ class Kinematics:
 
     @property
     def time_to_contact(self) -> Floats:
-        """(M, M) seconds until the outlines meet if they go on so.
+        """(M, M) seconds until the outlines meet at the present rate.
 
         0 where they meet, infinite where they do not close in.
         """

@@ -1,4 +1,4 @@
-"""Concerns that stand: raised when a rule comes to be true of some objects, told anew now and then."""
+"""Alarm conditions: raised when a rule becomes true for some objects, and renewed from time to time."""
 
 from __future__ import annotations
 

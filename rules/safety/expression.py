@@ -196,7 +196,7 @@ UNFINISHED = "(,<>=+-*/["
 def _rule(text: str, variables: tuple[str, ...]) -> Rule:
     last = text.rstrip()[-1:]
     if last and last in UNFINISHED:
-        raise RuleError(f"'{text}' ends too early", expected=f"what belongs behind '{last}'")
+        raise RuleError(f"'{text}' ends too early", expected=f"what belongs after '{last}'")
     lines = f"rule watched({', '.join(variables)}): info when\n{text}\n{_SAY}"
     try:
         (rule,) = parse_rules(lines, "<expression>")

@@ -44,7 +44,9 @@ def evaluation_of(mind: Mind) -> Evaluation:
     """
     memory = rule_memory(mind)
     if memory.now is None or memory.before is None:
-        raise RuleError("no rule has been judged in this mind", hint="let the agent make a step")
+        raise RuleError(
+            "no rules have been evaluated in this mind", hint="let the agent make a step"
+        )
     # Rules saw the tasks as they stood a step before.
     facts = Snapshot(replace(mind, tasks=memory.tasks))
     return Evaluation(compile_rules(memory.rules, memory.early), facts, memory.now, memory.before)

@@ -1,7 +1,7 @@
-"""What a decision hangs on: the very conditions by which a reasoner decides also explain it.
+"""Conditions of decisions: those by which a reasoner decides also explain the decision.
 
-A reasoner gives the conditions of a decision one by one, the first that is not met ends it. Who wants
-to know why lets it decide again with a `DecisionLog`: then all conditions are worked out and kept.
+A reasoner yields the conditions of a decision one by one; the first that is not met ends it. To find
+out why, let it decide again with a `DecisionLog`: then all conditions are evaluated and recorded.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Condition(NamedTuple):
 
         >>> at_least("seen for", 0.2, 0.36, " s").line()
         'seen for 0.2 s of 0.36 s: 0.16 s short'
-        >>> less_than("share of it that shows", 0.5, 0.2).line()
-        'share of it that shows 0.5, less than 0.2 is needed'
+        >>> less_than("visible share", 0.5, 0.2).line()
+        'visible share 0.5, less than 0.2 is needed'
         """
         if self.value is None:
             return f"{self.text}: {'yes' if self.met else 'no'}"
@@ -68,7 +68,7 @@ def less_than(text: str, value: float, required: float, unit: str = "") -> Condi
 
 
 class DecisionLog(dict[Subject, tuple[Condition, ...]]):
-    """All conditions that decisions of one step hung on, in the order in which they were asked."""
+    """All conditions of the decisions in one step, in order of evaluation."""
 
 
 def decide(

@@ -1,4 +1,4 @@
-"""Changes of relations told, sparingly: one sentence when two objects begin to come closer or part."""
+"""Events about changes of relations, sparingly: one when two objects begin to converge or diverge."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from visup.rules.wording.sentences import sentence
 
 TEMPLATES = {
     "converging": "{0} and {1} {are} converging.",
-    "diverging": "{0} and {1} {are} moving apart.",
+    "diverging": "{0} and {1} {are} diverging.",
     "keeping_distance": "{0} and {1} {are} keeping their distance.",
 }
 Told = tuple[str, float]
@@ -23,7 +23,7 @@ RELATION_EVENTS: MemoryKey[Mapping[tuple[int, ...], Told]] = MemoryKey(
 
 @dataclass(frozen=True, slots=True)
 class RelationEventSettings:
-    """How sparingly relations are told.
+    """How sparingly relations are reported.
 
     Attributes:
         lasting_s: How long a relation must hold before it is told.

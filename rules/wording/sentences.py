@@ -59,7 +59,7 @@ def believed_name(mind: Mind, object_id: int) -> str | None:
 
 
 def spoken_name(mind: Mind, object_id: int) -> str | None:
-    """What an object is called in sentences: as `believed_name`, but no name before it has been told.
+    """The name of an object in sentences: as `believed_name`, but only once the name has been reported.
 
     What leads the votes for a moment is no news, and names that come and go would be a story that contradicts
     itself: who is called otherwise than before was told to be so.
@@ -79,7 +79,7 @@ def spoken_name(mind: Mind, object_id: int) -> str | None:
 
 
 def is_of_kind(mind: Mind, object_id: int) -> bool:
-    """Whether of an object only its kind is known, as a detector tells it, and no task casts it.
+    """Whether of an object only its kind is known, as reported by a detector, and no task casts it.
 
     Of a kind there may be several: each is 'a person', and none is 'the person'.
     """

@@ -1,4 +1,4 @@
-"""Zones and distances on the floor, as a task with a `ground` asks for them."""
+"""Zones and distances on the floor, for tasks with a `ground`."""
 
 from __future__ import annotations
 

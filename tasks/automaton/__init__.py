@@ -1,10 +1,10 @@
-"""The task as an automaton, and the filter that follows it: where a task is, with what probability.
+"""The task as an automaton, and the filter that tracks its state with a probability.
 
 Read in this order: `states.py` (where one can be in a course), `derivatives.py` (how it begins and goes on),
 `automaton.py` (the states, numbered), `stage_hmm.py` (the probabilities), `forward_recursion.py` (the
 forward algorithm), `task_filter.py` (the filter, and what a model gives it), `transitions.py` and
 `hidden_phases.py` (the exact model), `backpointers.py` (the best way to a state), `prognosis.py` (what
-comes next, and whether it ends well). The second model, which supervises, is in `supervision/`.
+comes next, and the probability of success). The second model, used for supervision, is in `supervision/`.
 """
 
 from visup.tasks.automaton.automaton import END, Automaton, Transition

@@ -1,4 +1,4 @@
-"""Where one can be in a course: states, how a course begins, how it goes on.
+"""States of a course and their derivatives: how it begins and continues.
 
 A state is what remains of a course with its steps under way marked; moving on gives the states
 that may come next. It is the derivative of a regular expression, with a stack where stages

@@ -35,7 +35,7 @@ class RunningDeadline:
 
 @dataclass(frozen=True, slots=True)
 class TaskStep:
-    """One action that a course asks for.
+    """One action that a course requires.
 
     Attributes:
         action: Its name; for a comparison or a zone its key (see `structure.fact_key`).

@@ -82,7 +82,7 @@ class HiddenTransitions:
         return known[state]
 
     def required(self, state: HiddenState) -> Required:
-        """What is to be seen at a place; an action that several steps ask for is told once."""
+        """What is expected at a state; an action that several steps require is listed once."""
         if state not in self._asked:
             found: dict[tuple[str, tuple[str, ...]], PhaseKind] = {}
             for step, phase in zip(self.automaton.steps(state.node), state.phases, strict=True):

@@ -1,5 +1,5 @@
 """Casting: which objects play the actors of a task.
 
-Read in this order: `fitness.py` (how well an object fits what is said of an actor), `matching.py` (the
+Read in this order: `fitness.py` (how well an object fits the description of an actor), `matching.py` (the
 best matching of actors and objects).
 """

@@ -1,4 +1,4 @@
-"""Who plays an actor when nobody else is left: a guess, held until somebody is recognised.
+"""Casting by exclusion: a guess, held until the actor is recognised.
 
 When all but one of the actors are found and rest, and one thing that nobody knows moves, that is the one
 which is missed: an arm in a posture in which it was never shown, a tool seen from behind. A guess gives way
@@ -66,7 +66,7 @@ def guessed(
 
 
 def _told_by_looks(task: Task, binding: Binding) -> bool:
-    """Whether an actor is told by its models alone, and must be there."""
+    """Whether an actor is identified by its models only, and is not optional."""
     actor = task.actor(binding.actor)
     waited = not actor.optional and not actor.spare
     return bool(binding.models) and not actor.criteria and waited

@@ -59,7 +59,7 @@ REST_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """An actor that is looked for.
+    """An actor to be cast.
 
     Attributes:
         task: The task.
@@ -125,13 +125,13 @@ def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
 
 
 def asks_for_traits(task: Task) -> bool:
-    """Whether a task tells some actor by more than its models and its machine."""
+    """Whether a task describes some actor by more than its models and its machine."""
     criteria = (c for a in (*task.actors, *task.bystanders) for c in a.criteria)
     return any(not isinstance(c, PartOf | Another | OtherModels) for c in criteria)
 
 
 def asks_for_colour(task: Task) -> bool:
-    """Whether a task tells some actor by its colour."""
+    """Whether a task describes some actor by its colour."""
     declared = (*task.actors, *task.bystanders)
     return any(isinstance(c, Colours) for a in declared for c in a.criteria)
 
@@ -218,7 +218,7 @@ def _first_to_move(fit: Sequence[float], known: Sequence[Traits]) -> list[float]
 
 
 def _hangs_together(object_id: int, machine: int | None, mind: Mind) -> float:
-    """How well an object hangs together with a machine that is found; nobody can tell while it is not."""
+    """How well an object is attached to its machine; unknown until the machine is found."""
     if machine is None or machine == object_id:
         return 0.0
     measured = kinematics(mind)

@@ -1,4 +1,4 @@
-"""Who plays which actor: weighted matching of actors and believed objects (paper, section 6).
+"""Casting: weighted matching of actors and objects (paper, section 6).
 
 Several identities are believed of each object, each with a strength. The weight of a pair is how
 strongly the object is believed to be one of the models that the actor stands for, or how well it fits
@@ -157,7 +157,7 @@ def unexplained(
     optional: Collection[str] = (),
     task: Task | None = None,
 ) -> tuple[int, ...]:
-    """Objects in view that no actor explains, by id; nobody waits for `optional` actors.
+    """Objects in view that no actor explains, by id; `optional` actors are not waited for.
 
     With every actor bound that is any further object. With an actor still unbound, an object that
     is not identified yet may be it, and so may one that could be any of the actors, or whose identity

@@ -1,4 +1,4 @@
-"""What a parsed task must satisfy, and loading of task files.
+"""Semantic checks of parsed tasks, and loading of task files.
 
 Read in this order: `load.py` and `files.py` (task files by path or name), `diagnose.py` (all errors
 of a file at once), `semantics.py` (known names, reachable stages), `courses.py`, `names.py` and

@@ -1,4 +1,4 @@
-"""Stages that no observation can tell apart: the same is seen of both."""
+"""Stages that no observation can distinguish."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ NOTHING = Action("", ())
 
 @dataclass(frozen=True)
 class AmbiguityCheck:
-    """Checks whether the stages of a task can be told apart.
+    """Checks whether the stages of a task can be distinguished.
 
     Attributes:
         task: The task, whole.

@@ -63,7 +63,7 @@ def text_fault(text: str, source: Source) -> Diagnostic | None:
 
 @dataclass(frozen=True)
 class BoundsCheck:
-    """Checks of how much a task asks for.
+    """Checks of the size of a task.
 
     Attributes:
         grammar: Of the task, with at least one rule.
@@ -98,7 +98,7 @@ class BoundsCheck:
                 yield self.source.fault("E239", what, place, hint=hint)
             if self._ways[name] > MOST_WAYS:
                 what = f"stage `<{name}>` may begin in {self._counted(name)} ways"
-                hint = "have fewer alternatives at the same time"
+                hint = "use fewer alternatives at the same time"
                 yield self.source.fault("E239", what, place, f"at most {MOST_WAYS}", hint)
 
     @cached_property

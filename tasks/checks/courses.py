@@ -85,9 +85,9 @@ class CourseCheck:
             return
         for stage in self.grammar.non_terminating():
             what = f"stage `<{stage.name}>` can never end"
-            hint = f"offer a way out, such as `( ... <{stage.name}> )?` or `| ...`"
+            hint = f"add a way out, such as `( ... <{stage.name}> )?` or `| ...`"
             yield self.source.fault(
-                "E207", what, stage.span, "a course without the stage itself", hint
+                "E207", what, stage.span, "an alternative without the stage itself", hint
             )
 
     def clauses(self) -> Iterator[Diagnostic]:
@@ -113,12 +113,10 @@ class CourseCheck:
                 most = delay.most or delay.duration
                 if value(self.task.amount(most)) < value(self.task.amount(delay.duration)):
                     what = f"`{delay}` is never: the greatest delay is less than the least"
-                    yield self.source.fault(
-                        "E208", what, delay.span, "a greater number behind `to`"
-                    )
+                    yield self.source.fault("E208", what, delay.span, "a greater number after `to`")
             if holds and self.grammar.is_sequential(course.item):
-                what = f"`{holds[0]}` stands behind things that follow one another"
-                hint = "put `for` behind the one that must hold"
+                what = f"`{holds[0]}` comes after a sequence"
+                hint = "put `for` after the one that must hold"
                 expected = "one action, or several at the same time"
                 yield self.source.fault("E216", what, holds[0].span, expected, hint)
 
@@ -192,8 +190,8 @@ class CourseCheck:
                     what = f"what is asked for, `{sign.condition}`, also pauses it, so it is never done"
                     yield self.source.fault("E208", what, sign.span, "another condition")
                 if sign.kind in ("begins", "ends") and self.grammar.is_sequential(course.item):
-                    what = f"`{sign.kind} when` stands behind things that follow one another"
-                    hint = f"put it behind the one that {sign.kind} so"
+                    what = f"`{sign.kind} when` comes after a sequence"
+                    hint = f"put it after the one that {sign.kind} so"
                     expected = "one action, or several at the same time"
                     yield self.source.fault("E232", what, sign.span, expected, hint)
 
@@ -203,7 +201,7 @@ class CourseCheck:
             if isinstance(course, Counted) and course.most is not None:
                 if course.most == 0:
                     yield self.source.fault(
-                        "E233", "`at most 0 times` asks for nothing", course.span
+                        "E233", "`at most 0 times` requires nothing", course.span
                     )
                 elif course.most < course.least:
                     what = f"at least {course.least} and at most {course.most} times is never"
@@ -219,7 +217,7 @@ class CourseCheck:
                 )
             if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
                 what = f"{len(course.items)} things in any order have too many orders to follow"
-                hint = "put those together that follow one another"
+                hint = "group those that follow one another"
                 expected = f"at most {MOST_IN_ANY_ORDER}"
                 yield self.source.fault("E234", what, course.span, expected, hint)
 
@@ -247,5 +245,5 @@ class CourseCheck:
                 continue
             if self.grammar.nullable(course.item):
                 what = f"`{mark}` repeats what may be left out, so it has no end"
-                hint = "leave the `?` or `*` inside away"
+                hint = "remove the `?` or `*` inside"
                 yield self.source.fault("E215", what, course.span, hint=hint)

@@ -65,7 +65,7 @@ def read_beside(path: str, including: str, root: Path | None = None) -> tuple[st
         return path, read_text(path)
     if root is not None and not _is_within(beside, root):
         raise TaskError(
-            "it is outside of the folder of the task that is read",
+            "it is outside the folder of the task being read",
             where=str(beside)[:LONGEST_NAME],
             expected=f"a file in {root} or below",
             hint=f"{ROOT} may name a folder above both",

@@ -105,7 +105,7 @@ class NameCheck:
         yield from self.astray()
 
     def used(self) -> Iterator[tuple[Amount, str]]:
-        """Every amount that is used, with what it should measure; empty when nobody knows."""
+        """Every amount that is used, with what it should measure; empty if unknown."""
         for course in self.courses:
             if isinstance(course, Timed):
                 yield from ((a, TIME) for c in course.clauses for a in _durations(c))
@@ -228,7 +228,7 @@ class NameCheck:
                     yield self.source.fault("E229", what, actor.span, "an actor")
 
     def grounds(self) -> Iterator[Diagnostic]:
-        """A ground told twice, or by points that do not tell it."""
+        """A ground defined twice, or by points that do not determine it."""
         floors = [*(z.floor for z in self.task.zones), *(g.floor for g in self.task.grounds)]
         for side in (side for floor in floors for point in floor for side in point):
             known = side.unit in UNITS  # a place may well be 0 m
@@ -238,12 +238,12 @@ class NameCheck:
             yield self.source.fault("E224", "`ground` is declared twice", ground.span, hint=hint)
         for ground in self.task.grounds[:1]:
             if floor_map(ground) is None:
-                what = "three of the points lie in a line, so they do not tell the floor"
+                what = "three of the points lie on a line, so they do not determine the floor"
                 expected = "four points, such as the corners of a rectangle on the floor"
                 yield self.source.fault("E136", what, ground.span, expected)
 
     def declared(self) -> Iterator[Diagnostic]:
-        """Names declared twice; those of actors alone are told elsewhere."""
+        """Names declared twice; actors are checked elsewhere."""
         first: dict[str, str] = {a.name: "an actor" for a in self.task.actors}
         bystanders = [b for b in self.task.bystanders if b.name]
         for b in bystanders:
@@ -276,7 +276,7 @@ class NameCheck:
                     yield self.source.fault("E225", what, one.span)
 
     def unobserved(self) -> Iterator[Diagnostic]:
-        """Actions that need percepts that will not be at hand, each told once."""
+        """Actions that need percepts that will not be available, each reported once."""
         told = set()
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
@@ -284,8 +284,8 @@ class NameCheck:
             if missing and name not in told:
                 told.add(name)
                 said = " and ".join(f"`{m}`" for m in missing)
-                what = f"`{name}` can never be observed: it needs {said}, which nothing will give"
-                hint = "switch the behaviour on that gives it, or ask for something else"
+                what = f"`{name}` can never be observed: it needs {said}, which nothing provides"
+                hint = "enable the behaviour that provides it, or require something else"
                 yield self.source.fault("E231", what, span, hint=hint)
 
     def astray(self) -> Iterator[Diagnostic]:

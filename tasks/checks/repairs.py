@@ -172,7 +172,7 @@ UNUSED = ("E204", "E213", "E225")
 
 
 def told(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
-    """What is said of faults, wherever they stand."""
+    """The messages of faults, regardless of position."""
     return {(f.code, f.message) for f in faults}
 
 

@@ -154,10 +154,10 @@ class _Semantics:
             match self.misread(stage):
                 case "action":
                     meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
-                    what = f"the actors of `{names[0]}` stand without brackets"
+                    what = f"the actors of `{names[0]}` are written without brackets"
                     yield self.source.fault("E219", what, stage.body.span, meant)
                 case "infix":
-                    what = f"`{names[1]}` stands between its actors"
+                    what = f"`{names[1]}` is written between its actors"
                     meant = f"`{names[1]}({names[0]}, {names[2]})`"
                     yield self.source.fault("E219", what, stage.body.span, meant)
                 case "stages":

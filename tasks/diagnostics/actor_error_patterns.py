@@ -1,4 +1,4 @@
-"""Errors that people often make where they say who an actor is."""
+"""Common errors in declarations of actors."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def actor(text: str) -> RecognisedError | None:
             one, two = spaced.groups()
             hint = f"the name of a model has no blanks, such as `{one}_{two}`"
             if one in TERMS or two in TERMS:
-                hint = f"what is said of an actor is joined by `and`, such as `{one} and {two}`"
+                hint = f"criteria of an actor are joined by `and`, such as `{one} and {two}`"
         what = f"actor `{m[1]}` is declared with something that is not a model"
         if not text[m.end() :].strip(" "):
             what = f"actor `{m[1]}` is declared without a model"
@@ -81,7 +81,7 @@ def _conduct(text: str) -> RecognisedError | None:
     if m is None or re.search(right + r"|moves\s+first\b|rests\b)", text):
         return None
     expected = "`what enters from the left`, `what moves first` or `what rests`"
-    what = f"`{m[0]}` is not a way to tell an actor"
+    what = f"`{m[0]}` is not a way to identify an actor"
     return RecognisedError("E124", m.start(), m.end() - m.start(), what, expected)
 
 

@@ -63,7 +63,7 @@ def operators(text: str) -> RecognisedError | None:
     m = re.search(r"(!|~|¬)(?=\s*[\w(<])", text)
     if m is not None:
         hint = (
-            "a stage asks for what should be: `decoupled`, `apart`, `gone`; conditions have `not`"
+            "a stage states what should hold: `decoupled`, `apart`, `gone`; conditions have `not`"
         )
         return RecognisedError(
             "E122", m.start(), 1, f"`{m[0]}` is not part of the language", None, hint
@@ -90,13 +90,13 @@ def no_brackets(text: str) -> RecognisedError | None:
     """An action whose actors stand behind it without brackets."""
     m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME})[ ]+({NAME})", text)
     if m is not None and m[2] in ACTIONS:
-        what = f"`{m[2]}` stands between its actors"
+        what = f"`{m[2]}` is written between its actors"
         expected = f"`{m[2]}({m[1]}, {m[3]})`"
         return RecognisedError("E219", m.start(1), m.end(3) - m.start(1), what, expected)
     m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME}(?:\s*,\s*{NAME})+)", text)
     if m is None or m[1] in RESERVED_WORDS:
         return None
-    what = f"the actors of `{m[1]}` stand without brackets"
+    what = f"the actors of `{m[1]}` are written without brackets"
     return RecognisedError("E219", m.start(1), m.end(2) - m.start(1), what, f"`{m[1]}({m[2]})`")
 
 
@@ -149,7 +149,7 @@ def commas(text: str) -> RecognisedError | None:
     m = re.search(r"\([^()]*?(,\s*)(?=[,)])|\(\s*(,)", text)
     if m is not None:
         start = m.start(1) if m[1] else m.start(2)
-        return RecognisedError("E117", start, 1, "no actor stands beside this comma", "an actor")
+        return RecognisedError("E117", start, 1, "there is no actor next to this comma", "an actor")
     m = re.search(r"[>)?*+]\s*(,|;(?=\s*[<\w]))", text)
     if m is not None and not re.search(r"\bany\s+order\b", text):
         what = f"`{m[1]}` between stages"
@@ -176,7 +176,7 @@ def periodic(text: str) -> RecognisedError | None:
         )
     before = text[: m.start()].rstrip()
     if re.search(rf"(?<![<>=] ){NAME}[ ]*\([^()]*\)$", before) is None:
-        what = "`every` does not stand behind one action"
+        what = "`every` does not follow a single action"
         return RecognisedError("E101", m.start(1), 5, what, AGAIN)
     return None
 
@@ -250,11 +250,11 @@ def any_order(text: str) -> RecognisedError | None:
     m = m or re.search(r"\bin\s+any\s+order\b", text)
     if m is None:
         return None
-    what = f"`{' '.join(m[0].split())}` stands without a list in brackets"
+    what = f"`{' '.join(m[0].split())}` is not followed by a list in brackets"
     if re.match(r"\s*\(", text[m.end() :]):
         what = "`any order` needs at least two things, separated by commas"
     if m[0].startswith("in"):
-        what = "`in` does not stand before `any order`"
+        what = "`in` is not written before `any order`"
     return RecognisedError("E135", m.start(), len(m[0]), what, "`any order (<a>, <b>)`")
 
 
@@ -289,7 +289,7 @@ def repeat_in_front(text: str) -> RecognisedError | None:
         return None
     group = next(i for i in (1, 3, 4) if m[i])
     mark = m[group]
-    what = f"`{mark}` does not stand behind one thing that it repeats"
+    what = f"`{mark}` does not follow the one thing that it repeats"
     expected = f"such as `<approach>{mark}` or `( ... ){mark}`"
     return RecognisedError("E126", m.start(group), 1, what, expected)
 
@@ -299,5 +299,5 @@ def mixed_names(text: str) -> RecognisedError | None:
     m = re.search(rf"(?<![<\w(,])[ ]+({NAME})(?=\s+(?:<|\(|{NAME}\s*[(<])|\s*[|&?*+])", text)
     if m is None or m[1] in RESERVED_WORDS:
         return None
-    start, what = m.start(1), f"`{m[1]}` stands alone: neither an action with actors nor a stage"
+    start, what = m.start(1), f"`{m[1]}` is neither an action with actors nor a stage"
     return RecognisedError("E103", start, len(m[1]), what, f"`<{m[1]}>` or `{m[1]}(...)`")

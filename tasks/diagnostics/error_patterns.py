@@ -101,7 +101,7 @@ def _bare_head(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*({NAME})\s*(?:::=|:=|=)", text)
     if m is None or m[1] in RESERVED_WORDS:
         return None
-    what = f"the name of stage `{m[1]}` stands without angle brackets"
+    what = f"the name of stage `{m[1]}` is written without angle brackets"
     return RecognisedError("E103", m.start(1), len(m[1]), what, f"`<{m[1]}> ::= ...`")
 
 
@@ -188,10 +188,8 @@ def _ground(text: str) -> RecognisedError | None:
         r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)\s*=\s*\(\s*[\d.]+\s*[^\W\d]+\s*,\s*[\d.]+\s*[^\W\d]+\s*\)"
     )
     points = len(re.findall(pair, text))
-    what = (
-        "`ground` is told by something that is not a point of the image and its place on the floor"
-    )
-    what = "`ground` is told by fewer than four points" if points < 4 and m[2] else what
+    what = "`ground` is given something that is not a point of the image and its place on the floor"
+    what = "`ground` is given fewer than four points" if points < 4 and m[2] else what
     what = what if m[2] else "`is` is missing after `ground`"
     expected = "`ground is (80, 400) = (0 m, 0 m), ...`, four points or more"
     return RecognisedError("E136", m.start(1), 6, what, expected)

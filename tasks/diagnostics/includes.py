@@ -71,7 +71,7 @@ class _Joiner:
         self.taken.add(file)
         self.room -= len(text)
         if self.room < 0 or len(self.taken) > MOST_FILES:
-            what = "all that is included is more than a task may be"
+            what = "the included files are larger than a task may be"
             expected = f"at most {MOST_FILES} files, and {MOST_CHARACTERS} characters"
             return self.fault("E137", what, include, expected, None)
         source = self.source.included[file] = Source(text, file)

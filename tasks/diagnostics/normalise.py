@@ -1,4 +1,4 @@
-"""Characters: what only looks like text of the language is told and taken as it was meant."""
+"""Characters: look-alikes of the language's own are reported, and read as intended."""
 
 from __future__ import annotations
 

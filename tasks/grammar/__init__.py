@@ -1,4 +1,4 @@
-"""The grammar of task files, and questions about the tree of a task.
+"""The grammar of task files, and analysis of the tree of a task.
 
 Read in this order: `tasks.lark` (the language), `conditions.py` and `ast_courses.py` (the nodes
 inside a stage), `nodes.py` (the file as a whole), `parser.py` (text to tree), `statement.py` (one

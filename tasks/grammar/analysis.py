@@ -1,4 +1,4 @@
-"""What a grammar says as a whole: what is reached, what may be left out, what can end, how soon.
+"""Analysis of a grammar: what is reachable, nullable, terminating, and how soon.
 
 Each question about all stages is answered in time linear in the size of the file: stages are
 looked at after those that they refer to, and only circles need a second look.
@@ -74,7 +74,7 @@ class Grammar:
         return reachable(self.mentions, [r for r in self.task.roots if r in self.stages])
 
     def unreachable(self) -> list[Stage]:
-        """Stages that the task never comes to; of those that lead to each other only the first."""
+        """Stages that the task never reaches; of a cycle only the first."""
         lost = [s for s in self.stages.values() if s.name not in self.reached]
         named = {n for s in lost for n in self.mentions[s.name] if n != s.name}
         roots = [s for s in lost if s.name not in named]
@@ -92,7 +92,7 @@ class Grammar:
         return [self.stages[n] for n in sorted(found, key=order.__getitem__)]
 
     def non_terminating(self) -> list[Stage]:
-        """Stages all of whose courses go on for ever, the first only."""
+        """Stages that can never end; only the first."""
         lasting = [s for n, s in self.stages.items() if self._least_times[n] == NEVER]
         named = {n for s in lasting for n in self.mentions[s.name]}
         own = [s for s in lasting if s.name in named]

@@ -17,7 +17,7 @@ from visup.tasks.grammar.conditions import Action, Amount, Condition
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """`for 5 s`: what it stands behind must hold so long without a break."""
+    """`for 5 s`: what precedes it must hold for that long without interruption."""
 
     duration: Amount
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -28,7 +28,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Deadline:
-    """`within 60 s`: what it stands behind must be over so long after it began."""
+    """`within 60 s`: what precedes it must be over within that time after it began."""
 
     duration: Amount
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -143,7 +143,7 @@ class Timed:
 
 @dataclass(frozen=True, slots=True)
 class Conditioned:
-    """`a begins when b fails when c`: a course with signs of its own."""
+    """`a begins when b fails when c`: a course with its own stage conditions."""
 
     item: Course
     conditions: tuple[StageCondition, ...]

@@ -1,8 +1,8 @@
-"""The supervision of tasks: a reasoner that says how each task stands.
+"""The supervision of tasks: a reasoner that determines the state of each task.
 
-Read in this order: `supervise.py` (the reasoner), `snapshot.py` (what is seen now), `hypotheses.py`
-(the courses that are followed), `monitored_phases.py` with `open_transitions.py` and `advance.py` (the
-model that the task filter follows), `belief.py` (marginals, verdict), `beginning.py` (what has begun),
+Read in this order: `supervise.py` (the reasoner), `snapshot.py` (the current observation), `hypotheses.py`
+(the hypotheses that are followed), `monitored_phases.py` with `open_transitions.py` and `advance.py` (the
+model of the task filter), `belief.py` (marginals, verdict), `beginning.py` (what has begun),
 `task_inference.py` (which of several tasks is going on), `invariants.py`, `events.py` and
 `sentences.py` (what is reported), `memory.py` (what is remembered).
 """

@@ -14,9 +14,9 @@ from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import lasted, outcome
 from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.reported import ReportedRelations, joined, with_reported
 from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
-from visup.tasks.verification.told import Told, joined, with_told
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
 
@@ -253,7 +253,7 @@ class Advance:
         told = joined(self._told(x, transition) for x in left)
         return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told))
 
-    def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> Told:
+    def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
         """What has been told once a step is left: of it, and of what came before it."""
         step, monitor = left.step, left.payload
         if self._ending(left, followed := self._followed(transition)).status is not Status.DONE:
@@ -261,7 +261,7 @@ class Advance:
         meaning, denied = self.steps.actions[step.action], self._denied(step)
         _, until = lasted(step, meaning, monitor, self.now, followed, denied)
         until = self.now if until is None else until
-        return with_told(monitor.told, step.actors, meaning.name, until)
+        return with_reported(monitor.told, step.actors, meaning.name, until)
 
     def _after(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
         """A step that begins, with when what comes before it was over; its delay counts from then."""

@@ -145,7 +145,7 @@ def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
         expected=() if activity.excluded else belief.expected,
         prospects=(),
         success=None,
-        evidence=f"it is probably not going on ({activity.chance:.0%})".replace("%", " %"),
+        evidence=f"it is probably not in progress ({activity.chance:.0%})".replace("%", " %"),
     )
 
 
@@ -250,7 +250,7 @@ def _why(
 ) -> str:
     """Why the verdict is what it is: one clause."""
     if verdict is Verdict.UNKNOWN:
-        return "nothing of the task has been seen yet"
+        return "no part of the task has been seen yet"
     if verdict is Verdict.SUCCEEDED:
         return f"all stages were done at {teller.finished:.1f} s"
     if verdict is Verdict.FAILED:
@@ -309,7 +309,7 @@ def _missing(model: MonitoredPhases, snapshot: TaskSnapshot) -> str:
     unbound = (b.actor for b in snapshot.bindings if b.object_id is None)
     waited = (model.spare.get(a, a) for a in unbound if not model.task.actor(a).optional)
     missing = [a for a in dict.fromkeys(waited) if a not in there]
-    return f"not found yet: {', '.join(missing)}" if missing else "nothing of it has been seen yet"
+    return f"not found yet: {', '.join(missing)}" if missing else "no part of it has been seen yet"
 
 
 def _expected(

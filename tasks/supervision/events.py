@@ -75,7 +75,7 @@ def activity_events(
     if before.reportable == now.reportable:
         return
     kind = "task_active" if now.reportable else "task_inactive"
-    said = "appears to be going on" if now.reportable else "turns out not to be going on"
+    said = "appears to be in progress" if now.reportable else "turns out not to be in progress"
     chance = f"{now.chance:.0%}".replace("%", " %")
     yield Event(
         kind,

@@ -12,8 +12,8 @@ from visup.tasks.grammar.conditions import Action
 from visup.tasks.grammar.nodes import Comparison, Task
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.verification.pauses import Pause
+from visup.tasks.verification.reported import since_reported
 from visup.tasks.verification.step_monitor import StepMonitor
-from visup.tasks.verification.told import since_told
 
 SHORT_S = 0.6
 """What lasted less long than this is told with its beginning, seconds."""
@@ -49,7 +49,7 @@ def evidence(
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
             what = _say(monitor.contrary, actions)
             known = monitor.entered if monitor.contrary_since is None else monitor.contrary_since
-            since = since_told(monitor.told, step.actors, monitor.contrary, known)
+            since = since_reported(monitor.told, step.actors, monitor.contrary, known)
             return (
                 f"{who} {have} been {what} since {since:.1f} s; "
                 f"stage `{step.stage}` requires {them} to be {meaning.text}"
@@ -63,12 +63,12 @@ def evidence(
         case Status.PROGRESSING if monitor.helped_since is not None:
             by = monitor.helped_by or ""
             what, known = _say(by, actions), max(0.0, monitor.helped_since)
-            since = since_told(monitor.told, step.actors, by, known)
+            since = since_reported(monitor.told, step.actors, by, known)
             return f"{who} {have} been {what} since {since:.1f} s"
         case Status.STALLED if monitor.helped_at is not None:
             return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
         case Status.UNKNOWN if monitor.unseen_since is not None:
-            return f"{who} could not be observed since {monitor.unseen_since:.1f} s"
+            return f"{who} {have} not been observable since {monitor.unseen_since:.1f} s"
     return f"{who} should be {meaning.text}"
 
 
@@ -99,18 +99,21 @@ def outcome(
     if monitor.late:
         return Status.FAILED, _late(step, monitor)
     if step.hold_s is not None and not monitor.fulfilled:
-        return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
+        return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, but {was} not"
     end = step.condition("ends")
     if end is not None and not monitor.fulfilled:
         if monitor.denied:
-            return Status.FAILED, f"`{step.stage}` ends when {end.condition}, which was not so"
+            return (
+                Status.FAILED,
+                f"`{step.stage}` ends when {end.condition}, which was not the case",
+            )
         return Status.UNKNOWN, f"whether {end.condition} could not be seen"
     if meaning.lasts and monitor.begun is None:
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
     if meaning.lasts or monitor.held:
         return Status.DONE, f"{who} {_held(step, meaning, monitor, now, followed, denied)}"
     if monitor.broken_since is not None:
-        return Status.FAILED, f"{who} should be {meaning.text}, and {was} not"
+        return Status.FAILED, f"{who} should be {meaning.text}, but {was} not"
     return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"
 
 
@@ -166,11 +169,11 @@ def lasted(
     latest = monitor.helped_since or 0.0
     if meaning.lasts or monitor.held_s == 0.0:
         since, until = _first_known(monitor), last_held(meaning, monitor, now, followed)
-        told = since_told(monitor.told, step.actors, meaning.name, since)
+        told = since_reported(monitor.told, step.actors, meaning.name, since)
         # Where something else was told in between it began anew.
         return (since if told == since else max(told, latest)), until
     known = max(0.0, now - monitor.held_s, latest)
-    since = since_told(monitor.told, step.actors, meaning.name, known)
+    since = since_reported(monitor.told, step.actors, meaning.name, known)
     return since, denied if denied is not None and denied > since else None
 
 
@@ -204,13 +207,13 @@ def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -
     """What came before its turn, or before its delay was over."""
     if step.delay is not None and monitor.hasty_s is not None:
         return (
-            f"it began {max(0.0, monitor.hasty_s):.1f} s after what comes before it, "
-            f"and should begin no sooner than {step.delay[0]:g} s after it"
+            f"it began {max(0.0, monitor.hasty_s):.1f} s after the stage before it, "
+            f"but should begin no sooner than {step.delay[0]:g} s after it"
         )
     was = "was" if len(step.actors) < 2 else "were"
     return (
         f"{names(step.actors)} {was} {meaning.text} before stage `{step.stage}` began, "
-        "and should become so in it"
+        "but should become so during it"
     )
 
 
@@ -230,11 +233,11 @@ def _late(step: TaskStep, monitor: StepMonitor) -> str:
     """Which time ran out before a step was over, or had begun."""
     due = monitor.missed
     if due is not None:
-        return f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
+        return f"`{due.stage}` should be done within {due.seconds:g} s, but was not"
     assert step.delay is not None
     return (
-        f"`{step.stage}` should begin no later than {step.delay[1]:g} s after what comes before it, "
-        "and did not"
+        f"`{step.stage}` should begin no later than {step.delay[1]:g} s after the stage before it, "
+        "but did not"
     )
 
 
@@ -260,7 +263,7 @@ STAGE_WORDS = {
     "stage_started": "Stage `{stage}` of task `{task}` has begun",
     "stage_progressing": "Stage `{stage}` is progressing satisfactorily",
     "stage_paused": "Stage `{stage}` is paused",
-    "stage_resumed": "Stage `{stage}` goes on",
+    "stage_resumed": "Stage `{stage}` has resumed",
     "stage_stalled": "Stage `{stage}` makes no progress",
     "stage_failing": "Stage `{stage}` is failing",
     "stage_failed": "Stage `{stage}` has failed",
@@ -287,7 +290,7 @@ def prospects_text(belief: TaskBelief) -> str:
     if belief.success is None:
         return "next: unknown"
     if belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
-        return "next: nothing, it is over"
+        return "next: nothing, the task is over"
     chances = [(f"`{p.stage}`" if p.stage else "the end", p.probability) for p in belief.prospects]
     lost = 1.0 - sum(p.probability for p in belief.prospects)
     said = [

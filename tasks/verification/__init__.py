@@ -1,9 +1,9 @@
-"""The verification of one step under way: what is seen of it, and how it stands.
+"""The verification of one active step: what is observed of it, and its status.
 
-Read in this order: `observe.py` (what is seen of an action now), `stage_conditions.py` (what the task
+Read in this order: `observe.py` (the current observation of an action), `stage_conditions.py` (what the task
 itself says of the beginning, end, progress and failure of a step), `step_monitor.py` (the status of a
-step over time), `told.py` (what was told of the actors, and until when), `step_model.py` (how well what is
-seen fits it), `settings.py` (how patient all this is).
+step over time), `reported.py` (relations of actors as reported), `step_model.py` (how well the
+observations fit it), `settings.py` (the time constants).
 """
 
 from visup.tasks.verification.observe import ActionObservation, observe

@@ -13,8 +13,8 @@ from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import RunningDeadline, TaskStep
 from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
+from visup.tasks.verification.reported import ReportedRelations, with_reported
 from visup.tasks.verification.settings import TaskSettings
-from visup.tasks.verification.told import Told, with_told
 
 BAD = (Status.FAILING, Status.FAILED)
 
@@ -104,7 +104,7 @@ class StepMonitor:
     after: float = -math.inf
     hasty_s: float | None = None
     fulfilled_at: float | None = None
-    told: Told = ()
+    told: ReportedRelations = ()
 
     @property
     def begun_anew(self) -> bool:
@@ -175,7 +175,9 @@ def _note_told(monitor: StepMonitor, step: TaskStep, status: Status, now: float)
     """A change of status is told, with the relation by which it came."""
     by = monitor.helped_by if status is Status.PROGRESSING else None
     by = monitor.contrary if status in BAD else by
-    return replace(monitor, told=with_told(monitor.told, step.actors, by, now)) if by else monitor
+    return (
+        replace(monitor, told=with_reported(monitor.told, step.actors, by, now)) if by else monitor
+    )
 
 
 def _note_lateness(

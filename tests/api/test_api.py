@@ -166,7 +166,7 @@ def test_runs_and_records_show_themselves(recorded: tuple[visup.Run, Path]) -> N
         ({"source": "x", "models": 3}, "the model database cannot be 3"),
         ({"source": "x", "actors": {"arm": ()}}, "the actor 'arm' cannot stand for ()"),
         ({"source": "x", "actors": "arm"}, "actors cannot be 'arm'"),
-        ({"source": visup.Settings("x"), "every": 2}, "settings come whole"),
+        ({"source": visup.Settings("x"), "every": 2}, "a Settings object is complete"),
     ],
 )
 def test_bad_input_is_told_in_words(given: dict[str, object], said: str) -> None:

@@ -313,7 +313,7 @@ def test_the_command(
     told = visup("find", lake.path, "converging(arm, satellite) for 0.3 s")
     assert told.code == 0, told.err
     assert "arm (1), spartan (2), confidence" in told.out
-    assert "open it: visup step " in told.out
+    assert "inspect it: visup step " in told.out
     lines = visup(
         "find", lake.path, "converging(arm, satellite) for 0.3 s", "--json"
     ).out.splitlines()
@@ -323,12 +323,12 @@ def test_the_command(
     assert all(Path(h["folder"], "journal.sqlite").is_file() for h in hits)
     first = visup("find", lake.path, "converging(a, b)", "--first", 1, "--clips", lake.path / "cut")
     assert "Hits: " in first.out
-    assert "; looked into: 1 (25 %); not looked into: 3." in first.out
+    assert "; searched: 1 (25 %); not searched: 3." in first.out
     assert "the footage is not there any more" in first.err
     none = visup("find", lake.path, "coupled(arm, spartan) and south_of(arm, spartan)")
     assert (none.code, none.out.splitlines()[-1]) == (
         1,
-        "Hits: 0, in 0 of 4 runs; looked into: 0 (0 %).",
+        "Hits: 0, in 0 of 4 runs; searched: 0 (0 %).",
     )
     assert visup("find", lake.path, "gap(a, b)").code == 2
     with pytest.raises(SettingsError, match="alerts are raised or not"):

@@ -178,9 +178,9 @@ def test_the_command(
 ) -> None:
     visup: Call = caller(monkeypatch, capfd)
     first = visup("archive", "compact", loose[1].path)
-    assert (first.code, first.out) == (0, "Joined: 5 runs; the lake has 1 partition.\n")
+    assert (first.code, first.out) == (0, "Merged 5 runs; the lake has 1 partition.\n")
     again = visup("archive", "compact", loose[1].path, "--now")
     assert again.out == (
-        "Joined: 0 runs; the lake has 1 partition. Files that were replaced went, of 5 runs.\n"
+        "Merged 0 runs; the lake has 1 partition. Replaced files of 5 runs were removed.\n"
     )
     assert visup("archive", "compact", loose[1].path.parent).code == 2

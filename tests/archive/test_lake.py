@@ -223,7 +223,7 @@ def test_the_command_adds_what_it_can(visup: Call, tmp_path: Path) -> None:
     assert "the run has not ended" in told.err
     assert len(Lake.open(tmp_path / "lake").runs()) == 1
     assert (
-        "was there already"
+        "was already there"
         in visup("archive", "add", tmp_path / "good", "--into", tmp_path / "lake").out
     )
 

@@ -151,7 +151,7 @@ def test_a_question_can_only_read_the_lake(lake: Lake, database: LakeDatabase, s
 @pytest.mark.parametrize(
     ("sql", "said"),
     [
-        ("", "nothing is asked"),
+        ("", "the query is empty"),
         ("SELECT 1; SELECT 2", "these are 2 statements"),
         ("SELECT * FROM stage", "visup query LAKE --tables"),
         ("SELECT nothing FROM runs", "visup query LAKE --tables"),

@@ -42,7 +42,7 @@ def test_a_new_behaviour_runs_at_once(name: str, tmp_path: Path) -> None:
 def test_nothing_is_written_over(tmp_path: Path) -> None:
     (tmp_path / "lamp.py").write_text("mine")
     code, told = visup("behaviours", "new", "lamp", "--out", tmp_path)
-    assert (code, "exists already" in told) == (2, True)
+    assert (code, "already exists" in told) == (2, True)
     assert (tmp_path / "lamp.py").read_text() == "mine"
 
 

@@ -276,7 +276,7 @@ def test_memory_that_runs_out_is_told(
     monkeypatch.setattr("visup.cli.check_memory", full)
     told = visup("presets")
     assert told.code == 1
-    assert told.err.startswith(f"error: there is no memory left{said and ': '}{said}\n  hint: ")
+    assert told.err.startswith(f"error: out of memory{said and ': '}{said}\n  hint: ")
 
 
 ASKED_FROM_PYTHON = """

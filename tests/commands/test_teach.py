@@ -36,7 +36,7 @@ def test_outlines_are_stored_told_and_drawn(picture: Path, tmp_path: Path) -> No
     done = run(picture, *words("part"), *words("tray", 9), "--models", models)
     assert done.exit_code == 0, done.output
     assert f"part: {SIDE} x {SIDE} pixels at (20, {TOP})." in done.output
-    assert "knows by outlines: part (1 view), tray (1 view)" in done.output
+    assert "has outlines of: part (1 view), tray (1 view)" in done.output
     assert ModelDatabase.open(models).names() == ("part", "tray")
     drawn = cv2.imread(str(tmp_path / "cell-taught.png"))
     assert drawn is not None
@@ -65,11 +65,11 @@ def test_a_brief_says_what_is_outlined_where(tmp_path: Path) -> None:
     ("args", "message"),
     [
         ([], "--models DB"),
-        (["--models", "a"], "nothing to draw outlines in"),
+        (["--models", "a"], "no clip was given to draw outlines in"),
         (["no.mp4", "--models", "a", *words("part")], "no.mp4"),
         (["cell.png", "--models", "a", "--outline", "part"], "has no name"),
         (["cell.png", "--models", "a", *words("part"), "--frame", "4"], "no frame 4"),
-        (["cell.png", "--models", "a", "--brief", "b.json"], "a brief already says"),
+        (["cell.png", "--models", "a", "--brief", "b.json"], "a brief already contains"),
         (["--models", "a", "--brief", "b.json"], "cannot be read"),
         (["cell.png", "--models", "no/a", *words("part")], "cannot be written"),
     ],

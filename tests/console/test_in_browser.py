@@ -171,7 +171,7 @@ def test_it_stops_at_breakpoints_and_goes_through_the_phases_of_a_step(
 ) -> None:
     open_run(browser, address)
     tab(browser, "Steps")
-    press(browser, "Go on")
+    press(browser, "Continue")
     shows(browser, "alert: ")
     browser.until("!document.body?.innerText.includes('frame 0')")
     field = "document.querySelector('input[aria-label=\"Where to stop\"]')"
@@ -179,7 +179,7 @@ def test_it_stops_at_breakpoints_and_goes_through_the_phases_of_a_step(
     browser.type("when gap(")
     browser.press("Enter")
     shows(browser, "when gap(")
-    press(browser, "Go on")
+    press(browser, "Continue")
     browser.until("document.querySelector('[role=status]')?.innerText.includes('ends too early')")
     for phase in ("perceive", "update", "cogitate"):
         press(browser, "Next phase")
@@ -249,10 +249,10 @@ def test_a_question_is_answered_to_see_what_would_have_followed(
     open_run(browser, address, VIEWER, "who-is-it")
     browser.press("End")
     shows(browser, "Is object 1 the satellite or the arm?")
-    assert not browser.value("document.body?.innerText.includes('as if answered')")
+    assert not browser.value("document.body?.innerText.includes('if answered')")
     open_run(browser, address, OPERATOR, "who-is-it")
     browser.press("End")
-    shows(browser, "as if answered")
+    shows(browser, "if answered")
     press(browser, "spartan")
     shows(browser, "as if object 1 were said to be spartan")
     assert violations(browser) == []
@@ -266,7 +266,7 @@ def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: 
         browser.press("End")
         shows(browser, "answer:")
         press(browser, "spartan")
-        shows(browser, "The run is told")
+        shows(browser, "Sent to the run")
         assert (folder / "live" / ANSWERS).read_text() == "1=spartan\n"
     finally:
         rmtree(folder / "live")
@@ -285,9 +285,9 @@ def test_why_an_object_looks_like_a_model_is_shown(
         follow(browser, "alike")
         browser.press("End")
         shows(browser, "frame 59")
-        browser.until("!!document.querySelector('[aria-label=\"who object 1 is\"]')")
-        browser.value("document.querySelector('[aria-label=\"who object 1 is\"]').click()")
-        press(browser, "Beside the views")
+        browser.until("!!document.querySelector('[aria-label=\"identity of object 1\"]')")
+        browser.value("document.querySelector('[aria-label=\"identity of object 1\"]').click()")
+        press(browser, "Compare views")
         browser.until("document.querySelector('.likeness img')?.naturalWidth > 1000")
         assert violations(browser) == []
         press(browser, "Close")
@@ -307,7 +307,7 @@ def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
 ) -> None:
     open_run(browser, address, VIEWER)
     tab(browser, "Alerts")
-    shows(browser, "only what is open")
+    shows(browser, "only alerts open")
     assert not browser.value("document.body?.innerText.includes('false alarm')")
     browser.open(f"{address}?token={OPERATOR}")
     open_run(browser, address)
@@ -363,8 +363,8 @@ def test_everybody_can_use_it(browser: Browser, address: str) -> None:
     open_run(browser, address)
     for name, text in (
         ("Now", "approach"),
-        ("Told", "in view"),
-        ("Alerts", "only what is open"),
+        ("Events", "in view"),
+        ("Alerts", "only alerts open"),
         ("Ask", "Why?"),
         ("Try", "from the cursor on"),
     ):

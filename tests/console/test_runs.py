@@ -65,7 +65,7 @@ def test_every_moment_has_its_picture(run: tuple[Path, Sequence[Step]]) -> None:
         assert picture is not None
         assert picture.shape == (height, width, 3)
     assert view.picture(30, plain=True) != view.picture(30)
-    assert "not there" in view.pictures.problem
+    assert "no longer available" in view.pictures.problem
 
 
 def test_times_and_frames_lead_to_the_last_moment_that_is_not_later(
@@ -176,11 +176,11 @@ def test_the_playhead_stays_within_the_run_and_jumps_to_what_was_told(
     head.next_event(forth=False)
     assert head.run.times[head.number] == pytest.approx(times[-2])
     asked: list[str] = []
-    head.listen(lambda: asked.append(head.panel), "Told")
+    head.listen(lambda: asked.append(head.panel), "Events")
     head.step(-1)
     assert asked == []
-    head.open_panel("Told")
-    assert asked == ["Told"]
+    head.open_panel("Events")
+    assert asked == ["Events"]
     head.go(0)
     head.toggle()
     for _ in range(80):

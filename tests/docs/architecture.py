@@ -58,13 +58,14 @@ def layers() -> list[list[str]]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     contracts = project["tool"]["importlinter"]["contracts"]
     (whole,) = (c for c in contracts if c.get("containers") == ["visup"])
-    return [re.findall(r"\w+", layer) for layer in whole["layers"]]
+    return [re.findall(r"\w+", layer) for layer in whole["layers"] if layer != "__main__"]
 
 
 def uses() -> list[tuple[str, str]]:
     """Which room imports which, without what follows from other arrows."""
     graph = grimp.build_graph("visup")
     rooms = {name.removeprefix("visup."): name for name in graph.find_children("visup")}
+    rooms.pop("__main__", None)  # only calls `cli`
     arrows = nx.DiGraph()
     for a, whole_a in rooms.items():
         below = graph.find_modules_directly_imported_by

@@ -19,5 +19,5 @@ def test_every_arrow_leads_down() -> None:
 def test_the_page_shows_both_pictures_and_twelve_usual_changes() -> None:
     page = (ROOT / "docs" / "architecture.md").read_text()
     assert all(f"images/{path.name})" in page for path in pictures())
-    rows = page.partition("## Where do I change what")[2].splitlines()
+    rows = page.partition("## Where to change what")[2].splitlines()
     assert len([row for row in rows if row.startswith("| ")]) - 1 >= 12

@@ -34,7 +34,7 @@ COMMANDS: list[tuple[str, int, str]] = [
     ("behaviours list", 0, "motion"),
     ("presets", 0, "traffic: a road"),
     # A clip of one's own, without a task.
-    ("check clip.avi", 0, "A run can begin."),
+    ("check clip.avi", 0, "A run can start."),
     ("watch clip.avi", 0, "Verdict: nothing unsafe was seen (no task was given)"),
     ("watch clip.avi --quiet", 0, "Report:  runs/clip-2/report.html"),
     ("watch clip.avi --json --no-video", 0, '"kind": "result"'),
@@ -45,7 +45,7 @@ COMMANDS: list[tuple[str, int, str]] = [
     ("export runs/clip mot", 0, "clip-mot.txt: "),
     # Slips.
     ("watch clop.avi", 2, "did you mean clip.avi?"),
-    ("watch clip.avi --out runs/clip", 2, "the folder holds a run already"),
+    ("watch clip.avi --out runs/clip", 2, "the folder already contains a run"),
     ("watch clip.avi --every abc", 2, "'abc' is not a whole number"),
     ("watch clip.avi --task dock", 2, "cannot be followed"),
     ("watch clip.avi --task dok", 2, "did you mean"),
@@ -54,12 +54,12 @@ COMMANDS: list[tuple[str, int, str]] = [
     ("task check cross.task", 0, ""),
     ("task show cross.task", 0, "go"),
     ("task format cross.task", 0, ""),
-    ("check clip.avi --task cross.task", 0, "A run can begin."),
+    ("check clip.avi --task cross.task", 0, "A run can start."),
     ("watch clip.avi --task cross.task --out runs/cross --no-video", 0, "Verdict: succeeded"),
     ("replay runs/clip --task never.task", 0, "Verdict: succeeded"),
     # Rules of one's own, on the run that is there.
     ("rules check own.rules", 0, "seen"),
-    ("replay runs/clip --rules own.rules", 1, "something grave was seen"),
+    ("replay runs/clip --rules own.rules", 1, "something unsafe was seen"),
     ("rules explain runs/clip --at 1.2 --rule stale_perception", 0, "stale_perception"),
     # Looking inside.
     ("step runs/cross <- step until go; why go; show go.png", 0, "go.png: 96 x 72 pixels"),
@@ -68,7 +68,7 @@ COMMANDS: list[tuple[str, int, str]] = [
     (
         f"teach clip.avi --models cell.models --outline '{OUTLINE}'",
         0,
-        "cell.models knows by outlines",
+        "cell.models has outlines of",
     ),
     ("models list cell.models", 0, "disc"),
     ("models show cell.models", 0, ""),

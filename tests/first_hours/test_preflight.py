@@ -43,7 +43,7 @@ def test_so_is_one_whose_actors_are_none_of_the_models(visup: Call, clip: Path) 
 def test_an_actor_that_no_model_stands_for_is_warned_of_first(visup: Call, clip: Path) -> None:
     done = visup("watch", clip, *DOCK, "--models", MODELS, "--no-video")
     assert done.out.splitlines()[0] == (
-        "Nothing tells what the actor 'satellite' looks like: the model database has no 'satellite'."
+        "It is not known what the actor 'satellite' looks like: the model database has no 'satellite'."
     )
 
 
@@ -56,9 +56,9 @@ def test_who_says_beforehand_who_is_who_needs_no_models(visup: Call, clip: Path)
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        ([], 0, "A run can begin."),
+        ([], 0, "A run can start."),
         ([*DOCK, "--models", MODELS, "--actor", "satellite=spartan"], 0, "satellite is spartan"),
-        ([*DOCK, "--models", MODELS], 0, "warning: Nothing tells what the actor 'satellite'"),
+        ([*DOCK, "--models", MODELS], 0, "warning: It is not known what the actor 'satellite'"),
         (DOCK, 2, "cannot be followed"),
         ([*DOCK, "--actor", "arms=arm"], 2, "no task has an actor called 'arms'"),
     ],

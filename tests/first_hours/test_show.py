@@ -33,7 +33,7 @@ def test_what_cannot_be_shown_is_told(
     visup: Call, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     piped(monkeypatch, "show")
-    assert "no step was taken yet" in visup("step", clip).out
+    assert "no step has been taken yet" in visup("step", clip).out
     piped(monkeypatch, "step 3", "show no/such/folder.png")
     done = visup("step", clip)
     assert "the picture cannot be written" in done.out
@@ -41,7 +41,7 @@ def test_what_cannot_be_shown_is_told(
     assert visup("watch", clip, "--out", tmp_path / "run", "--no-video", "--quiet").code == 0
     clip.unlink()
     piped(monkeypatch, "step 3", "show")
-    assert "cannot be had again" in visup("step", tmp_path / "run").out
+    assert "cannot be read again" in visup("step", tmp_path / "run").out
 
 
 def test_what_an_answer_rests_on_is_marked_in_its_frame(

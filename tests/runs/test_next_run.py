@@ -144,7 +144,7 @@ def test_a_next_run_that_cannot_be_begun_leaves_no_folder(
 
 def test_a_run_that_goes_on_elsewhere_is_not_taken_up(camera: Camera) -> None:
     first = next(camera.runs()).path.parent
-    with pytest.raises(OutputError, match="goes on in another"):
+    with pytest.raises(OutputError, match="continues in another"):
         interrupted_run(first)
     assert run_under_way(camera.store.folder, "a") != first
 

@@ -278,7 +278,7 @@ def test_a_camera_that_drops_comes_back_and_goes_on() -> None:
     assert [f.index for f in frames] == list(range(6))
     assert all(a.time < b.time for a, b in itertools.pairwise(frames))
     assert troubles == [[], [], [], ["source_dropped"], [], []]
-    assert said[0] == "camera 0 delivers nothing; it is tried again."
+    assert said[0] == "camera 0 delivers no frames; trying again."
     assert waited[:2] == [0.5, 1.0]
     assert source.problem is not None
     assert "stopped delivering" in source.problem

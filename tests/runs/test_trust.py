@@ -61,7 +61,7 @@ def test_code_that_a_run_folder_names_does_not_run(
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
     named = {kind: [n.format(file=file) for n in names] for kind, names in named.items()}
     written(tmp_path / "run" / JOURNAL, **named)
-    with pytest.raises(SettingsError, match="cannot have code run") as refused:
+    with pytest.raises(SettingsError, match="code is never run") as refused:
         interrupted_run(tmp_path / "run")
     assert not mark.exists()
     assert all(name in (refused.value.hint or "") for names in named.values() for name in names)
@@ -90,7 +90,7 @@ def test_it_runs_once_it_is_named_again_wherever_it_is_now(
 
 def test_other_code_than_the_run_had_is_refused(clip: WatchSettings, tmp_path: Path) -> None:
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
-    with pytest.raises(SettingsError, match="no behaviours of its own"):
+    with pytest.raises(SettingsError, match="no custom behaviours"):
         interrupted_run(tmp_path / "run", plugins=("shape",))
 
 
@@ -117,7 +117,7 @@ def test_a_run_that_somebody_else_went_on_with_is_not_gone_on_with(
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
     first, second = interrupted_run(tmp_path / "run"), interrupted_run(tmp_path / "run")
     supervise(first.settings, tmp_path / "run", options=BARE, past=first)
-    with pytest.raises(OutputError, match="gone on with this run meanwhile"):
+    with pytest.raises(OutputError, match="resumed this run in the meantime"):
         supervise(second.settings, tmp_path / "run", options=BARE, past=second)
     assert Recording.open(tmp_path / "run").facts()["ended"] == "complete"
 
@@ -132,9 +132,9 @@ def test_two_runs_into_one_folder_are_told_apart_in_words(
     with pytest.raises(OutputError, match="another visup is writing this run"):
         fresh_folder(folder, "")
     journal.close()
-    with pytest.raises(OutputError, match="holds a run already"):
+    with pytest.raises(OutputError, match="already contains a run"):
         fresh_folder(folder, "")
-    with pytest.raises(OutputError, match="a run is recorded here already"):
+    with pytest.raises(OutputError, match="a run is already recorded here"):
         supervise(clip, folder, options=BARE)
 
 

@@ -89,7 +89,7 @@ def test_a_process_that_hangs_is_ended(cell: Cell, stepped: bool, away: bool, mo
     if stepped:
         cell.step()
     if away:
-        cell.bench.last.tell(NOTICE, text="it delivers nothing; it is tried again.")
+        cell.bench.last.tell(NOTICE, text="it delivers no frames; trying again.")
         cell.turn()
     cell.turn(most)
     assert cell.bench.running

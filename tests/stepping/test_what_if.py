@@ -154,14 +154,14 @@ def test_beliefs_can_be_told_in_words(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "no assumption is given"),
+        ("", "no belief was given"),
         ("touchin 1 2", "did you mean 'touching'"),
-        ("touching 1", "no relation of two objects"),
-        ("touching 1 2 maybe", "no relation of two objects"),
+        ("touching 1", "not a relation of two objects"),
+        ("touching 1 2 maybe", "not a relation of two objects"),
         ("touching 1 9", "there is no object 9"),
         ("object 9 arm", "there is no object 9"),
-        ("object arm", "which object"),
-        ("object 1", "which object"),
+        ("object arm", "an object and a belief"),
+        ("object 1", "an object and a belief"),
         ("object 1 arn", "did you mean 'arm'"),
     ],
 )

@@ -110,7 +110,7 @@ def test_the_command_tells_and_draws(run: Path, tmp_path: Path) -> None:
     models = tmp_path / "a.models"
     code, told = command(run, "--models", models, "--thing", f"disc={first_object(run)}")
     assert code == 0, told
-    assert "knows by outlines: disc" in told
+    assert "has outlines of: disc" in told
     assert (tmp_path / "a-taught.png").exists()
     shown = CliRunner().invoke(app, ["models", "show", str(models)])
     assert shown.exit_code == 0, shown.output
@@ -128,7 +128,7 @@ def test_the_command_tells_and_draws(run: Path, tmp_path: Path) -> None:
         (["--thing", "disc=a"], "cannot be read"),
         (["--thing", "disc=1", "--thing", "disc=2"], "twice"),
         (["--thing", "disc=99"], "no object 99"),
-        ([], "nobody has said who is who"),
+        ([], "no object of this run was identified"),
         (["--thing", "disc=1", "--source", "gone.mp4"], "gone.mp4"),
     ],
 )

@@ -156,7 +156,7 @@ def test_what_is_told_names_size_place_and_what_to_heed(clip: Path, tmp_path: Pa
     lesson = teach_brief(brief(tmp_path, told), tmp_path / "a.models")
     assert "10 x 10 pixels at (0, 0), cut by the picture's border" in lesson.told[0]
     assert "hard to find again" in lesson.told[0]
-    assert lesson.told[-1].endswith("knows by outlines: dot (1 view).")
+    assert lesson.told[-1].endswith("has outlines of: dot (1 view).")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data is not there")

@@ -1,7 +1,7 @@
-"""The public API: watch a source, open a recorded run, and have both as tables and pictures.
+"""The public API: watch a source, open a recorded run, and get both as tables and pictures.
 
-Read in this order: `watching.py` (`visup.watch` and the run that it gives), `watch_options.py` (what may be
-said about a run), `recorded.py` (`visup.open_run`), `records.py` (sequences of records that become
+Read in this order: `watching.py` (`visup.watch` and the run that it returns), `watch_options.py` (the options
+of a run), `recorded.py` (`visup.open_run`), `records.py` (sequences of records that become
 tables). Users take these names from `visup` itself.
 """
 

@@ -1,4 +1,4 @@
-"""`visup.open_run`: a run folder read back as records."""
+"""`visup.open_run`: read a run folder as records."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True, slots=True)
 class RecordedStep:
-    """What was believed after one step, in short.
+    """A summary of the beliefs after one step.
 
     Attributes:
         frame_index: Number of the frame.
         time: Seconds.
-        objects: Ids of the objects that were believed in.
+        objects: Ids of the objects.
         verdicts: Task -> verdict so far.
         stages: Task -> stage -> status.
         health: State of the camera.
@@ -51,7 +51,7 @@ class RecordedStep:
 
 @dataclass(frozen=True, slots=True)
 class RecordedObject:
-    """What was believed of one object after one step.
+    """The beliefs about one object after one step.
 
     Attributes:
         frame_index: Number of the frame.
@@ -60,7 +60,7 @@ class RecordedObject:
         name: The likeliest model, or 'unknown object'.
         share: Share of the votes for it, 0 to 1.
         presence: 'seen', 'hidden' or 'left'.
-        confirmed: Whether it is more than a passing impression.
+        confirmed: Whether it counts as an object, and not as a passing impression.
         region: Id of its region.
         bbox: (x, y, width, height), pixels.
         area: Pixels.
@@ -88,7 +88,7 @@ class RecordedObject:
 
 @dataclass(frozen=True, repr=False)
 class RecordedRun:
-    """A run on disk, which may still go on; each part is read when it is first asked for.
+    """A run on disk, which may still be live; each part is read when it is first used.
 
     Attributes:
         recording: Its journal.
@@ -103,7 +103,7 @@ class RecordedRun:
 
     @cached_property
     def facts(self) -> Mapping[str, Any]:
-        """What was noted about the run: version, source, frame rate, settings."""
+        """Facts about the run: version, source, frame rate, settings."""
         return self.recording.facts()
 
     @cached_property
@@ -113,28 +113,28 @@ class RecordedRun:
 
     @property
     def verdict(self) -> Verdict | None:
-        """The verdict; None when nothing was to be judged, or the run was not ended."""
+        """The verdict; None if there was no task and nothing was wrong, or the run has not ended."""
         said = self.facts.get("verdict")
         return self._read(Verdict, said) if said is not None else None
 
     @cached_property
     def events(self) -> Records[Event]:
-        """What happened, in order."""
+        """The events, in order."""
         return self._records(Event, _event, self.recording.events())
 
     @cached_property
     def alerts(self) -> Records[Alert]:
-        """Alerts as they were last, in the order in which they were opened."""
+        """The alerts in their final state, in the order in which they opened."""
         return self._records(Alert, _alert, self.recording.alerts().values())
 
     @cached_property
     def steps(self) -> Records[RecordedStep]:
-        """What was believed after each step, in short."""
+        """A summary of the beliefs after each step."""
         return self._records(RecordedStep, _step, self.recording.summaries())
 
     @cached_property
     def objects(self) -> Records[RecordedObject]:
-        """What was believed of each object after each step: one record for both."""
+        """The beliefs about each object after each step, one record per object and step."""
         lines = ({**o, **_when(s)} for s in self.recording.summaries() for o in s["objects"])
         return self._records(RecordedObject, _object, lines)
 
@@ -165,7 +165,7 @@ class RecordedRun:
 
 
 def open_run(folder: str | os.PathLike[str]) -> RecordedRun:
-    """A recorded run, as records.
+    """Open a recorded run.
 
     Example:
         ```python
@@ -180,7 +180,7 @@ def open_run(folder: str | os.PathLike[str]) -> RecordedRun:
 
     Raises:
         OutputError: There is no run, or it cannot be read.
-        SettingsError: `folder` is no path.
+        SettingsError: `folder` is not a path.
     """
     if not isinstance(folder, str | os.PathLike):
         raise SettingsError(f"a run folder cannot be {folder!r}", expected="a path")

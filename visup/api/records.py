@@ -26,10 +26,10 @@ EXTRA = "tables"
 
 
 class Records(Sequence[Record_co]):
-    """Records of one kind in order; a sequence that becomes a table.
+    """A sequence of records of one kind, which converts to a table.
 
     A table has one column for each field whose values are plain: numbers, texts, and sequences of
-    them. Details of no fixed form (`Event.data`) stand in it as JSON text, so that every table of a
+    them. Details without a fixed form (`Event.data`) are JSON text, so that every table of a
     kind has the same columns of the same types.
 
     Args:
@@ -62,7 +62,7 @@ class Records(Sequence[Record_co]):
         return html_of(rows(repr(self)[1:-1], self))
 
     def to_pandas(self) -> pd.DataFrame:
-        """The records as a data frame, one a row.
+        """The records as a data frame, one per row.
 
         Raises:
             ExtraMissingError: pandas is not installed.
@@ -72,7 +72,7 @@ class Records(Sequence[Record_co]):
         return frame
 
     def to_arrow(self) -> pa.Table:
-        """The records as an Arrow table, one a row.
+        """The records as an Arrow table, one per row.
 
         Raises:
             ExtraMissingError: pyarrow is not installed.

@@ -1,4 +1,4 @@
-"""What a user says about a run, checked and turned into the settings of `visup watch`."""
+"""The arguments of `visup.watch`, checked and converted to settings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TaskLike = str | os.PathLike[str] | Task
 
 
 class WatchOptions(TypedDict, total=False):
-    """Settings of `visup.watch` besides the usual ones; `visup.Settings` says what each means."""
+    """Further settings of `visup.watch`; `visup.Settings` documents each."""
 
     rules: Sequence[str | os.PathLike[str]]
     behaviours: Sequence[str | os.PathLike[str]]
@@ -61,7 +61,7 @@ def settings_from(
         options: Further settings.
 
     Raises:
-        SettingsError: Something is of the wrong kind or out of its range.
+        SettingsError: An argument has the wrong type or is out of range.
     """
     given: dict[str, Any] = {**options}
     _check_names(given)

@@ -1,4 +1,4 @@
-"""`visup.watch`: a source is watched step by step, and the run tells what was seen."""
+"""`visup.watch`: watch a source step by step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Self, Unpack
 
 from rich.console import RenderableType
 
-from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
+from visup.agent.cycle.system_alerts import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Alert, Event
 from visup.agent.model.fast_replace import replace
@@ -31,7 +31,7 @@ from visup.runs.wiring import final_verdict
 from visup.story import Narrative
 
 KEPT_STEPS = 2000
-"""Steps that a run keeps in memory, some 100 kB each; events and alerts are kept all."""
+"""Steps that a run keeps in memory, about 100 kB each; all events and alerts are kept."""
 
 
 def watch(
@@ -43,9 +43,9 @@ def watch(
     out: str | os.PathLike[str] | None = None,
     **options: Unpack[WatchOptions],
 ) -> Run:
-    """Supervise a source: see what moves, name it, judge it by rules, verify tasks.
+    """Supervise a source: segment motion, recognise objects, evaluate rules, verify tasks.
 
-    The run goes on as it is iterated over; asking for `verdict`, `events` and so on before that
+    The run advances as you iterate over it; asking for `verdict`, `events` and so on before that
     watches the source to its end.
 
     Example:
@@ -57,12 +57,12 @@ def watch(
         ```
 
     Args:
-        source: A video file, a folder of images, a URL, the number of a camera, or whole `Settings`
-            (then nothing else but `out` may be given).
+        source: A video file, a folder of images, a URL, the number of a camera, or a complete `Settings`
+            (then only `out` can be given with it).
         task: A task file, the name of a shipped task, a task from `visup.load_task`, or several;
-            None for supervision by the safety rules alone.
-        models: A model database, or None to go without identities.
-        actors: Actor of the task -> model or models that it may look like.
+            None to supervise by the safety rules only.
+        models: A model database, or None to work without identities.
+        actors: Actor of the task -> its model or models.
         out: Folder to record to: journal, events, annotated video, report. None records nothing.
         options: Further settings, named as in `visup.Settings`.
 
@@ -70,13 +70,13 @@ def watch(
         The run, before its first step.
 
     Raises:
-        VisupError: Something given is not as it should be; the message says what was expected.
+        VisupError: An argument is invalid; the message says what was expected.
     """
     if not isinstance(source, WatchSettings):
         return Run(settings_from(source, task, models, actors, options), out)
     if options or not (task is None and models is None and actors is None):
         raise SettingsError(
-            "settings come whole: nothing but `out` can stand beside them",
+            "a Settings object is complete: only `out` can be given with it",
             hint="change them with dataclasses.replace(settings, ...)",
         )
     return Run(source, out)
@@ -86,15 +86,15 @@ class Run(Iterator[Step]):
     """A supervised source; iterate over it for one step after another.
 
     Each step that it yields carries its frame, so that `step.draw()` shows it. In a `with` statement
-    a run that is left early is ended properly, with its report.
+    a run that is left early is closed properly, with its report.
 
     Args:
-        settings: What to watch and against what.
+        settings: What to watch, and what for.
         out: Folder to record to, or None.
 
     Attributes:
         settings: As given.
-        result: How the run ended, with the recorded folder and report, or None while it goes on.
+        result: How the run ended, with the recorded folder and report; None until then.
     """
 
     def __init__(self, settings: WatchSettings, out: str | os.PathLike[str] | None = None) -> None:
@@ -129,7 +129,7 @@ class Run(Iterator[Step]):
         self.stop()
 
     def __repr__(self) -> str:
-        state = "ended" if self.result else "under way" if self._begun else "not begun"
+        state = "ended" if self.result else "under way" if self._begun else "not started"
         return f"Run({redacted(self.settings.source)!r}, {state}, {len(self._events)} events)"
 
     def __rich__(self) -> RenderableType:
@@ -139,10 +139,10 @@ class Run(Iterator[Step]):
         return html_with_picture(self._story(), self._last())
 
     def narrate(self) -> Iterator[Event]:
-        """Watch what is left of the source, and yield what is worth telling as it comes.
+        """Watch the rest of the source, and yield notable events as they come.
 
         These are the lines that `visup watch` prints: events with one cause are one line, and an
-        unidentified object has one line for its life. `events` has all that happened.
+        unidentified object gets a single line. `events` has all events.
         """
         narrative = Narrative()
         for step in self:
@@ -151,13 +151,13 @@ class Run(Iterator[Step]):
             yield from narrative.rest(self._steps[-1].time, self._steps[-1].frame_index)
 
     def finish(self) -> Self:
-        """Watch what is left of the source, and return the run itself."""
+        """Watch the rest of the source, and return the run itself."""
         for _ in self:
             pass
         return self
 
     def stop(self) -> Self:
-        """End the run here: what was seen is judged and recorded as it is."""
+        """End the run here; the verdict and the recording cover what was seen so far."""
         if self.result is None and self._begun:
             try:
                 self._run.throw(KeyboardInterrupt())
@@ -174,26 +174,26 @@ class Run(Iterator[Step]):
 
     @property
     def events(self) -> Records[Event]:
-        """What happened so far, in order."""
+        """The events so far, in order."""
         self._ask()
         return Records(Event, self._events)
 
     @property
     def alerts(self) -> Records[Alert]:
-        """Every alert so far as it is now, in the order in which they were opened."""
+        """All alerts so far in their current state, in the order in which they opened."""
         self._ask()
         return Records(Alert, [self._alerts[i] for i in sorted(self._alerts)])
 
     @property
     def verdict(self) -> Verdict | None:
-        """The verdict, or the verdict so far; None when nothing was to be judged and nothing was wrong."""
+        """The verdict so far, or the final one; None if there was no task and nothing was wrong."""
         self._ask()
         if self.result is not None:
             return self.result.verdict
         return self._verdict_so_far()
 
     def _ask(self) -> None:
-        """Whoever asks before the first step wants to know about the whole source."""
+        """Asking for results before the first step means asking about the whole source."""
         if not self._begun:
             self.finish()
 
@@ -201,7 +201,7 @@ class Run(Iterator[Step]):
         return replace(self._steps[-1], frame=self._frame) if self._steps else None
 
     def _story(self) -> RenderableType:
-        state = "" if self.result else "; the run is under way" if self._begun else "; not begun"
+        state = "" if self.result else "; the run is under way" if self._begun else "; not started"
         verdict = self.result.verdict if self.result else self._verdict_so_far()
         return story(
             f"{redacted(self.settings.source)}{state}",

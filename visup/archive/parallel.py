@@ -16,7 +16,7 @@ Item = TypeVar("Item")
 Found = TypeVar("Found")
 Workers = Annotated[
     int | None,
-    Option("Processes; 0 for this one alone (default: one for each core).", at_least=0),
+    Option("Worker processes; 0 to use none (default: one per core).", at_least=0),
 ]
 
 

@@ -1,5 +1,5 @@
-"""The commands: one module for each command of `visup`, or a folder where it has commands of its own.
+"""The commands: one module per command of `visup`, or a folder if it has sub-commands.
 
-`visup/cli.py` gathers them. A command reads its options, calls what does the work and prints the result;
-heavy imports stay inside its functions, so that `visup --help` comes at once.
+`visup/cli.py` collects them. A command reads its options, calls the code that does the work, and prints the
+result; heavy imports stay inside its functions, so that `visup --help` is fast.
 """

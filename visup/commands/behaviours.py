@@ -78,16 +78,20 @@ def list_behaviours() -> None:
 @app.command("check")
 def check(
     where: Annotated[
-        str, typer.Argument(metavar="FILE", help="A Python file, package.module:Class, or a name.")
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="A Python file, package.module:Class, or the name of an installed behaviour.",
+        ),
     ],
     setting: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME.KEY=VALUE", help="A setting of the behaviour."),
     ] = None,
 ) -> None:
-    """Run a behaviour on clips of all sorts and see whether it keeps its contract.
+    """Run a behaviour on a variety of clips and check that it keeps its contract.
 
-    Exit code: 0 when it does, 1 when it does not, 2 when it cannot be loaded.
+    Exit code: 0 if it does, 1 if it does not, 2 if it cannot be loaded.
     """
     from visup.agent.plugins.settings import parse_settings
 
@@ -98,10 +102,10 @@ def check(
 
 @app.command("new")
 def new(
-    name: Annotated[str, typer.Argument(help="Of the behaviour, such as lamp.")],
+    name: Annotated[str, typer.Argument(help="Name of the behaviour, such as lamp.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the file.")] = Path(),
 ) -> None:
-    """Write a behaviour that runs at once, to be changed into your own."""
+    """Create a working behaviour from a template, for you to change."""
     from keyword import iskeyword
 
     from visup.agent.model.errors import OutputError, SettingsError
@@ -117,10 +121,10 @@ def new(
         with path.open("x", encoding="utf-8") as file:
             file.write(TEMPLATE.format(name=name, title=title))
     except FileExistsError as fault:
-        raise OutputError("the file exists already", where=str(path)) from fault
+        raise OutputError("the file already exists", where=str(path)) from fault
     except OSError as fault:
         raise OutputError(f"cannot be written: {fault.strerror}", where=str(path)) from fault
-    echo(f"{path}: change it, then\n  visup behaviours check {path}")
+    echo(f"{path}: edit it, then run\n  visup behaviours check {path}")
 
 
 def _factories(where: str) -> list[BehaviourFactory]:

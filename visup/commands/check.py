@@ -1,4 +1,4 @@
-"""`visup check`: whether a run could begin, and come to anything, before its first frame."""
+"""`visup check`: whether a run could start and reach a verdict, checked without running it."""
 
 from __future__ import annotations
 
@@ -19,15 +19,14 @@ def check(
     ],
     settings_file: SettingsFile = None,
 ) -> None:
-    """Say beforehand whether `visup watch` with the same options can begin, and lead to anything.
+    """Check whether `visup watch` with the same options could start and reach a verdict.
 
-    The source is opened and its first frame read; tasks, rules, zones, models and behaviours are loaded;
-    and the actors of each task are looked for among the models. Exit code: 0 when a run can begin, 2 when it
-    cannot.
+    Opens the source and reads its first frame, loads tasks, rules, zones, models and behaviours, and looks
+    for a model for each actor of the tasks. Exit code: 0 if a run can start, 2 if it cannot.
     """
     from visup.runs.inputs.preflight import preflight
     from visup.terminal.console import echo
 
     for line in preflight(watch_settings(source, setting, settings_file)):
         echo(line)
-    echo("A run can begin.")
+    echo("A run can start.")

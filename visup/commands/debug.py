@@ -1,4 +1,4 @@
-"""`visup debug`: pictures of the workings, for those who improve them."""
+"""`visup debug`: visualise intermediate results, for developers of visup."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_WIDTH = 1284
 
 @app.callback()
 def group() -> None:
-    """Pictures of the workings, for those who improve them."""
+    """Visualise intermediate results, for developers of visup."""
 
 
 @app.command("motion")
@@ -34,10 +34,10 @@ def motion(
     every: Annotated[int, typer.Option(help="Use every n-th frame.")] = 1,
     limit: Annotated[int | None, typer.Option(min=1, help="Use at most this many frames.")] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frame rate, where the source has none.")
+        float | None, typer.Option(help="Frame rate, if the source does not state one.")
     ] = None,
 ) -> None:
-    """Write a video of how motion is seen: constraints, layers, labels, regions."""
+    """Write a video of the motion pipeline: constraints, layers, labels, regions."""
     from visup.commands.watch import progress_bar
     from visup.percepts.video import open_source
 
@@ -54,7 +54,7 @@ def motion(
 
 
 def _write(video: VideoSource, target: Path, limit: int | None, advance: RunProgress) -> int:
-    """Segment, draw and write; the number of frames written."""
+    """Segment, draw and write; returns the number of frames written."""
     from itertools import islice
 
     from visup.percepts.motion.segmenter import MotionSegmenter
@@ -73,7 +73,7 @@ def _write(video: VideoSource, target: Path, limit: int | None, advance: RunProg
 
 
 def _given(video: VideoSource) -> int | None:
-    """How many frames a source gives, where it is known."""
+    """The number of frames that a source will give, if known."""
     return None if video.frame_count is None else -(-video.frame_count // video.every)
 
 
@@ -87,7 +87,7 @@ def video_of(source: str) -> str:
 
 
 def checked_target(path: Path) -> Path:
-    """Refuse a file that cannot be written before minutes of work.
+    """Refuse a file that cannot be written, before minutes of work are wasted on it.
 
     Raises:
         SettingsError: It is not WebM.
@@ -97,7 +97,7 @@ def checked_target(path: Path) -> Path:
 
     if path.suffix != ".webm":
         raise SettingsError(
-            f"videos of the kind {path.suffix or path.name!r} cannot be written here",
+            f"videos of type {path.suffix or path.name!r} cannot be written on this machine",
             where=str(path),
             expected="a name that ends in .webm",
         )
@@ -107,7 +107,7 @@ def checked_target(path: Path) -> Path:
 
 
 def _name(source: str) -> str:
-    """What the source is called, without folders and endings."""
+    """The name of the source, without folder or extension."""
     path = Path(source)
     word = path.parent.name if path.stem in ("video", "frames") else path.stem
     return word or "source"

@@ -55,12 +55,12 @@ EXTRAS = {
     ),
     "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),
 }
-"""What each extra brings, and its libraries; the same as `optional-dependencies` in pyproject.toml."""
+"""What each extra is for, and its libraries; the same as `optional-dependencies` in pyproject.toml."""
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedPart:
-    """One line of the doctor's list.
+    """One line of the report.
 
     Attributes:
         what: What was looked at.
@@ -77,10 +77,10 @@ class CheckedPart:
 
 def doctor(
     speed: Annotated[
-        bool, typer.Option("--speed", help="Also measure frames a second on the shipped clip.")
+        bool, typer.Option("--speed", help="Also measure frames per second on the shipped clip.")
     ] = False,
 ) -> None:
-    """Show what is installed, what is missing, and versions. Exit code 2 when the core is broken."""
+    """Show what is installed, what is missing, and versions. Exit code 2 if the core is broken."""
     from rich.table import Table
     from rich.text import Text
 
@@ -118,11 +118,11 @@ def examine() -> Iterator[CheckedPart]:
 
 
 SPEED_FRAMES = 60
-"""So many frames are looked at for each figure; the first ones, in which loops are compiled, do not count."""
+"""Frames measured for each figure, not counting the first ones, during which loops are compiled."""
 
 
 def speeds(frames: int = SPEED_FRAMES) -> Iterator[str]:
-    """Frames a second on the shipped clip: of a bare watch, with models and a task, by preset.
+    """Frames per second on the shipped clip: motion only, with models and a task, and by preset.
 
     Args:
         frames: How many are looked at.
@@ -152,7 +152,7 @@ def _library(name: str, purpose: str) -> CheckedPart:
 
 
 def _extra(extra: str, purpose: str, names: tuple[str, ...]) -> CheckedPart:
-    """An extra is there when all its libraries are."""
+    """An extra is installed when all its libraries are."""
     found = {name: _version(name) for name in names}
     label = f"visup[{extra}]"
     if None in found.values():
@@ -170,7 +170,7 @@ def _version(name: str) -> str | None:
 
 
 def _tried(what: str, look: Callable[[], str]) -> CheckedPart:
-    """What a look says; whatever it raises is a finding, since finding faults is its purpose."""
+    """The result of one check; any exception is a finding, since finding faults is the purpose."""
     try:
         return CheckedPart(what, "ok", look())
     except Exception as fault:

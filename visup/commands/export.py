@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-WITH_HIDDEN = ", and rows for what is hidden or not yet confirmed"
+WITH_HIDDEN = ", plus rows for objects that are hidden or not yet confirmed"
 
 
 def export(
     run: Annotated[Path, typer.Argument(help="Run folder of `visup watch`, or its journal.")],
     form: Annotated[str, typer.Argument(help="mot, coco, fiftyone or csv.", metavar="FORM")],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Where to (default: RUN.FORM).")
+        Path | None,
+        typer.Option(metavar="FILE", help="File to write (default: RUN-FORM.txt, .json or .csv)."),
     ] = None,
 ) -> None:
     """Write the objects of a run, frame by frame, as MOT, COCO, FiftyOne or CSV."""

@@ -1,4 +1,4 @@
-"""`visup models`: build a model database, add to it, look into it, match a picture."""
+"""`visup models`: build a model database, add to it, inspect it, match a picture against it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from visup.percepts.shape.database.model_database import ModelDatabase, Ranking
 
 app = typer.Typer(
-    no_args_is_help=True, help="Model databases: the shapes that objects are known by."
+    no_args_is_help=True, help="Model databases: the shapes by which objects are recognised."
 )
 
 Db = Annotated[Path, typer.Argument(metavar="DB", help="Model database file.")]
@@ -31,13 +31,13 @@ def build(
     views: Annotated[
         int, typer.Option(help="Views of each mesh, spread evenly over the sphere.")
     ] = 32,
-    seed: Annotated[int, typer.Option(help="Seed of the rotation of the views' directions.")] = 0,
-    jobs: Annotated[int, typer.Option(help="Processes; 0 for one on each core.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed for the rotation of the viewing directions.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Processes; 0 for one per core.")] = 0,
 ) -> None:
-    """Build a database from meshes. Each model is named after its file, without the ending.
+    """Build a database from meshes. Each model is named after its file, without the extension.
 
-    A build that was stopped goes on where it was when the same command is given again. Views that are
-    the same by symmetry are stored once.
+    Running the same command again continues a build that was stopped. Views that are identical by
+    symmetry are stored once.
     """
     import os
 
@@ -61,22 +61,23 @@ def build(
 @app.command("add")
 def add(
     db: Db,
-    name: Annotated[str, typer.Option(help="Name of the model; one that exists gets more views.")],
+    name: Annotated[str, typer.Option(help="Name of the model; an existing one gets more views.")],
     silhouettes: Annotated[
-        Path | None, typer.Option(help="Folder of pictures, a silhouette each.")
+        Path | None, typer.Option(help="Folder of pictures, one silhouette each.")
     ] = None,
-    masks: Annotated[Path | None, typer.Option(help="Folder of a video's label masks.")] = None,
+    masks: Annotated[Path | None, typer.Option(help="Folder of label masks of a video.")] = None,
     label: Annotated[
-        int | None, typer.Option(min=1, max=255, help="The object's value in --masks; any if none.")
+        int | None,
+        typer.Option(min=1, max=255, help="The object's value in --masks; any by default."),
     ] = None,
     clusters: Annotated[
-        int, typer.Option(help="Number of exemplars that represent all pictures.")
+        int, typer.Option(help="Number of exemplars to cluster the pictures into.")
     ] = 8,
 ) -> None:
-    """Add exemplars of silhouettes, or of an object's masks in a video.
+    """Add exemplars from silhouettes, or from masks of an object in a video.
 
-    Silhouettes may be cut by the pictures' borders, and are then stored as such. A database that does
-    not exist yet is begun.
+    Silhouettes that the picture border cuts are stored as truncated. A database that does not exist is
+    created.
     """
     from visup.agent.model.errors import SettingsError
     from visup.percepts.shape.building.database_builder import (
@@ -113,20 +114,20 @@ def learn(
     ],
     thing: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=OBJECT", help="What an object of the run was; repeatable."),
+        typer.Option(metavar="NAME=OBJECT", help="Name an object of the run; repeatable."),
     ] = None,
     source: Annotated[
-        str | None, typer.Option(metavar="FILE", help="The run's video, where it has moved.")
+        str | None, typer.Option(metavar="FILE", help="The video of the run, if it has moved.")
     ] = None,
-    views: Annotated[int, typer.Option(min=1, help="Views of each thing at most.")] = 5,
+    views: Annotated[int, typer.Option(min=1, help="Most views to add for each name.")] = 5,
     out: Annotated[
         Path | None,
         typer.Option(metavar="PNG", help="Picture of what was stored (default: beside DB)."),
     ] = None,
 ) -> None:
-    """Add views of what was confirmed in a run: this was the gripper.
+    """Add views of objects whose identity was confirmed in a run.
 
-    What the operator answered in the run counts, and what --thing says.
+    Both the operator's answers during the run and --thing count as confirmation.
     """
     from visup.percepts.taught.drawing import taught_picture
     from visup.teaching.learning import learn_from
@@ -141,7 +142,7 @@ def learn(
 
 @app.command("list")
 def list_models(db: Db) -> None:
-    """List the models of a database with their views."""
+    """List the models of a database and their views."""
     from collections import Counter
 
     from rich.table import Table
@@ -171,7 +172,7 @@ def match_picture(
         Path | None, typer.Option(help="Picture of the best five views to write (PNG).")
     ] = None,
 ) -> None:
-    """Rank the views that a silhouette looks like; with --out, draw why."""
+    """Rank the views that match a silhouette; with --out, draw how they correspond."""
     from visup.agent.model.errors import DatabaseError, SettingsError
     from visup.percepts.shape.building.database_builder import read_silhouette
     from visup.percepts.shape.database.model_database import ModelDatabase
@@ -184,9 +185,9 @@ def match_picture(
     silhouette = normalise(mask, cut=looks_cut(mask))
     if silhouette is None:
         raise DatabaseError(
-            "there is no silhouette in this picture",
+            "this picture contains no silhouette",
             where=str(image),
-            expected="an object of at least 24 pixels, one shade on another",
+            expected="an object of at least 24 pixels, in one shade on a background of another",
         )
     ranking = database.query(silhouette, top=top)
     if as_json:
@@ -206,7 +207,7 @@ def show(
         Path | None, typer.Option(help="Picture to write (PNG; default: beside the database).")
     ] = None,
 ) -> None:
-    """Draw a contact sheet: a row for each model, its views with their shock graphs."""
+    """Draw a contact sheet: one row per model, its views with their shock graphs."""
     from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.percepts.shape.drawing.contact_sheet import contact_sheet
 

@@ -23,7 +23,9 @@ Given = dict[str, Any]
 SettingsFile = Annotated[
     Path | None,
     typer.Option(
-        "--settings", metavar="TOML", help="Settings, in tables [behaviours.NAME] and [identity]."
+        "--settings",
+        metavar="TOML",
+        help="Settings file, with tables [behaviours.NAME] and [identity].",
     ),
 ]
 

@@ -1,10 +1,10 @@
-"""`visup presets`: what each preset chooses, and why."""
+"""`visup presets`: what each preset sets, and why."""
 
 from __future__ import annotations
 
 
 def presets() -> None:
-    """List the presets of `visup watch --preset`: rules, memory and pace of each, and why."""
+    """List the presets of `visup watch --preset`: the rules, memory and frame rate of each, and why."""
     from visup.runs.inputs.presets import PRESETS
     from visup.terminal.console import echo
 
@@ -13,7 +13,7 @@ def presets() -> None:
         pace = (
             "all frames"
             if preset.enough_fps is None
-            else f"at least {preset.enough_fps:g} frames a second, others are left out"
+            else f"at least {preset.enough_fps:g} frames per second; the surplus is skipped"
         )
         without = f"all but {', '.join(sorted(preset.without))}" if preset.without else "all"
         echo(f"{preset.name}: {preset.about}")

@@ -1,4 +1,4 @@
-"""`visup render`: a scenario file or a seed becomes a video with masks and truth."""
+"""`visup render`: render a scenario file or a random world, with masks and ground truth."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ SIZE_FORM = "WIDTHxHEIGHT, such as 320x240"
 
 
 def render(
-    out: Annotated[Path, typer.Option(help="Folder for the mission; new or empty.")],
+    out: Annotated[Path, typer.Option(help="Folder for the result; new or empty.")],
     scenario: Annotated[
         str | None,
         typer.Argument(help="Scenario file (TOML), or the name of a shipped scenario."),
     ] = None,
-    container: Annotated[str, typer.Option(help="Kind of video: mp4, avi or webm.")] = "mp4",
-    size: Annotated[
-        str | None, typer.Option(help=f"Another size of the image: {SIZE_FORM}.")
-    ] = None,
+    container: Annotated[
+        str, typer.Option(help="Container of the video: mp4, avi or webm.")
+    ] = "mp4",
+    size: Annotated[str | None, typer.Option(help=f"Override the image size: {SIZE_FORM}.")] = None,
     random: Annotated[
         str | None,
         typer.Option(
             metavar="KIND",
-            help="In place of a scenario: a random world of a kind, such as pick or orbit.",
+            help="Instead of a scenario, render a random world of this kind, such as pick or orbit.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of a random world.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a random world.")] = 0,
     outcome: Annotated[
-        str | None, typer.Option(help="How a random world goes, such as ok; drawn when not given.")
+        str | None, typer.Option(help="Outcome of a random world, such as ok; random by default.")
     ] = None,
 ) -> None:
-    """Render a scenario or a random world: a video, a mask for each frame, and what is true of it."""
+    """Render a scenario or a random world: a video, a mask for each frame, and the ground truth."""
     needs_renderer()
     if (scenario is None) == (random is None):
         from visup.agent.model.errors import SettingsError

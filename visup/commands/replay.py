@@ -28,9 +28,11 @@ if TYPE_CHECKING:
 class ReplayComparison:
     """What the replay is compared with, and what is shown of it."""
 
-    diff: Annotated[bool, Option("Show what changes against the recorded run.", "--diff")] = False
+    diff: Annotated[bool, Option("Show what changes compared with the recorded run.", "--diff")] = (
+        False
+    )
     against: Annotated[
-        Path | None, Option("Show what changes against this other run.", metavar="RUN")
+        Path | None, Option("Show what changes compared with another run.", metavar="RUN")
     ] = None
     quiet: Annotated[bool, Option("Print only the last lines.", "--quiet")] = False
 
@@ -47,13 +49,13 @@ def replay(
     compared: Given,
     run: Annotated[Path, typer.Argument(help="Run folder of `visup watch`, or its journal.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write the new run to this folder.")
+        Path | None, typer.Option(metavar="DIR", help="Write the replay to this folder as a run.")
     ] = None,
 ) -> None:
-    """Reason again about what a run perceived, with other tasks, rules or actors.
+    """Reason again about a recorded run, with other tasks, rules or actors.
 
-    Exit code: with --diff or --against 0 when nothing changes and 1 when something does; else as of
-    `visup watch`. 2 on bad input.
+    Exit code: with --diff or --against, 0 if nothing changes and 1 if something does; otherwise that of
+    `visup watch`. 2 for bad input.
     """
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import replay as reason_again
@@ -100,7 +102,7 @@ def _write_report(console: Console, report: ReplayReport, folder: Path, told: Tr
 
 
 def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int:
-    """Print how the replay ended; the exit code."""
+    """Print how the replay ended; returns the exit code."""
     from visup.agent import Verdict
     from visup.runs.result import RunResult
     from visup.terminal.narrator import verdict_line
@@ -113,7 +115,7 @@ def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int
 
 
 def _print_changes(console: Console, other: Recording, told: Transcript, quiet: bool) -> int:
-    """Print what the replay changes against another run; the exit code."""
+    """Print what differs from the other run; returns the exit code."""
     from visup.runs.replay import recorded_transcript, transcript_diff
 
     changed = transcript_diff(recorded_transcript(other), told)
@@ -124,11 +126,11 @@ def _print_changes(console: Console, other: Recording, told: Transcript, quiet: 
 
 def _speed(told: Transcript) -> str:
     rate = told.steps / told.seconds if told.seconds else 0.0
-    return f"{told.steps} frames replayed in {told.seconds:.1f} s ({rate:.0f} a second)"
+    return f"{told.steps} frames replayed in {told.seconds:.1f} s ({rate:.0f} per second)"
 
 
-def _told_otherwise(changed: TranscriptDiff) -> Iterator[str]:
-    """What only one of both runs told, by time; events that read alike are one line."""
+def _differing_events(changed: TranscriptDiff) -> Iterator[str]:
+    """Events that only one of the two runs reported, by time; events with the same text share a line."""
     from visup.wording import prose
 
     gone, new = (
@@ -145,7 +147,7 @@ def _lines(changed: TranscriptDiff, quiet: bool) -> Iterator[str]:
         yield "Nothing changes."
         return
     if not quiet:
-        yield from _told_otherwise(changed)
+        yield from _differing_events(changed)
     for group, (gone, new) in changed.counts().items():
         if gone or new:
             yield f"{group}: {gone} gone, {new} new"

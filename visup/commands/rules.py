@@ -1,4 +1,4 @@
-"""`visup rules`: check rule files, list rules with what they cost, explain a verdict."""
+"""`visup rules`: check rule files, list rules and their cost, explain a verdict."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True)
 
-Files = Annotated[list[Path] | None, typer.Argument(help="Rule files; the shipped rules if none.")]
+Files = Annotated[
+    list[Path] | None, typer.Argument(help="Rule files; by default the shipped rules.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
 EXPLAINED = ("tasks", "models", "rules", "early", "actors", "every", "fps", "fov_vertical_deg")
-"""Settings of a run that bear on what rules say."""
+"""Settings of a run that affect rules."""
 
 
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
-    """Report every mistake in rule files, and what each rule costs; exit code 2 if there is a mistake."""
+    """Report every mistake in rule files, and the cost of each rule; exit code 2 if there is a mistake."""
     from visup.agent.model.errors import ErrorGroup, VisupError
     from visup.rules.language.diagnostics import raise_errors
     from visup.rules.language.parser import load_rules
@@ -83,10 +85,10 @@ def explain(
     source: Annotated[
         str, typer.Argument(help="Video file, folder of images, camera, URL, or a run folder.")
     ],
-    at: Annotated[float, typer.Option("--at", min=0.0, help="Seconds of the video.")],
+    at: Annotated[float, typer.Option("--at", min=0.0, help="Time in the video, seconds.")],
     rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
 ) -> None:
-    """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
+    """Explain why rules were true, false or unknown for each choice of objects at a given time."""
     from visup.agent.model.errors import SettingsError
 
     mind = None
@@ -96,7 +98,7 @@ def explain(
     if mind is None or mind.time < at:
         raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
     told = explanations(mind, rule)
-    for text in told or [f"at {mind.time:g} s too few objects are in view for any choice"]:
+    for text in told or [f"at {mind.time:g} s too few objects are in view to evaluate any rule"]:
         echo(text)
 
 
@@ -121,11 +123,11 @@ def _minds(source: str, setting: Given) -> Iterator[Mind]:
 
 
 def explanations(mind: Mind, only: str | None) -> list[str]:
-    """Why each rule is true, false or unknown of each choice of objects in a mind.
+    """Why each rule is true, false or unknown for each choice of objects in a mind.
 
     Args:
-        mind: A mind that rules have judged.
-        only: Name of the one rule that is wanted, or None for all.
+        mind: A mind in which rules have been evaluated.
+        only: Name of a single rule, or None for all.
 
     Raises:
         RuleError: There is no rule of that name.
@@ -145,11 +147,11 @@ def _cost(rule: Rule) -> str:
     from visup.rules.language.cost import cost_of
 
     cost = cost_of(rule)
-    late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported at once"
-    told = f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"
+    late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported immediately"
+    told = f"{late}, at most {cost.bytes / 1024:,.1f} kB per choice of objects"
     if cost.early_delay_s == cost.delay_s:
         return told
     least = (
-        f"{cost.early_delay_s:g} s late at the least" if cost.early_delay_s else "perhaps at once"
+        f"at least {cost.early_delay_s:g} s late" if cost.early_delay_s else "possibly immediately"
     )
     return f"{told}; with --early, {least}"

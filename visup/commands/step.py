@@ -1,4 +1,4 @@
-"""`visup step`: step the agent in the terminal and look into its mind, live or on a recorded run."""
+"""`visup step`: step an agent in the terminal and inspect its mind, live or on a recorded run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OPTIONS = (
     *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention", "preset"),
     *("detections", "motion"),
 )
-"""Settings of a run that matter when it is stepped: nothing is late here, and nothing recorded."""
+"""Settings that matter when stepping, where nothing is late and nothing is recorded."""
 
 
 @takes(WatchSettings, only=OPTIONS)
@@ -38,10 +38,10 @@ def step(
     ],
     settings_file: SettingsFile = None,
 ) -> None:
-    """Step back and forth through a video or a recorded run, and look into the agent's mind.
+    """Step back and forth through a video or a recorded run, and inspect what visup believes.
 
-    Commands are read from the terminal, or from a pipe: one a line, see `help`. Exit code: 0; from a pipe 2
-    when a command could not be obeyed.
+    Commands are read from the terminal or a pipe, one per line; type `help` for a list. Exit code: 0;
+    2 if a command from a pipe could not be carried out.
     """
     from visup.agent.storage.journal_reader import is_run
     from visup.terminal.prompt import read_commands
@@ -56,7 +56,7 @@ def step(
         session = Session(agent, frames, picture=_pictures(video, stack))
         at_prompt = sys.stdin.isatty()
         code = session.run(read_commands(session))
-    # At a prompt a slip is put right by the next line; from a pipe nobody would know of it.
+    # At a prompt the user sees a mistake and corrects it; in a pipe only the exit code shows it.
     raise typer.Exit(0 if at_prompt else code)
 
 
@@ -70,14 +70,14 @@ def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
     video = stack.enter_context(open_video(settings))
     if not video.live:
         return agent, video
-    # While one looks at a step a camera goes on: the next step is to be of what it sees then.
+    # The camera goes on while the user looks at a step; the next step should show the newest frame.
     newest = in_real_time(video, video)
     stack.callback(newest.close)
     return agent, MonotonicFrames(newest, video.fps)
 
 
 def _pictures(source: str, stack: ExitStack) -> Callable[[int], NDArray[np.uint8]] | None:
-    """Frames by their number, of a source that can be read again; None for cameras and what is gone."""
+    """Frames by index, of a source that can be read again; None for cameras and missing files."""
     from visup.teaching.clip_frames import ClipFrames
 
     if not Path(source).exists() or Path(source).is_char_device():
@@ -105,7 +105,7 @@ def _recorded(
     beyond += ["--settings"] if settings_file else []
     if beyond:
         raise SettingsError(
-            f"a recorded run is not perceived again: {', '.join(beyond)} cannot be changed",
+            f"perception is not repeated on a recorded run: {', '.join(beyond)} cannot be changed",
             expected="--task, --rules, --actor or --zones",
         )
     recording = Recording.open(run)

@@ -1,4 +1,4 @@
-"""`visup teach`: show things once, by outlines on the command line, in a file, or in the browser."""
+"""`visup teach`: teach objects by outlines, given on the command line, in a file, or in the browser."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class OutlineCommand(TyperCommand):
-    """A command whose `--outline` takes corners as several words, so that none must be quoted."""
+    """A command whose `--outline` takes corners as separate words, so that no quotes are needed."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As of any command, the corners of each outline joined."""
@@ -38,27 +38,28 @@ def teach(
     frame: Annotated[int, typer.Option(min=0, help="Number of the frame, from 0.")] = 0,
     outline: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=x,y x,y ...", help="A thing's corners, in pixels; repeatable."),
+        typer.Option(
+            metavar="NAME=x,y x,y ...", help="Corners of an outline, in pixels; repeatable."
+        ),
     ] = None,
     brief: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Outlines in a brief.json, with their clips."),
+        Path | None, typer.Option(metavar="FILE", help="Take clips and outlines from a brief.json.")
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="PNG", help="Picture of what was stored (default: beside DB)."),
     ] = None,
     browser: Annotated[
-        bool, typer.Option(help="Open the window; without, only its address is told.")
+        bool, typer.Option(help="Open the page in the browser, or only print its address.")
     ] = True,
 ) -> None:
-    """Show things once, so that visup knows them from then on.
+    """Teach objects by outlining them once, so that visup recognises them from then on.
 
-    Without --outline and --brief a window opens in the browser, in which you draw the outlines.
+    Without --outline or --brief, a page opens in the browser on which you draw the outlines.
     """
     if models is None:
         raise SettingsError(
-            "there is no model database to store what is taught in",
+            "no model database was given in which to store the taught objects",
             expected="--models DB",
             hint="a database that does not exist yet is created",
         )
@@ -85,14 +86,14 @@ def _lesson(
 
     if brief is not None and (outlines or clip is not None):
         raise SettingsError(
-            "a brief already says what is outlined, and in which clip",
-            expected="--brief FILE --models DB, without CLIP and --outline",
+            "a brief already contains the outlines and names the clips",
+            expected="--brief FILE --models DB, without CLIP or --outline",
         )
     if brief is not None:
         return teach_brief(brief, models)
     if clip is None:
         raise SettingsError(
-            "there is nothing to draw outlines in",
+            "no clip was given to draw outlines in",
             expected="CLIP: a video, a folder of images or a picture; or --brief FILE",
         )
     drawn = [(frame, parse_outline(text)) for text in outlines]
@@ -108,7 +109,7 @@ def _in_the_browser(frames: ClipFrames, frame: int, models: Path, browser: bool)
     frames.at(frame)
     with TeachingPage(frames, models, frame) as page:
         echo(f"Draw the outlines at {page.url}")
-        echo("Ctrl-C ends.")
+        echo("Press Ctrl-C to stop.")
         if browser:
             typer.launch(page.url)
         try:

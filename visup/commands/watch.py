@@ -1,4 +1,4 @@
-"""`visup watch` and `visup demo`: supervise a video, tell the story, give the verdict."""
+"""`visup watch` and `visup demo`: supervise a video, print what happens, give the verdict."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from visup.runs.runner import RunProgress
 
 
-LAG_TOLD_S = 0.5
-"""A camera is told to be watched late from so long on: less than that nobody notices."""
+LAG_SHOWN_S = 0.5
+"""Lag behind a live source is shown from this many seconds on; nobody notices less."""
 
 
 def _parse_answers(texts: list[str]) -> dict[int, str]:
@@ -36,27 +36,27 @@ def _parse_answers(texts: list[str]) -> dict[int, str]:
 
 @dataclass(frozen=True, slots=True)
 class Presentation:
-    """What `visup watch` shows of a run, and what its operator said beforehand."""
+    """What `visup watch` shows of a run, and the operator's answers given in advance."""
 
     out: Annotated[Path | None, Option("Run folder (default: runs/NAME).", metavar="DIR")] = None
     quiet: Annotated[bool, Option("Print only the verdict.", "--quiet")] = False
     verbose: Annotated[
-        bool, Option("Print every event, also of objects that nobody knows.", "--verbose")
+        bool, Option("Print every event, including those of unidentified objects.", "--verbose")
     ] = False
-    as_json: Annotated[bool, Option("Print events as JSON, one per line.", "--json")] = False
+    as_json: Annotated[bool, Option("Print every event as JSON, one per line.", "--json")] = False
     answers: Annotated[
         Mapping[int, str],
-        Option("The identity of an object, such as 2=arm.", "--answer", "ID=NAME", _parse_answers),
+        Option("What an object is, such as 2=arm.", "--answer", "ID=NAME", _parse_answers),
     ] = field(default_factory=dict)
     answers_file: Annotated[
-        Path | None, Option("File of such answers, one per line.", "--answers", "FILE")
+        Path | None, Option("File of answers, one per line.", "--answers", "FILE")
     ] = None
 
     def all_answers(self) -> dict[int, str]:
-        """The answers of the file, and those that were given one by one.
+        """The answers from the file and from the command line.
 
         Raises:
-            SettingsError: The file cannot be read, or a line of it is no answer.
+            SettingsError: The file cannot be read, or a line of it is not an answer.
         """
         from visup.runs.operator import read_answers
 
@@ -74,20 +74,20 @@ def watch(
     settings_file: SettingsFile = None,
     resume: Annotated[
         Path | None,
-        typer.Option(metavar="RUN", help="Resume this run, which was stopped or killed."),
+        typer.Option(metavar="RUN", help="Resume a run that was stopped or killed."),
     ] = None,
 ) -> None:
-    """Watch a video and say whether the work goes well.
+    """Watch a video and report whether the work goes well.
 
-    Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input,
-    3 when the task was still in progress, 4 when the source broke off, 130 when you stopped it.
+    Exit code: 0 if the task succeeded, 1 if it failed, was unsafe or could not be followed, 2 for bad
+    input, 3 if the task was still in progress, 4 if the source broke off, 130 if you stopped the run.
     """
     past = None
     if resume:
         past = _interrupted(resume, setting, source, settings_file, shown.get("out"))
         settings = past.settings
     elif source is None:
-        raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
+        raise typer.BadParameter("give a video, or a run with --resume", param_hint="SOURCE")
     else:
         settings = watch_settings(source, setting, settings_file)
     result = run_and_report(settings, Presentation(**shown), RunOptions(**recording), past)
@@ -98,7 +98,7 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
     """The settings of a run, from the options of a command.
 
     Raises:
-        SettingsError: One is not as it should be.
+        SettingsError: A setting is invalid.
     """
     if settings_file:
         from visup.agent.plugins.settings import merge_settings
@@ -111,17 +111,17 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
 
 
 def _interrupted(run: Path, setting: Given, source: str | None, *given: Any) -> InterruptedRun:
-    """The run that goes on; what it is about was settled when it began, but for code of the user's own."""
+    """The run to resume; its settings were fixed when it began, except for behaviours of the user's own."""
     from visup.agent.model.errors import SettingsError
     from visup.redaction import has_secret
     from visup.runs.resume import interrupted_run
 
-    # An address with a password is not recorded whole, so that it is named again.
+    # The password of an address is not recorded, so such an address must be given again.
     address = source if source and has_secret(source) else None
     if any((*given, source != address)) or setting.keys() - {"behaviours", "plugins"}:
         raise SettingsError(
             "a resumed run keeps its settings: --resume takes no source, task or other settings",
-            expected="nothing else but the behaviours that it had (--behaviour, --plugin)",
+            expected="nothing except the behaviours that it had (--behaviour, --plugin)",
             hint=f"visup watch --resume {run}",
         )
     return interrupted_run(run, **setting, source=address)
@@ -134,13 +134,13 @@ def demo(
 ) -> None:
     """Supervise the shipped clip: a capture that fails.
 
-    An arm tries to capture a satellite, and sends it away spinning. Exit code 0 when visup sees that.
+    An arm tries to capture a satellite and knocks it away. Exit code 0 if visup reports the failure.
     """
     from visup.runs.demo import demo_settings, free_folder
 
     folder = out or free_folder(Path("demo-run"))
     result = run_and_report(demo_settings(**setting), Presentation(folder))
-    # The clip shows a failed capture: having seen that is the demo's success.
+    # The clip shows a failed capture, so that verdict is the demo's success.
     from visup.agent import Verdict
 
     raise typer.Exit(0 if result.verdict is Verdict.FAILED else 1)
@@ -152,7 +152,7 @@ def run_and_report(
     options: RunOptions | None = None,
     past: InterruptedRun | None = None,
 ) -> RunResult:
-    """Run, print the narrative as it goes and the verdict last."""
+    """Run, printing the narrative as it goes and the verdict at the end."""
     from rich.markup import escape
 
     from visup.runs.operator import HumanOperator, typed_lines
@@ -165,7 +165,7 @@ def run_and_report(
     narrator = Narrator(console, shown.as_json, narrative)
     folder = past.recording.path.parent if past else fresh_folder(shown.out, settings.source)
     silent = shown.quiet or shown.as_json
-    # Whoever reads events from a pipe does not type answers.
+    # Output to a pipe means that nobody is there to type answers.
     typed = None if silent or not console.is_terminal else typed_lines()
     with progress_bar(console, "watching", shown=not silent) as progress:
         audience = Audience(
@@ -185,7 +185,7 @@ def run_and_report(
 
 @contextmanager
 def no_empty_folder(folder: Path) -> Iterator[None]:
-    """What is refused before its first frame leaves no folder behind."""
+    """A run that is refused before its first frame leaves no empty folder behind."""
     try:
         yield
     except Exception:
@@ -196,15 +196,15 @@ def no_empty_folder(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[RunProgress]:
-    """A progress bar on a terminal; nothing where the output is not one.
+    """A progress bar, if the output is a terminal.
 
     Args:
-        console: Where it is shown.
+        console: Where to show it.
         word: What is being done.
         shown: Whether to show it at all.
 
     Yields:
-        What is to be told frames done and frames in all.
+        A callable that takes the number of frames done and the total.
     """
     from rich import progress
 
@@ -229,13 +229,13 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
 
 
 def pace_text(done: int, took_s: float, lag_s: float | None) -> str:
-    """How fast frames are looked at, and by how much a live source is ahead where that is worth a word.
+    """The processing rate, and how far behind a live source visup is, if noticeably.
 
     >>> pace_text(50, 2.0, 3.0)
     '25.0 frames/s, 3.0 s behind'
     """
     rate = f"{done / took_s:.1f} frames/s" if took_s > 1.0 else ""
-    late = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= LAG_TOLD_S else ""
+    late = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= LAG_SHOWN_S else ""
     return f"{rate}{late}"
 
 

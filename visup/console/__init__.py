@@ -1,7 +1,7 @@
-"""The console: recorded and running runs in a browser, with the reason for every sentence.
+"""The console: recorded and live runs in a browser, with the reason for every statement.
 
-It reads run folders and nothing else, so it costs an agent at work only what reading its journal costs.
+It only reads run folders, so a running agent is affected no more than by any reader of its journal.
 `library.py` finds runs, `run_view.py` reads one, `tracks.py` lays it out over time, `drawing/` draws,
-`reasoning/` asks why and what if, `access.py` says who may look, `pages/` is what is seen,
+`reasoning/` answers why and what if, `access.py` controls access, `pages/` is the user interface,
 `server.py` serves it.
 """

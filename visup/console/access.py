@@ -1,4 +1,4 @@
-"""Who may look, and who may act: a guard before every request, page, picture and socket of the console.
+"""Access control for every request, page, picture and socket of the console.
 
 - The console listens on this machine alone unless told otherwise.
 - Whoever asks must know a token. The address that is printed holds it once; from then on a cookie does.
@@ -34,7 +34,7 @@ LONGEST_BODY = 2**20
 
 
 class ConsoleRole(StrEnum):
-    """What somebody may do."""
+    """A role: what its holder may do."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -42,7 +42,7 @@ class ConsoleRole(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who gets in.
+    """Access by tokens and host names.
 
     Attributes:
         operator: Token of those who may act.
@@ -55,7 +55,7 @@ class Access:
     hosts: tuple[str, ...] = LOOPBACK
 
     def role(self, token: str) -> ConsoleRole | None:
-        """Who has a token, or None."""
+        """The role of a token, or None."""
         given = token.encode()
         if secrets.compare_digest(given, self.operator.encode()):
             return ConsoleRole.OPERATOR
@@ -69,7 +69,7 @@ class AccessGuard:
 
     Args:
         app: The application.
-        access: Who gets in.
+        access: Access by tokens and host names.
     """
 
     def __init__(self, app: Application, access: Access) -> None:
@@ -94,13 +94,13 @@ class AccessGuard:
             await self._app(scope, receive, send)
 
     def _fault(self, headers: Mapping[str, str]) -> str:
-        """Why a request is refused whoever makes it; empty when it is not."""
+        """Why a request is refused regardless of its token; empty if it is not."""
         host = headers.get("host", "")
         if _name(host) not in self._access.hosts:
             return "This console is not known by that name."
         origin = headers.get("origin")
         if origin is not None and urlsplit(origin).netloc != host:
-            return "Another page asked for this; only the console's own pages may."
+            return "This request came from another page; only the console's own pages may make it."
         length = headers.get("content-length", "0")
         if not length.isdecimal() or int(length) > LONGEST_BODY:
             return "This request is too long."

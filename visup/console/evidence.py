@@ -35,7 +35,7 @@ class AlertEvidence:
 
 
 def evidence_of(run: Path, alert: int) -> AlertEvidence:
-    """What is kept of an alert of a run; nothing where nothing is.
+    """The evidence of an alert of a run, if any.
 
     Args:
         run: Folder of the run.

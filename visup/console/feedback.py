@@ -1,4 +1,4 @@
-"""What people said of alerts: seen, right, false alarm, muted; kept beside the journal, one line each.
+"""Feedback on alerts: seen, right, false alarm, muted; stored beside the journal, one line each.
 
 Nothing is ever changed in the file: the last line on an alert counts, and the ones before tell who said
 what, and when.
@@ -26,7 +26,7 @@ LARGEST_FILE = 2**22
 
 
 class Opinion(StrEnum):
-    """What is said of an alert."""
+    """Kinds of feedback."""
 
     SEEN = "seen"
     RIGHT = "right"
@@ -36,7 +36,7 @@ class Opinion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AlertFeedback:
-    """What somebody said of one alert.
+    """Feedback on one alert.
 
     Attributes:
         alert: Its number within the run.
@@ -79,12 +79,12 @@ def _feedback(line: Mapping[str, Any]) -> AlertFeedback:
 
 
 def say(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFeedback:
-    """Keep what somebody says of an alert.
+    """Store feedback on an alert.
 
     Args:
         folder: Of the run.
         alert: The alert.
-        opinion: What is said; to mute an alert needs a reason.
+        opinion: What is said; muting an alert needs a reason.
         note: Why.
 
     Raises:
@@ -93,7 +93,7 @@ def say(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFe
     """
     note = " ".join(note.split())
     if opinion is Opinion.MUTED and not note:
-        raise SettingsError("to mute an alert needs a reason", expected="a few words")
+        raise SettingsError("muting an alert needs a reason", expected="a few words")
     if len(note) > LONGEST_NOTE:
         raise SettingsError("this note is too long", expected=f"at most {LONGEST_NOTE} letters")
     told = AlertFeedback(alert.id, alert.kind, opinion, note, time.time())

@@ -120,7 +120,7 @@ def _written(run: Path) -> float | None:
 
 
 def run_key(folder: Path) -> str:
-    """What stands for a run in addresses."""
+    """The key of a run in URLs."""
     name = os.fsencode(folder.resolve())
     return hashlib.sha256(name).hexdigest()[:KEY_LETTERS]
 

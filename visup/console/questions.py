@@ -1,4 +1,4 @@
-"""What a run asked its operator, and had not been told yet at a moment."""
+"""Questions of a run to its operator that are open at a given time."""
 
 from __future__ import annotations
 

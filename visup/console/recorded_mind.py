@@ -93,7 +93,7 @@ def _belief(
 
 
 def _outline_lost(line: Mapping[str, Any], size: tuple[int, int]) -> Region:
-    """Where something was last seen: its box, since the outline is not kept."""
+    """Where something was last seen: its box, since the outline is not recorded."""
     x, y, w, h = (int(n) for n in line["bbox"])
     corners = [(x, y), (x + w - 1, y), (x + w - 1, y + h - 1), (x, y + h - 1)]
     return Region(

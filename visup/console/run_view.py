@@ -68,7 +68,7 @@ class RunView:
         self._lock = Lock()
 
     def refreshed(self) -> RunView:
-        """This run, read anew if it has grown."""
+        """This run, read again if it has grown."""
         ends = self._run.recording.first_and_last()
         if ends is None or (self.frames and ends[1] == self.frames[-1]):
             return self
@@ -171,7 +171,7 @@ class RunView:
 
     def _moment(self, number: int) -> tuple[Mind, Observation]:
         if not 0 <= number < len(self.frames):
-            raise OutputError("nothing was judged in this run yet", where=str(self.folder))
+            raise OutputError("nothing has been processed in this run yet", where=str(self.folder))
         with self._lock:
             if number not in self._moments:
                 told, seen = self._run.recording.step_at(self.frames[number])
@@ -182,11 +182,11 @@ class RunView:
             return self._moments[number]
 
     def looks(self, number: int, object_id: int) -> tuple[Hypothesis, ...]:
-        """What an object was last found to look like, the most alike first; empty where nobody looked."""
+        """The latest matches of an object, best first; empty if there are none."""
         return self.last_look(number, object_id)[1]
 
     def last_look(self, number: int, object_id: int) -> tuple[int | None, tuple[Hypothesis, ...]]:
-        """The moment at which somebody last looked what an object is, or None, and what was found."""
+        """The last time at which an object was matched, or None, and the result."""
         for at in range(number, max(-1, number - LOOKED_BACK), -1):
             mind, seen = self._moment(at)
             belief = mind.objects.get(object_id)

@@ -98,7 +98,7 @@ def serve_console(
 
     Args:
         state: What it shows.
-        access: Who gets in.
+        access: Access by tokens and host names.
         host: Address to listen at.
         port: Port; 0 for any that is free.
         ready: Told the address, with the token, once it listens.

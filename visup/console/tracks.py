@@ -1,4 +1,4 @@
-"""What happened in a run, laid out over time: stages, alerts, who was in view, camera health."""
+"""A run laid out over time: stages, alerts, objects in view, camera health."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOST_OBJECTS = 40
 
 @dataclass(frozen=True, slots=True)
 class TrackSpan:
-    """A time during which something was so.
+    """A span of time on a track.
 
     Attributes:
         start: Seconds.
@@ -67,7 +67,7 @@ def tracks_of(
     seconds: float,
     actors: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> tuple[TimelineTrack, ...]:
-    """The rows of a timeline, from what was told.
+    """The rows of a timeline, from the events.
 
     Args:
         events: Of the run, by time.
@@ -119,7 +119,7 @@ def _stage_changes(events: Sequence[Event], *, several: bool) -> Iterator[Change
 
 
 def _status(event: Event) -> str | None:
-    """The status that an event of a stage tells, or None."""
+    """The status in an event of a stage, or None."""
     status = event.data.get("status") if event.kind.startswith("stage_") else None
     return str(status) if status in _STATUSES else None
 

@@ -1,1 +1,1 @@
-"""Files that ship with visup: the demo clip, what is true of it, and its model database."""
+"""Files that ship with visup: the demo clip, its ground truth and its model database."""

@@ -1,4 +1,4 @@
-"""The report of a run: data collected while it goes on, annotated pictures and video, one page to read.
+"""The report of a run: data collected during the run, annotated pictures and video, a page to read.
 
 Read in this order: `records` (what a report is made of), `bounded_buffers`, `moments` and `collector`
 (collected during a run), `annotate`, `crops` and `video` (pictures). The folder `page` makes the HTML

@@ -188,7 +188,7 @@ def _banner(image: Image, y: int, alert: Alert, more: str, scale: Scale) -> int:
 
 
 def _triangle(image: Image, centre: tuple[int, int], size: int, colour: Rgb, on: Rgb) -> None:
-    """A warning sign: severity must not be told by colour alone."""
+    """A warning sign, since severity must not be shown by colour alone."""
     (x, y), r = centre, size * 0.55
     corners = np.array([[x, y - r], [x + r, y + r * 0.8], [x - r, y + r * 0.8]])
     cv2.fillPoly(image, [np.round(corners).astype(np.int32)], colour[::-1], cv2.LINE_AA)
@@ -226,7 +226,7 @@ def _stages(image: Image, mind: Mind, scale: Scale) -> int:
 def _chips(
     image: Image, stages: tuple[StageBelief, ...], at: tuple[int, int], right: int, scale: Scale
 ) -> None:
-    """One chip for each stage, its colour and a word saying how it stands."""
+    """One chip for each stage, with a colour and a word for its status."""
     x, y = at
     each = (right - x - scale.pad) // max(1, len(stages))
     for stage in stages:

@@ -44,7 +44,7 @@ class Thinned(Generic[T]):
 
 @dataclass(slots=True)
 class SpanRecorder:
-    """Turns values that are told step by step into spans of time.
+    """Converts values reported step by step into spans of time.
 
     Attributes:
         most: How many closed spans may be kept; later ones are then dropped.

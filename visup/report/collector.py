@@ -1,4 +1,4 @@
-"""Keeps of a run, while it goes on, what its report will need; `Collector.add` is an observer."""
+"""Collects data for the report during a run; `Collector.add` is an observer."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ENDS_WEIGHT = 2
 
 @dataclass(frozen=True, slots=True)
 class ReportLimits:
-    """How much of a run is kept, whatever its length.
+    """Limits on the data kept of a run, whatever its length.
 
     Attributes:
         samples: Moments of the series.
@@ -134,7 +134,7 @@ class Collector:
         return {n: getattr(self, n) for n in names} | {"pictures": self._pictures.items()}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Go on from what a collector with the same limits kept."""
+        """Restore the state of a collector with the same limits."""
         for name, value in state.items():
             if name != "pictures":
                 setattr(self, name, value)

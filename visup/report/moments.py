@@ -81,7 +81,7 @@ def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:
 
 
 def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
-    """What the timelines follow: stages, how pairs move, who is in view."""
+    """What the timelines show: stages, relations of pairs, objects in view."""
     now: dict[tuple[str, ...], str] = {}
     for task in mind.tasks:
         now |= {("stage", task.task, s.stage): s.status.value for s in task.stages}

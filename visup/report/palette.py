@@ -1,4 +1,4 @@
-"""Colours that tell objects, severities and states apart, also for the colour-blind.
+"""Colours that distinguish objects, severities and states, also for the colour-blind.
 
 The object colours are those of Okabe and Ito ("Color Universal Design", 2008), the first ones
 chosen to stand out both on a dark sky and on a light page.

@@ -1,4 +1,4 @@
-"""The state of a run beside its journal: from it a run that was killed goes on within seconds."""
+"""The checkpoint beside the journal of a run, from which a killed run resumes within seconds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded runs as what tasks are learned from: the minds of a run, reasoned anew from its journal."""
+"""Recorded runs as training data for tasks: the minds of a run, replayed from its journal."""
 
 from __future__ import annotations
 

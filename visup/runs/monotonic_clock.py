@@ -1,4 +1,4 @@
-"""Time only goes on: what reasons relies on it, whatever a source's clock does."""
+"""A monotonic clock for reasoning, whatever the clock of a source does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from visup.agent import AlertCondition, Frame, Severity
-from visup.agent.cycle.own_troubles import CLOCK_JUMPED
+from visup.agent.cycle.system_alerts import CLOCK_JUMPED
 
 NAME = "clock"
 

@@ -1,4 +1,4 @@
-"""The operator of a run: asked who is who, answers beforehand, from a file, or on the terminal.
+"""The operator of a run, who identifies objects in advance, from a file, or on the terminal.
 
 Nothing waits for an answer: lines are read in a thread of their own, and what was typed by the end of
 a step is taken up then.

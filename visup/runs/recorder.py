@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from visup.agent import AlertCondition, Frame, Severity, TaskBelief
-from visup.agent.cycle.own_troubles import NOT_RECORDED
+from visup.agent.cycle.system_alerts import NOT_RECORDED
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, JournalLimits

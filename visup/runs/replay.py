@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import Verdict
-from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
+from visup.agent.cycle.system_alerts import grave_kinds, verdict_without_task
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
@@ -34,7 +34,7 @@ STAGE = "stage_"
 
 @dataclass(frozen=True, slots=True)
 class Transcript:
-    """What a run told.
+    """The events of a run.
 
     Attributes:
         events: As lines of `events.jsonl`.
@@ -82,7 +82,7 @@ class TranscriptDiff:
 
 @dataclass(slots=True)
 class _EventCollector:
-    """Gathers what a run tells."""
+    """Collects the events of a run."""
 
     events: list[Line] = field(default_factory=list)
     steps: int = 0
@@ -159,14 +159,14 @@ def replay(
 
 
 def recorded_transcript(recording: Recording) -> Transcript:
-    """What a recorded run told."""
+    """The events of a recorded run."""
     verdict = recording.facts().get("verdict")
     told = verdict if isinstance(verdict, str) else None
     return Transcript(tuple(recording.events()), told, recording.count())
 
 
 def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
-    """What the second run tells that the first does not, and the other way round.
+    """Events in only one of two runs.
 
     Events are the same when all that is told of them is. Faults of behaviours and of
     the surroundings count like any other: they are part of what was perceived.

@@ -56,7 +56,7 @@ class ReplayReport:
             except VisupError:
                 self._waiting = None
         if self._waiting is None:
-            self.notes = ("The video is not there any more: pictures show outlines alone.",)
+            self.notes = ("The video is no longer available: pictures show outlines only.",)
         return self
 
     def __exit__(

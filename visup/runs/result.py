@@ -1,4 +1,4 @@
-"""How a run ended, and what it says to whoever started it."""
+"""How a run ended, and its exit code."""
 
 from __future__ import annotations
 

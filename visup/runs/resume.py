@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from visup.agent import Frame, Observation, Severity, Verdict
 from visup.agent.cycle.agent import Agent
-from visup.agent.cycle.own_troubles import verdict_without_task
+from visup.agent.cycle.system_alerts import verdict_without_task
 from visup.agent.model.errors import OutputError, SettingsError, SourceError
 from visup.agent.model.step import Step
 from visup.agent.plugins.factory import MODULE_PATH
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class InterruptedRun:
-    """What is known of the run that goes on.
+    """Facts about the run to resume.
 
     Attributes:
         recording: Its journal.
@@ -57,14 +57,14 @@ class InterruptedRun:
     answers: Mapping[int, str]
 
     def check_unchanged(self) -> None:
-        """See that nobody has gone on with the run since it was read.
+        """Check that no other process has resumed the run since it was read.
 
         Raises:
             OutputError: Somebody has.
         """
         if self.recording.count() != self.steps:
             raise OutputError(
-                "another process has gone on with this run meanwhile",
+                "another process has resumed this run in the meantime",
                 where=str(self.recording.path.parent),
                 hint="resume it again, if it is not over",
             )
@@ -98,13 +98,13 @@ def interrupted_run(
         raise OutputError("nothing was recorded of this run", where=str(run), hint="begin it anew")
     if facts.get("ended") == "rolled":
         raise OutputError(
-            "this run is over: it goes on in another one",
+            "this run is complete: it continues in another one",
             where=str(run),
             hint=f"that is {run.parent / str(facts.get('next_run'))}",
         )
     if facts.get("ended") == "complete":
         raise OutputError(
-            "this run is over: its source was seen to the end",
+            "this run is complete: its source was watched to the end",
             where=str(run),
             hint=f"visup replay {run}",
         )
@@ -146,9 +146,9 @@ def _with_named_code(
         # Quoted: a folder's words must not become commands where the hint is pasted.
         again = shlex.join(["visup", "watch", "--resume", str(run), *wanted])
         raise SettingsError(
-            "this run had behaviours of its own, which are code: a run folder cannot have code run"
+            "this run used custom behaviours, which are code; code is never run from a run folder"
             if wanted
-            else "this run had no behaviours of its own",
+            else "this run used no custom behaviours",
             where=str(run),
             expected=shlex.join(wanted) or "neither --behaviour nor --plugin",
             hint=f"if you trust them, name them again: {again}" if wanted else None,
@@ -271,7 +271,7 @@ def catch_up(
     if differing:
         notes.append(
             f"{differing} frames look different now than when they were recorded: "
-            "behaviours may not be as they were."
+            "behaviours may have changed."
         )
     last = past.recording.first_and_last()
     begin = max(after, last[1] if last else -1)

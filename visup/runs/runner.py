@@ -91,7 +91,7 @@ def supervised(
     options: RunOptions | None = None,
     past: InterruptedRun | None = None,
 ) -> Generator[Step, None, RunResult]:
-    """As `supervise`, one step each time that it is asked for; the source is open when it returns.
+    """As `supervise`, but as a generator of steps; the source is open when it returns.
 
     A KeyboardInterrupt thrown in ends the run as stopped by the user, with verdict and report; a
     generator that is merely closed leaves the run as one that was killed, to be resumed.
@@ -243,7 +243,7 @@ class _Run:
         self._sinks.alerts.links = keeper.links
 
     def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
-        """Say something before the first frame; who is told nothing then finds it among the notes."""
+        """Give a warning before the first frame; without an audience it is added to the notes."""
         if notice:
             notice(text)
         else:
@@ -281,7 +281,7 @@ class _Run:
             self._stopped = True
 
     def _roll(self, step: Step, old: Recorder, audience: Audience) -> None:
-        """Begin the next run when it is time to: the agent goes on, its books are new."""
+        """Start the next run when it is due: the same agent, with a new journal."""
         if not (audience.places and self._roll_over.due(step.time, old.journal.size)):
             return
         try:
@@ -289,7 +289,7 @@ class _Run:
         except OutputError as fault:
             self._roll_over.failed(step.time)
             if audience.notice:
-                audience.notice(f"the next run cannot be begun: {fault}")
+                audience.notice(f"the next run cannot be started: {fault}")
             return
         mind, before = self._agent.mind, self._checkpoints
         verdict = final_verdict(mind) if mind.tasks else self._alarms.verdict
@@ -307,7 +307,7 @@ class _Run:
     def _next_books(
         self, step: Step, old: Recorder, places: RunPlaces
     ) -> tuple[Recorder, CheckpointWriter]:
-        """The journal and the checkpoint of the next run, from which it could already go on.
+        """The journal and the checkpoint of the next run, from which it can already be resumed.
 
         Raises:
             OutputError: They cannot be written.
@@ -379,7 +379,7 @@ class _Run:
         )
 
     def _attending(self, operator: HumanOperator, past: InterruptedRun | None) -> Observer:
-        """The operator, who does not say again what was taken up before the run was killed."""
+        """The operator, without answers that took effect before the run was killed."""
         if self._recorder and not past:
             self._recorder.journal.note(answers=operator.answers)
         given = {**past.answers, **operator.answers} if past else operator.answers

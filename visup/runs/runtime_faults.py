@@ -25,7 +25,7 @@ FaultSource = Callable[[], Iterable[AlertCondition]]
 
 
 class RuntimeFaults(Stateless):
-    """A behaviour that asks parts of the product for their faults before each step."""
+    """A behaviour that collects the faults of other components before each step."""
 
     contract = Contract("runtime_faults", gives=(RUNTIME_FAULT,))
 

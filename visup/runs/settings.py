@@ -1,7 +1,7 @@
-"""What a run is given: the settings of `visup watch`, checked before anything starts.
+"""The settings of a run (the options of `visup watch`), checked before anything starts.
 
 Each setting is described once, here: its annotation says how it is written on the command line, and
-`visup/commands/options.py` makes the options of all commands from that.
+`visup/commands/options.py` builds the options of all commands from it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Annotated, Any
 from visup.agent.model.errors import SettingsError
 
 VIEWS_AT_END = ("unknown", "weak", "strong")
-"""What may become of rules that are not decided when a run ends; as of `visup.rules`."""
+"""How rules that are undecided when a run ends may count; as in `visup.rules`."""
 LARGEST_EVIDENCE = 20.0
-"""With so much a single vote settles who is who."""
+"""With this weight a single vote decides an identity."""
 SOURCE_REDACTED = "source_without_secret"
-"""The fact of a recorded run that its source had a password, which is not recorded."""
+"""Key of a recorded run that says its source had a password, which was not recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +26,12 @@ class Option:
     """How a setting is given on the command line.
 
     Attributes:
-        help: What it is, one sentence.
-        flag: Such as `--task`; the name of the setting when left out.
-        metavar: What stands for its value in the help.
-        parse: The setting from the texts that were given, where it is not simply them.
+        help: One sentence for `--help`.
+        flag: Such as `--task`; by default made from the name of the setting.
+        metavar: Placeholder for the value in the help.
+        parse: Converts the texts given into the setting; None to take them as they are.
         at_least: The smallest value, or None.
-        complete: Gives what may stand for its value, from its beginning, to a shell that completes.
+        complete: Completions of a value that has been begun, for the shell.
     """
 
     help: str
@@ -43,7 +43,7 @@ class Option:
 
 
 def complete_task(begun: str) -> list[str]:
-    """Shipped tasks and task files that a word may become."""
+    """Shipped tasks and task files that complete a word."""
     from visup.tasks import shipped_tasks
 
     place = Path(begun)
@@ -53,7 +53,7 @@ def complete_task(begun: str) -> list[str]:
 
 
 def complete_preset(begun: str) -> list[str]:
-    """Presets that a word may become."""
+    """Presets that complete a word."""
     from visup.runs.inputs.presets import PRESETS
 
     return [name for name in PRESETS if name.startswith(begun)]
@@ -94,10 +94,10 @@ def _parse_plugin_settings(texts: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class WatchSettings:
-    """All that a supervised run depends on besides the video itself.
+    """Everything a supervised run depends on besides the video itself.
 
     Raises:
-        SettingsError: A value is out of its range.
+        SettingsError: A value is out of range.
     """
 
     source: str
@@ -117,15 +117,16 @@ class WatchSettings:
     early: Annotated[
         bool,
         Option(
-            "Tell what rules say of the future as soon as it is decided, not when their windows are over.",
+            "Report rules about the future as soon as they are decided, rather than when their time "
+            "window ends.",
             "--early",
         ),
     ] = False
     at_end: Annotated[
         str,
         Option(
-            "What becomes of rules that are not decided at the end: unknown, weak (they count as true) "
-            "or strong (as false).",
+            "How rules that are still undecided at the end count: unknown, weak (as true) or strong "
+            "(as false).",
             "--at-end",
             "VIEW",
         ),
@@ -133,13 +134,13 @@ class WatchSettings:
     actors: Annotated[
         Mapping[str, tuple[str, ...]],
         Option(
-            "The model that an actor of the task looks like.", "--actor", "NAME=MODEL", parse_actors
+            "Which model an actor of the task looks like.", "--actor", "NAME=MODEL", parse_actors
         ),
     ] = field(default_factory=dict)
     bystanders: Annotated[
         tuple[str, ...],
         Option(
-            "A model, or a taught thing, that plays no part in the task and is left alone.",
+            "A model or taught object that plays no part in the task and is ignored by it.",
             "--bystander",
             "NAME",
         ),
@@ -149,76 +150,82 @@ class WatchSettings:
         Option("A behaviour of your own: FILE.py or package.module:Class.", "--behaviour", "FILE"),
     ] = ()
     plugins: Annotated[
-        tuple[str, ...], Option("Name of an installed behaviour to add.", "--plugin", "NAME")
+        tuple[str, ...], Option("Add an installed behaviour, by name.", "--plugin", "NAME")
     ] = ()
     plugin_settings: Annotated[
         Mapping[str, Mapping[str, Any]],
         Option(
-            "A setting of a behaviour of your own.",
+            "A setting of a behaviour.",
             "--set",
             "NAME.KEY=VALUE",
             _parse_plugin_settings,
         ),
     ] = field(default_factory=dict)
     isolate: Annotated[
-        tuple[str, ...], Option("Run this behaviour in a process of its own.", metavar="NAME")
+        tuple[str, ...], Option("Run this behaviour in its own process.", metavar="NAME")
     ] = ()
     budgets: Annotated[
-        bool, Option("Give up behaviours that exceed their budget; for live sources.", "--budgets")
+        bool,
+        Option("Stop behaviours that exceed their time budget; for live sources.", "--budgets"),
     ] = False
     realtime: Annotated[
         bool | None,
-        Option("Drop frames when visup cannot keep up, and report it (default: for live sources)."),
+        Option(
+            "Drop frames when visup cannot keep up, and report it (default: live sources only)."
+        ),
     ] = None
     every: Annotated[int, Option("Use every n-th frame.")] = 1
     pace: Annotated[
         float | None,
-        Option("So many frames a second are enough: of a faster source others are left out."),
+        Option("Frames per second that are enough; the surplus of a faster source is skipped."),
     ] = None
-    fps: Annotated[float | None, Option("Frame rate, where the source has none.")] = None
+    fps: Annotated[float | None, Option("Frame rate, if the source does not state one.")] = None
     fov_vertical_deg: Annotated[
         float | None, Option("Vertical field of view of the camera, degrees.", "--fov")
     ] = None
     zones: Annotated[
         Path | None,
-        Option("File with zones that rules can name (see docs/formats.md).", metavar="FILE"),
+        Option("File of zones that rules can refer to (see docs/formats.md).", metavar="FILE"),
     ] = None
     signals: Annotated[
         tuple[Path | str, ...],
         Option(
-            "Signals that are not from the image: a table (CSV with a column `time`), or "
-            "mqtt:HOST/TOPIC of a broker.",
+            "Signals from elsewhere than the image: a table (CSV with a column `time`), or an MQTT "
+            "topic (mqtt:HOST/TOPIC).",
             "--signal",
             "FILE",
         ),
     ] = ()
     patience_s: float = 60.0
-    """How long a camera or stream that drops is tried again, seconds."""
+    """How long to keep reconnecting to a camera or stream that has dropped, seconds."""
     rest_s: float | None = None
-    """Seconds between two looks for motion while nothing changes; None to look at each frame."""
+    """Seconds between two searches for motion while nothing changes; None to search every frame."""
     detections: Annotated[
         Path | None,
         Option(
-            "Boxes of a detector in place of visup's own eyes: a MOT or COCO file, or a YOLO network "
-            "(.onnx).",
+            "Take boxes from a detector instead of visup's motion segmentation: a MOT or COCO file, "
+            "or a YOLO network (.onnx).",
             metavar="FILE",
         ),
     ] = None
     motion: Annotated[
-        bool, Option("See what moves; without it a behaviour of yours gives the regions.")
+        bool, Option("Segment motion; with --no-motion a behaviour of yours supplies the regions.")
     ] = True
     preset: Annotated[
         str | None,
         Option(
-            "Rules, memory and pace for a kind of scene: traffic, cell, orbit or bench "
+            "Rules, memory and frame rate for a kind of scene: traffic, cell, orbit or bench "
             "(see `visup presets`).",
             complete=complete_preset,
         ),
     ] = None
     vote_evidence: float | None = None
-    """How much a vote for an identity tells, in units of log likelihood; None for what visup ships with."""
+    """Weight of a vote for an identity, in log-likelihood units; None for the default."""
     attention: Annotated[
-        bool, Option("Match well-known objects less often, which saves time.", "--attention")
+        bool,
+        Option(
+            "Save time by matching objects less often once their identity is sure.", "--attention"
+        ),
     ] = False
 
     def __post_init__(self) -> None:
@@ -232,7 +239,7 @@ class WatchSettings:
             raise SettingsError(f"--fps is {self.fps}", expected="more than 0, at most 1000")
         if not (self.motion or self.behaviours or self.plugins or self.detections):
             raise SettingsError(
-                "nothing would see: --no-motion leaves seeing to another behaviour, and there is none",
+                "nothing would supply regions: --no-motion needs another behaviour that does",
                 hint="add --behaviour FILE, --plugin NAME or --detections FILE",
             )
         told = self.vote_evidence
@@ -252,14 +259,14 @@ class WatchSettings:
 
 @dataclass(frozen=True, slots=True)
 class EvidenceOptions:
-    """What is kept of each alert.
+    """What to keep as evidence of each alert.
 
     Attributes:
-        before_s: Seconds of its clip before it.
-        after_s: Seconds of its clip after it.
-        memory_mb: Memory that frames before an alert may take, megabytes.
-        link: Address of the folder of all runs of the camera, for links; None for names of files.
-        least_free_bytes: It is told when less is free on the disk.
+        before_s: Seconds of video to keep before the alert.
+        after_s: Seconds of video to keep after the alert.
+        memory_mb: Memory that buffered frames may take, megabytes.
+        link: Address of the folder of all runs of the camera, for links; None for file names.
+        least_free_bytes: A warning is given when the disk has less free space than this.
     """
 
     before_s: float = 8.0
@@ -278,39 +285,43 @@ class RunOptions:
     """Whether to write the report."""
     sinks: Annotated[
         tuple[str, ...],
-        Option("Also send alerts there: jsonl:-, webhook:URL, ...", "--sink", "KIND:PLACE"),
+        Option("Also send alerts to this sink: jsonl:-, webhook:URL, ...", "--sink", "KIND:PLACE"),
     ] = ()
     keep_gb: Annotated[
         float | None,
-        Option("How much of the journal to keep, in gigabytes (default: all).", at_least=0.0),
+        Option("Keep at most this much of the journal, in gigabytes (default: all).", at_least=0.0),
     ] = None
     state_every_s: Annotated[
         float,
         Option(
-            "Seconds between checkpoints to resume from; 0 for none.", "--state-every", at_least=0.0
+            "Seconds between the checkpoints that a run can resume from; 0 for none.",
+            "--state-every",
+            at_least=0.0,
         ),
     ] = 30.0
     camera: Annotated[
         str | None,
-        Option("Name of the camera: it and the host then stand in every record.", metavar="NAME"),
+        Option(
+            "Name of the camera; every record then carries it and the host name.", metavar="NAME"
+        ),
     ] = None
     webhook_headers: Mapping[str, str] = field(default_factory=dict, repr=False)
-    """Headers of each request of a webhook."""
+    """Headers sent with each webhook request."""
     webhook_key: str | None = field(default=None, repr=False)
-    """Key by which what webhooks send is signed."""
+    """Key that signs webhook requests."""
     span: tuple[int, int | None] = (0, None)
-    """Numbers of the first frame that is watched, and of the first that no longer is; None for no end."""
+    """Frames to watch, as a half-open range of indices; None for no end."""
     closing_s: float = 5.0
-    """How long each sink may take to deliver what is left when the run ends, seconds."""
+    """How long each sink may take to deliver pending alerts when the run ends, seconds."""
     evidence: EvidenceOptions | None = None
-    """What is kept of each alert; None for nothing."""
+    """What to keep as evidence of each alert; None for nothing."""
     run_s: float | None = None
-    """A run that goes on is followed by the next after so many seconds of the source."""
+    """Start a new run after this many seconds of the source."""
     run_bytes: int | None = None
-    """So is one whose journal has become larger."""
+    """Start a new run when the journal exceeds this size."""
     deliveries: Path | None = None
-    """File in which alerts wait until sinks take them, also over a kill; None to drop what they do not."""
+    """Queue file in which alerts wait until sinks accept them, which survives a kill; None to drop alerts."""
     quiet: tuple[str, ...] = ()
     """Hours in which only critical alerts go to sinks, such as '22:00-06:00'."""
     timezone: str | None = None
-    """That of quiet hours; None for that of the machine."""
+    """Time zone of the quiet hours; None for that of the machine."""

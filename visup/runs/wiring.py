@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from visup.agent import Behaviour, Contract, Frame, Mind, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
+from visup.agent.cycle.system_alerts import grave_kinds, verdict_without_task
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
@@ -275,7 +275,7 @@ def _behaviours(
 
 
 def _places(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
-    """Actors that are told by their place, and by no model: where they are in the first picture."""
+    """Actors that are identified by their place and not by a model: where they are in the first picture."""
     return {
         a.name: c.at
         for t in tasks
@@ -313,7 +313,7 @@ def _reasoners(
 
 
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
-    """A zone that nobody has drawn could never be seen to be entered or left."""
+    """Check that every zone used is drawn somewhere."""
     for task in tasks:
         if needs_ground(task) and task.ground is None:
             raise SettingsError(

@@ -1,4 +1,4 @@
-"""Sinks: alerts and figures for other programs, outside of the cycle.
+"""Sinks: alerts and metrics for other programs, outside the cycle.
 
 Read `outbox.py` (how nothing waits for a sink), `insistent_outbox.py` with `delivery_log.py` (how nothing is
 lost where a service watches), then `lines.py` (files), `webhook.py`, and

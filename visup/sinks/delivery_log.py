@@ -48,7 +48,7 @@ class DeliveryLog:
             self._db.executescript(SCHEMA)
         except sqlite3.Error as fault:
             raise OutputError(
-                f"what sinks have not taken cannot be kept ({fault})",
+                f"the queue of undelivered alerts cannot be kept ({fault})",
                 where=str(path),
                 hint="check that the folder is writable and has room, or delete this file",
             ) from fault

@@ -18,7 +18,7 @@ LOOK_S = 0.5
 
 
 class InsistentOutbox:
-    """Sends what waits for one sink, the oldest first, in a thread of its own.
+    """Sends pending records to one sink, oldest first, in its own thread.
 
     A sink that is down is tried again after 1 s, then 2, 4, ... up to 30. A record that it refuses for good
     is counted and left out: it must not hold up all others.

@@ -1,4 +1,4 @@
-"""What sinks for alerts are told: one record for each alert that opens or closes, and the verdict."""
+"""The records for alert sinks: one for each alert that opens or closes, and one for the verdict."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class AlertSender:
             self._send(records, step.frame_index)
 
     def late(self, step: Step) -> None:
-        """Send what a step told that was recorded by a process that was killed before it could send it."""
+        """Send the records of a step that a process recorded but was killed before sending."""
         if self._log and step.alerts and step.frame_index > self._log.told_frame:
             records = [self._record_of(alert) for alert in self.gate(step)]
             self._send(records, step.frame_index)

@@ -50,7 +50,7 @@ class Notification:
             title=title_of(record), body=body_of(record), attach=picture if there else None
         )
         if not taken:
-            raise DeliveryError("the message was not taken")
+            raise DeliveryError("the message was not accepted")
 
     def close(self) -> None:
         """There is nothing to close."""

@@ -12,7 +12,7 @@ from queue import Empty, Full, Queue
 from typing import Any, Protocol
 
 from visup.agent import AlertCondition, Severity
-from visup.agent.cycle.own_troubles import SINK_FAILED
+from visup.agent.cycle.system_alerts import SINK_FAILED
 
 MOST_WAITING = 1000
 CLOSING_S = 5.0

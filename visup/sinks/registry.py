@@ -85,7 +85,7 @@ class Sinks:
         ]
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Leave what a step tells in the outboxes."""
+        """Put the records of a step into the outboxes."""
         self.alerts(step, frame)
         for observer in self._observers:
             observer(step, frame)
@@ -168,7 +168,7 @@ _OF_STEPS: dict[str, Callable[[Step, Frame], object]] = {
 
 
 def _outbox(sink: Sink, number: int, log: DeliveryLog | None) -> Outbox | InsistentOutbox:
-    """Two sinks may be shown by the same name: their place in the list tells them apart."""
+    """The name of an outbox, made unique by its position if two sinks have the same."""
     if log is None or sink.name.partition(":")[0] in _OF_STEPS:
         return Outbox(sink, _room(sink))
     return InsistentOutbox(sink, f"{number} {sink.name}", log)

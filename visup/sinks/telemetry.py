@@ -111,7 +111,7 @@ def _providers(place: str) -> tuple[Any, Any]:
 
 
 def service_resource() -> Any:
-    """Who tells: the service `visup` with its version, unless the environment says otherwise.
+    """The resource: service `visup` with its version, unless the environment says otherwise.
 
     `OTEL_SERVICE_NAME` and `OTEL_RESOURCE_ATTRIBUTES` go before, as they do everywhere.
     """

@@ -147,7 +147,7 @@ class Webhook:
 
 
 def _shown(url: str) -> str:
-    """An address as it may be told: chat services keep their keys in the path."""
+    """An address safe to print: chat services put their keys in the path."""
     told = parse_url(url)
     port = f":{told.port}" if told.port else ""
     beyond = "/..." if (told.path or "/") != "/" or told.query else ""

@@ -1,4 +1,4 @@
-"""How a server knows that a record comes from here: headers of its own, and a signature of the body."""
+"""Authentication of webhooks: custom headers, and a signature of the body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OWN = ("content-type", "content-length", "host", TIMESTAMP.lower(), SIGNATURE.l
 
 @dataclass(frozen=True, slots=True)
 class WebhookAccess:
-    """What stands in the requests of webhooks besides the record.
+    """Headers and signing key of webhook requests.
 
     Attributes:
         headers: Name -> value.

@@ -1,4 +1,4 @@
-"""Stepping: the debugger of an agent. Forth, back, inside a step, aside, and why.
+"""Stepping: a debugger for agents. Forward, back, inside a step, sideways into what-if branches, and why.
 
 >>> from visup.evaluation.runtime.scripted_observations import moving_ellipses
 >>> from visup.runs.settings import WatchSettings

@@ -54,7 +54,7 @@ def parse_condition(
 
 
 def _guessed(word: str, names: Names) -> StopCondition:
-    """What a word means that is told without its kind."""
+    """The meaning of a word given without its kind."""
     try:
         return TimeStop(float(word))
     except ValueError:

@@ -51,7 +51,7 @@ class PhaseStop:
 
 @dataclass(frozen=True, slots=True)
 class EventStop:
-    """Stops when an event of a kind is told."""
+    """Stops at events of one kind."""
 
     kind: str
 
@@ -217,7 +217,7 @@ class WhenStop:
 
 @dataclass(slots=True)
 class ExpressionMonitor:
-    """Judges an expression from mind to mind; begins anew at a mind that it did not see coming."""
+    """Evaluates an expression from mind to mind; restarts at a mind that does not follow the last one."""
 
     mind: Mind | None = None
     judged: ExpressionResult | None = None
@@ -225,7 +225,7 @@ class ExpressionMonitor:
     def __call__(
         self, wanted: Expression, before: Mind, after: Mind
     ) -> tuple[ExpressionResult | None, ExpressionResult]:
-        """What it came to before, and what it comes to after."""
+        """Its values before and after."""
         if before is not self.mind:
             self.judged = wanted.judge(before) if before.frame_index >= 0 else None
         was = self.judged

@@ -1,4 +1,4 @@
-"""What differs between two minds: who is there, who is who, what holds, how tasks and alerts stand."""
+"""Differences between two minds: objects, identities, relations, tasks and alerts."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class MindDiff:
     def __str__(self) -> str:
         (a, b), (s, t) = self.frames, self.times
         head = f"from frame {a} ({s:.2f} s) to frame {b} ({t:.2f} s)"
-        return "\n".join([head, *(f"  {c}" for c in self.changes or ("nothing differs",))])
+        return "\n".join([head, *(f"  {c}" for c in self.changes or ("no differences",))])
 
 
 def mind_diff(first: Mind, second: Mind) -> MindDiff:
@@ -154,7 +154,7 @@ def _true(mind: Mind) -> frozenset[tuple[str, tuple[int, ...]]]:
 
 
 def _truths(mind: Mind, wanted: frozenset[tuple[str, tuple[int, ...]]]) -> dict[Key, str]:
-    """How some relations stand; those that are not judged are left out."""
+    """The truth of some relations, without those that are not evaluated."""
     found = {key: mind.relation(key[0], *key[1]) for key in wanted}
     return {("relation", _call(*key)): r.truth.value for key, r in found.items() if r is not None}
 

@@ -59,7 +59,7 @@ class StepHistory:
         self._minds[self.at] = self.agent.snapshot()
 
     def branch(self, agent: Agent) -> StepHistory:
-        """The history of a branch from here: another agent, which perceives and is told the same.
+        """The history of a branch that starts here: another agent with the same observations and answers.
 
         Args:
             agent: As it is to be here.
@@ -140,8 +140,8 @@ class StepHistory:
         self.at = number
         self.agent.restore(was)
 
-    def told(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
-        """Number of the step and event, for all that was told from step `first` to `last`."""
+    def events(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
+        """All events from step `first` to `last`, each with the number of its step."""
         end = self.made if last is None else min(last, self.made)
         for number in range(max(first, self.begin + 1), end + 1):
             for event in self._told[number - self.begin - 1][0]:

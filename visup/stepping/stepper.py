@@ -37,7 +37,7 @@ from visup.stepping.what_if import Assumption, assuming_reasoners, with_assumpti
 
 
 class Stepper(Timeline):
-    """Steps an agent forth and back, stops where it is told to, and looks into its mind.
+    """Steps an agent forward and back, stops at breakpoints, and inspects its mind.
 
     Args:
         agent: The agent, new or after any step; or a history of its steps, to go on with.
@@ -91,7 +91,7 @@ class Stepper(Timeline):
         until: str | Phase | Predicate | StopCondition | None = None,
         tell: Callable[[Step], None] | None = None,
     ) -> StepResult:
-        """Go on by some steps, or until something is so; breakpoints end it, too.
+        """Take some steps, or step until a condition holds; breakpoints also stop it.
 
         Args:
             n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
@@ -127,7 +127,7 @@ class Stepper(Timeline):
         return StepResult(taken, tuple(done))
 
     def _reasons(self, goal: Sequence[StopCondition], before: Mind, step: Step) -> tuple[str, ...]:
-        """Why to stop after a step; every condition is asked, for some remember."""
+        """Reasons to stop after a step; every condition is evaluated, since some have state."""
         found = [s.met(before, step) for s in goal]
         for b in self.breakpoints.values():
             if b.enabled and (why := b.stop.met(before, step)):
@@ -212,7 +212,7 @@ class Stepper(Timeline):
             SettingsError: There is no watch of that number.
         """
         if self.watches.pop(number, None) is None:
-            known = ", ".join(map(str, self.watches)) or "nothing is watched"
+            known = ", ".join(map(str, self.watches)) or "no watches are set"
             raise SettingsError(f"there is no watch {number}", expected=known)
 
     # Aside
@@ -230,8 +230,8 @@ class Stepper(Timeline):
         """
         if not self.may_answer:
             recorded = isinstance(self._source, RecordedObservations)
-            other = "later steps were made without this answer"
-            what = "the operator of a recorded run has spoken" if recorded else other
+            other = "later steps were taken without this answer"
+            what = "the operator of a recorded run can no longer answer" if recorded else other
             raise SettingsError(what, hint="branch, and answer there")
         self.agent.answer(object_id, name)
 
@@ -256,7 +256,7 @@ class Stepper(Timeline):
         return made
 
     def compare(self) -> TranscriptDiff:
-        """What this branch tells differently from the timeline that it left, over the same steps.
+        """How the events of this branch differ from those of the original timeline, over the same steps.
 
         Returns:
             Events that only that timeline told, and only this branch told; and both verdicts here.
@@ -271,8 +271,8 @@ class Stepper(Timeline):
             continue  # it was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at
         return transcript_diff(
-            _transcript(parent.told(first, last), parent.mind_at(last)),
-            _transcript(self.told(first, last), self.mind_at(last)),
+            _transcript(parent.events(first, last), parent.mind_at(last)),
+            _transcript(self.events(first, last), self.mind_at(last)),
         )
 
     def diff(self, first: int, second: int | None = None) -> MindDiff:
@@ -283,7 +283,7 @@ class Stepper(Timeline):
     # Why
 
     def why(self, what: object) -> Why:
-        """Why something is so here: a tree of reasons, down to percepts and their frames.
+        """Explain something at this step: a tree of reasons, down to percepts and their frames.
 
         Args:
             what: An alert, event, relation, coupling, object, stage or task belief; or text, such as

@@ -161,7 +161,7 @@ class Timeline:
         return self.go(number)
 
     def go(self, number: int) -> Step | None:
-        """Be after step `number`; later ones are made if need be, and breakpoints are not looked at.
+        """Go to the state after step `number`; missing steps are taken, and breakpoints are ignored.
 
         Raises:
             SettingsError: There is no such step; the place stays.
@@ -238,9 +238,9 @@ class Timeline:
         self.at_step(number)
         return self._history.snapshot(number).mind
 
-    def told(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
-        """Number of the step and event, for all that was told so far, also after this place."""
-        return self._history.told(first, last)
+    def events(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
+        """All events so far, also after this step, each with the number of its step."""
+        return self._history.events(first, last)
 
     def observation_at(self, number: int) -> Observation:
         """What was perceived in a step; numbers begin at 1, with what was seen before any branch."""

@@ -75,5 +75,5 @@ class WatchExpression:
         _, self.judged = self._follow(self.stop.expression, before, after)
 
     def changed(self, before: Mind, step: Step) -> str:
-        """What has changed of it, or an empty text; to be asked after each step."""
+        """How its value has changed, or an empty text; to be called after each step."""
         return self.stop.met(before, step) if self.breaks else ""

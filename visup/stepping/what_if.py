@@ -121,7 +121,7 @@ class AssumingReasoner:
 
 
 def _contradicts(belief: Assumption, event: Event) -> bool:
-    """Whether an event tells of what is insisted not to happen."""
+    """Whether an event contradicts an assumption."""
     if not isinstance(belief, AssumedRelation) or belief.name != "coupled":
         return False
     other = "decoupled" if belief.truth is Truth.TRUE else "coupled"
@@ -170,7 +170,7 @@ def without_tasks(mind: Mind) -> Mind:
 def with_relation(
     relations: RelationTable | tuple[Relation, ...], told: Relation
 ) -> RelationTable | tuple[Relation, ...]:
-    """Relations of which one is as told."""
+    """Relations with one replaced as assumed."""
     if not isinstance(relations, RelationTable):
         return (*_others(relations, told), told)
     for number, cells in enumerate(relations.parts):

@@ -1,8 +1,8 @@
-"""What a run comes to, for people: one line a life of each object, and a summary at the end.
+"""The narrative of a run for people: one line per object, and a summary at the end.
 
-Read in this order: `lives.py` (where each object came from, went to, whom it came near), `places.py` and
-`colour_words.py` (words for where and what), `life_sentences.py` (a life in a line, lives of one course in
-one), `line_budget.py` (how many lines a minute), `narrative.py` (what of a step is worth a line),
+Read in this order: `lives.py` (where each object came from, went to, and what it came near), `places.py` and
+`colour_words.py` (words for places and colours), `life_sentences.py` (one object in a line, similar ones in
+one), `line_budget.py` (how many lines per minute), `narrative.py` (what is worth a line),
 `summary.py` (the run in a few lines).
 """
 

@@ -9,7 +9,7 @@ PLAIN = ("red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", 
 GREY = "grey"
 
 LEAST_SHARE = 0.35
-"""So much of an object must be of a colour for it to be called so."""
+"""Least share of an object's pixels for it to be called by a colour."""
 
 
 def colour_word(palette: Palette) -> str | None:

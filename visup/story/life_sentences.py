@@ -8,13 +8,13 @@ from visup.rules.wording.sentences import spaced
 from visup.story.lives import ObjectLife
 
 STAYED = 0.06
-"""Who has come no farther than that, in image diagonals, has stayed where it was."""
+"""An object that has moved no farther than this, in image diagonals, has stayed where it was."""
 
 OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 OUT = {side: f"{'to' if side in ('left', 'right') else 'at'} the {side}" for side in OPPOSITE}
 
 MOST_NAMED = 4
-"""Of more objects than that the rest are counted."""
+"""Most objects to list; the rest are counted."""
 
 
 def who(life: ObjectLife) -> str:
@@ -57,13 +57,13 @@ def course(life: ObjectLife, was: str = "was") -> str:
 
 
 def life_sentence(life: ObjectLife) -> str:
-    """One life in one line: who, where, how long, whom it came near."""
+    """One life in one line: which object, where, how long, what it came near."""
     text = f"{who(life)} {course(life)}, {life.seconds:.1f} s{_nearest(life)}."
     return text[:1].upper() + text[1:]
 
 
 def lives_sentence(lives: Sequence[ObjectLife]) -> str:
-    """Lives of the same course in one line; a single one as `life_sentence` tells it.
+    """Lives with the same course in one line; a single one as in `life_sentence`.
 
     Args:
         lives: At least one.

@@ -1,4 +1,4 @@
-"""How many lines a minute a narrative may have."""
+"""The rate limit of the narrative."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Less is saved at the start, so that a short clip has hardly more than ten a minu
 
 @dataclass(slots=True)
 class LineBudget:
-    """Lines that may still be told, by the clock of the run.
+    """A rate limit for lines, by the clock of the run.
 
     Attributes:
         at_once: Most lines that may come together.
@@ -27,11 +27,11 @@ class LineBudget:
     _at: float | None = field(default=None, init=False)
 
     def begin(self, now: float) -> None:
-        """The run goes on since now, seconds; only the first call counts."""
+        """Start the clock, seconds; only the first call counts."""
         self._at = now if self._at is None else self._at
 
     def take(self, now: float) -> bool:
-        """Whether one more line may be told now, seconds; if so it is counted."""
+        """Whether one more line may be printed now (seconds); if so, it is counted."""
         lasted = 0.0 if self._at is None else max(0.0, now - self._at)
         self._at = now
         self._saved = min(float(self.at_once), self._saved + lasted / self.every_s)

@@ -1,4 +1,4 @@
-"""The lives of objects: from where each came, where it went, how long it was in view, whom it came near."""
+"""The lives of objects: where each came from and went, how long it was in view, what it came near."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from visup.story.colour_words import colour_word
 from visup.story.places import Box, place_of, sides_of
 
 OVER_S = 1.5
-"""A life is over when its object has been out of view for so long; what comes back later lives again."""
+"""A life ends when its object has been out of view for this long; a later return starts another."""
 
 GROWN = 1.3
-"""The colour is looked at again when an object shows so many times as large as when it was looked at."""
+"""The colour is measured again when an object appears larger by this factor than when last measured."""
 
 NEAR = 0.12
-"""Objects farther apart than that, in image diagonals, have nothing to do with each other."""
+"""Objects farther apart than this, in image diagonals, do not count as near."""
 
 MOST_PAIRS = 1000
-"""Of more pairs than that, those that were near each other for the shortest time are forgotten."""
+"""Most pairs to keep; those that were near each other for the shortest time are forgotten."""
 
 MOST_NEIGHBOURS = 12
-"""Of so many objects at once it is told who came near whom, the largest first."""
+"""Most objects at once between which nearness is recorded, the largest first."""
 
 
 @dataclass(slots=True)
@@ -155,7 +155,7 @@ class LifeLog:
 
     @property
     def count(self) -> int:
-        """How many objects have lived; who came back is one."""
+        """Number of objects so far; one that came back counts once."""
         return len(self._ids)
 
     def add(self, step: Step, frame: Frame | None) -> list[ObjectLife]:
@@ -235,7 +235,7 @@ class LifeLog:
         life.colour = colour if self._told.get(belief.id, colour) == colour else None
 
     def _meet(self, seen: Sequence[ObjectBelief], mind: Mind, lasted: float) -> None:
-        """Who is near whom."""
+        """Record which objects are near each other."""
         largest = sorted(seen, key=lambda b: (-b.region.area, b.id))[:MOST_NEIGHBOURS]
         near = NEAR * diagonal(mind.frame_size)
         for a, b in combinations(sorted(largest, key=lambda b: b.id), 2):

@@ -1,8 +1,8 @@
-"""What of a run is worth a line: what tasks and alerts say, named objects sparingly, a line a life of others.
+"""What is worth a line: tasks and alerts, named objects sparingly, one line per life of others.
 
-Others are those that nobody knows, and those of which a detector tells only the kind.
+Others are unidentified objects, and those of which only the class is known.
 
-Events are recorded whatever is told of them; this is what people read.
+All events are recorded in any case; this is what people read.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from visup.story.lives import LifeLog, ObjectLife
 from visup.wording import EVENT_KINDS, worded_once
 
 BRIEF_S = 0.8
-"""Who is in view for less than that is counted in the summary and told of nowhere else."""
+"""Objects in view for less than this are counted in the summary only."""
 
 SPECK = 0.0002
-"""So it is with who never shows more than that, share of the picture."""
+"""Objects that never cover more than this share of the picture are treated likewise."""
 
 STAYS_S = 10.0
-"""Who is in view for so long is told of while it is."""
+"""Objects in view for this long are reported while they are."""
 
 PATIENCE_S = 15.0
-"""A life that has found no line for so long is left to the summary."""
+"""A life that has found no line for this long is left to the summary."""
 
 SAME_S, SAME_PAIR_S = 3.0, 10.0
-"""Of the same object, and of the same pair, the same kind of thing is told no more often, seconds."""
+"""Least time between two events of one kind about the same object, and the same pair, seconds."""
 
 ABOUT_OBJECTS = frozenset(
     {
@@ -40,11 +40,11 @@ ABOUT_OBJECTS = frozenset(
         *("coupled", "decoupled", "relation", "identified", "alert", "alert_closed"),
     }
 )
-"""Kinds of events that are told of named objects alone, and sparingly; all others are always told."""
+"""Kinds of events that are reported for named objects only, and sparingly; all others always."""
 
 
 class Detail(StrEnum):
-    """How much is told."""
+    """Level of detail."""
 
     USUAL = "usual"
     ALL = "all"
@@ -52,16 +52,16 @@ class Detail(StrEnum):
 
 @dataclass(slots=True)
 class Narrative:
-    """Chooses what is told. Give it each step; what it gives back is to be shown.
+    """Chooses what to report. Pass it each step; it returns the lines to show.
 
-    What a task says, and what is grave, is always told. So is what its actors do, though the same seldom;
-    other named objects share a budget of lines a minute with the lives of all others.
+    Events of tasks and alerts are always reported. So are those of actors, without repetitions;
+    other named objects share a rate limit with the lives of all others.
 
     Attributes:
-        detail: `ALL` tells every event, and no lives.
+        detail: `ALL` reports every event, and no lives.
         log: The lives of all objects.
-        budget: Lines a minute of what is not grave and belongs to no task.
-        withheld: Events that were not told.
+        budget: Rate limit of lines that are neither alerts nor about a task.
+        withheld: Number of events that were not reported.
         courses: What objects did -> the ids of those that did it.
     """
 
@@ -77,7 +77,7 @@ class Narrative:
     _lives_told: int = 0
 
     def lines(self, step: Step, frame: Frame | None) -> list[Event]:
-        """What is told of one step.
+        """The lines of one step.
 
         Args:
             step: The step.
@@ -93,7 +93,7 @@ class Narrative:
         return [*told, *self._lives(step)]
 
     def rest(self, time: float, frame_index: int) -> list[Event]:
-        """What is left to be told when the run is over: the lives that wait, and those that go on.
+        """The remaining lines when the run is over: lives that wait, and those that have not ended.
 
         Args:
             time: Of the last step, seconds.
@@ -111,7 +111,7 @@ class Narrative:
         return [_event(lives_sentence(g), g, time, frame_index) for g in told]
 
     def _counted(self, lives: Sequence[ObjectLife]) -> list[ObjectLife]:
-        """Those that count; what they did is counted, told or not."""
+        """The lives that count; what they did is counted whether reported or not."""
         found = [x for x in lives if _counts(x)]
         for life in found:
             self.courses.setdefault(course(life, "were"), set()).add(life.id)

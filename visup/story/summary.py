@@ -12,7 +12,7 @@ MOST_COURSES = 2
 
 
 def summary_lines(log: LifeLog, courses: Mapping[str, Set[int]]) -> Iterator[str]:
-    """What is said of a run when it is over; its lives must be finished.
+    """The summary of a finished run.
 
     Args:
         log: Of the run.

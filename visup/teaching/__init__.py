@@ -1,7 +1,7 @@
-"""Showing things once: a user outlines them in one picture, and a model database keeps what was shown.
+"""Teaching: a user outlines objects in one picture, and a model database stores them.
 
-Read `lesson.py` (`visup.teach`, and what it tells), `outlines.py` (outlines as they are typed), `briefs.py`
-(outlines in a file), `clip_frames.py` (the frame in which something is shown), `snapping.py` (outlines that
+Read `lesson.py` (`visup.teach`, and what it reports), `outlines.py` (outlines on the command line),
+`briefs.py` (outlines in a file), `clip_frames.py` (the frames of a clip), `snapping.py` (outlines that
 follow edges), `page/` (the window in the browser), and `learning.py` (`visup.learn`: further views from
 recorded runs).
 """

@@ -78,7 +78,7 @@ class ClipFrames:
             (H, W, 3) uint8, BGR; not to be written to.
 
         Raises:
-            SourceError: There is no such frame, or it is gone by: a camera cannot be wound back.
+            SourceError: There is no such frame, or it is gone by: a camera cannot be rewound.
         """
         if number in self._kept:
             return self._kept[number]
@@ -97,7 +97,7 @@ class ClipFrames:
             self._keep(frame)
         if number not in self._kept:
             raise SourceError(
-                f"frame {number} has gone by", where=self.name, hint="a camera cannot be wound back"
+                f"frame {number} has gone by", where=self.name, hint="a camera cannot be rewound"
             )
         return self._kept[number]
 

@@ -1,7 +1,7 @@
-"""`visup.learn`: what was confirmed in a recorded run becomes further views of a model.
+"""`visup.learn`: add views of objects whose identity was confirmed in a recorded run.
 
-An operator has said who is who; the journal knows where that object was in each frame, and the source shows
-what it looked like. A few clear frames that differ most are kept.
+The operator has identified objects; the journal records where each was in every frame, and the source shows
+its appearance. A few clear and dissimilar frames are stored.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from visup.teaching.clip_frames import ClipFrames
 from visup.teaching.lesson import Lesson, store
 
 VIEWS = 5
-"""Further views of each thing unless asked otherwise."""
+"""Default number of further views of each object."""
 
 LEAST_AREA = 64
 """Pixels below which a sighting shows too little."""
@@ -46,8 +46,8 @@ class Sighting:
     Attributes:
         frame: Number of the frame.
         region: Where it is seen.
-        hidden: Share of its box that lies under the boxes of others.
-        shared: Whether somebody else is believed to be the same region.
+        hidden: Share of its box that the boxes of others cover.
+        shared: Whether another object is believed to be the same region.
     """
 
     frame: int
@@ -64,7 +64,7 @@ def learn(
     source: str | None = None,
     views: int = VIEWS,
 ) -> ModelDatabase:
-    """Add views of what was confirmed in a recorded run: a model gets better with each run.
+    """Add views of objects whose identity was confirmed in a recorded run.
 
     Example:
         ```python
@@ -74,16 +74,16 @@ def learn(
     Args:
         run: A run folder, or the journal in it.
         models: The model database; one that does not exist yet is created.
-        things: Name -> number of the object that it was, besides what the operator answered.
-        source: The video of the run, where it has moved.
-        views: How many views of each thing at most.
+        things: Name -> object id, in addition to the operator's answers.
+        source: The video of the run, if it has moved.
+        views: Most views to add for each name.
 
     Returns:
-        The database as it is then.
+        The updated database.
 
     Raises:
-        VisupError: There is no such run, its video is gone, or nobody said who is who; nothing is
-            stored then.
+        VisupError: There is no such run, its video is gone, or no object was identified; then nothing is
+            stored.
     """
     path = models.path if isinstance(models, ModelDatabase) else Path(models)
     return learn_from(Path(run), path, things or {}, source, views).database
@@ -129,7 +129,7 @@ def _confirmed(
             )
     if not told:
         raise SettingsError(
-            "nobody has said who is who in this run",
+            "no object of this run was identified by the operator",
             where=where,
             expected="answers of the operator, or --thing NAME=OBJECT",
             hint=f"objects of this run: {_objects(summaries)}",
@@ -264,7 +264,7 @@ def _video(recording: Recording, source: str | None) -> ClipFrames:
         raise SourceError(
             "this run watched a camera, whose frames are gone",
             where=where,
-            hint="if it was filmed as well, name the film: --source FILE",
+            hint="if it was also recorded, give the recording: --source FILE",
         )
     named = source or recorded_settings(facts, where).source
     try:
@@ -273,5 +273,5 @@ def _video(recording: Recording, source: str | None) -> ClipFrames:
         raise SourceError(
             f"the video of this run cannot be opened: {fault.what}",
             where=named,
-            hint="if it has moved, name it: --source FILE",
+            hint="if it has moved, give its path: --source FILE",
         ) from fault

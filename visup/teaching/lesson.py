@@ -1,4 +1,4 @@
-"""`visup.teach`: what a user outlines in one picture is stored, and told in plain words."""
+"""`visup.teach`: store objects that a user outlines in one picture, and report on it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from visup.teaching.clip_frames import ClipFrames
 from visup.teaching.outlines import DrawnOutline
 
 SMALL = 16
-"""A thing whose longer side shows fewer pixels may be hard to find again."""
+"""An object whose longer side has fewer pixels may be hard to recognise."""
 
 Corners = Sequence[Sequence[float]]
 OutlineLike = Corners | NDArray[np.bool_] | NDArray[np.number]
@@ -30,12 +30,12 @@ OutlineLike = Corners | NDArray[np.bool_] | NDArray[np.number]
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """What came of a teaching.
+    """The result of teaching.
 
     Attributes:
         database: As it is now.
-        views: What was shown, in order.
-        told: A sentence or two on each, and one on the database.
+        views: The new views, in order.
+        told: A sentence or two about each, and one about the database.
     """
 
     database: ModelDatabase
@@ -50,9 +50,9 @@ def teach(
     models: str | os.PathLike[str] | ModelDatabase,
     frame: int = 0,
 ) -> ModelDatabase:
-    """Show things once: they are known from then on, wherever the model database is used.
+    """Teach objects: they are recognised from then on, wherever the model database is used.
 
-    Teaching adds up: a name that is known gets one more view.
+    Views accumulate: teaching an existing name adds a view.
 
     Example:
         ```python
@@ -71,7 +71,7 @@ def teach(
         frame: Number of the frame in which they are outlined, from 0.
 
     Returns:
-        The database as it is then.
+        The updated database.
 
     Raises:
         VisupError: The source has no such frame, an outline shows nothing, or the database cannot
@@ -147,7 +147,7 @@ def store(models: Path, views: Sequence[TaughtView]) -> Lesson:
     known = len(before.taught)
     told = [_told(v) for v in views]
     if len(database.taught) == known:
-        told.append(f"{models} has all of this already; nothing was added.")
+        told.append(f"{models} already has all of this; nothing was added.")
     else:
         told.append(_summary(database))
     return Lesson(database, tuple(views), tuple(told))
@@ -172,11 +172,11 @@ def _told(view: TaughtView) -> str:
     if min(x, y) == 0 or x + width == view.frame_size[0] or y + height == view.frame_size[1]:
         told += ", cut by the picture's border"
     if max(width, height) < SMALL:
-        told += "; so small a thing may be hard to find again"
+        told += "; an object this small may be hard to find again"
     return told + "."
 
 
 def _summary(database: ModelDatabase) -> str:
     counts = Counter(v.name for v in database.taught)
     listed = ", ".join(f"{n} ({c} view{'s' if c > 1 else ''})" for n, c in counts.items())
-    return f"{database.path} knows by outlines: {listed}."
+    return f"{database.path} has outlines of: {listed}."

@@ -19,7 +19,7 @@ _SEED = 7
 
 
 def snapped(picture: NDArray[np.uint8], outline: DrawnOutline) -> DrawnOutline:
-    """An outline drawn anew along the edges that are near it; the same one where none are found.
+    """An outline snapped to nearby edges; unchanged where there are none.
 
     Args:
         picture: (H, W, 3) uint8, BGR.

@@ -1,9 +1,9 @@
-"""All that visup prints goes through here, so that no text of others reaches the terminal as a command to it.
+"""All output of visup goes through here, so that no untrusted text can control the terminal.
 
-Names of models, texts of tasks, a server's answer may hold anything, also sequences that clear the
-screen, set its title, or turn the reading order round. `tests/terminal/test_console.py` sees to it that
-nothing else in visup prints. Nobody has to read it either: when the reader goes away (as in
-`visup watch ... | head -1`), what is said from then on is lost, and a supervisor goes on.
+Names of models, texts of tasks or a server's answer may contain escape sequences that clear the screen,
+set its title or reverse the reading order. `tests/terminal/test_console.py` checks that nothing else in
+visup prints. Output is also best effort: when the reader goes away (as in `visup watch ... | head -1`),
+further output is dropped and the run continues.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 WIDE = 1000
-"""Columns of what is read by a program."""
+"""Columns of output that a program reads."""
 
 
 def make_console(*, whole: bool = False, **options: Any) -> Console:
-    """A console of rich that prints only what `printable` lets through.
+    """A rich console that prints only what `printable` lets through.
 
     Args:
-        whole: A pipe has no width: nothing is wrapped or cut there.
-        options: As of `rich.console.Console`; nothing is highlighted unless asked for.
+        whole: Whether to leave output to a pipe unwrapped and uncut.
+        options: As of `rich.console.Console`; highlighting is off by default.
     """
     from rich.console import Console, RenderHook
 
@@ -49,7 +49,7 @@ def make_console(*, whole: bool = False, **options: Any) -> Console:
 
 
 class _Cleaned:
-    """Something to be printed, without what a terminal would obey."""
+    """A renderable stripped of characters that control the terminal."""
 
     def __init__(self, shown: ConsoleRenderable) -> None:
         self._shown = shown
@@ -60,7 +60,7 @@ class _Cleaned:
         from visup.wording import printable
 
         for text, style, control in console.render(self._shown, options):
-            # What rich itself says to the terminal is not text.
+            # Control segments are rich's own.
             yield Segment(text if control else printable(text), style, control)
 
     def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
@@ -70,7 +70,7 @@ class _Cleaned:
 
 
 def echo(text: str = "", *, nl: bool = True) -> None:
-    """Print a text as it is, but for what a terminal would obey; at once."""
+    """Print a text, stripped of characters that control the terminal, and flush."""
     from visup.wording import printable
 
     _print(printable(text), "\n" if nl else "")
@@ -91,7 +91,7 @@ def _print(text: str, end: str = "\n") -> None:
 
 
 def _reader_has_gone() -> None:
-    """Let what is printed from now on go nowhere; Python flushes what is left when it ends."""
+    """Discard further output; Python still flushes its buffers when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

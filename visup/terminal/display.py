@@ -1,4 +1,4 @@
-"""How every public record looks on the terminal and in a notebook, in one place.
+"""How each public record is shown on the terminal and in a notebook.
 
 `shown(record)` gives what rich prints; `html(record)` the same for Jupyter. The records of `visup.agent`
 know nothing of it: they are shown so when they are printed with rich or stand last in a notebook's
@@ -76,13 +76,13 @@ def shown(record: Any) -> RenderableType:
 
 
 def html(record: Any) -> str:
-    """A record as HTML that stands by itself in a notebook's cell; with its picture, if it has one."""
+    """A record as self-contained HTML for a notebook cell, with its picture if it has one."""
     picture = record.draw() if isinstance(record, Step) and record.frame else None
     return ("" if picture is None else html_picture(picture)) + html_of(_in_words(record))
 
 
 def html_of(text: RenderableType) -> str:
-    """What rich prints as HTML that stands by itself."""
+    """A rich renderable as self-contained HTML."""
     console = Console(record=True, width=WIDTH + 20, file=StringIO(), force_jupyter=False)
     console.print(text)
     style = "font-family:Menlo,'DejaVu Sans Mono',monospace;line-height:1.2;white-space:pre"
@@ -98,7 +98,7 @@ _UPRIGHT = re.compile("[┃│]")
 
 
 def _brief(value: object, most: int = 60) -> str:
-    """A value in few words: arrays by their shape, long texts cut."""
+    """A value in brief: arrays by their shape, long texts truncated."""
     shape = getattr(value, "shape", None)
     if shape is not None and shape != ():
         return f"{getattr(value, 'dtype', '')} array of {'x'.join(map(str, shape))}"
@@ -267,7 +267,7 @@ def _hang(tree: Tree, why: Why) -> None:
 def _(record: MindDiff) -> RenderableType:
     (a, b), (s, t) = record.frames, record.times
     head = Text(f"from frame {a} ({s:.2f} s) to frame {b} ({t:.2f} s)", style="bold")
-    changes = [shown(c) for c in record.changes] or [Text("nothing differs")]
+    changes = [shown(c) for c in record.changes] or [Text("no differences")]
     return Group(head, *changes)
 
 

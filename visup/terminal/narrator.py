@@ -1,4 +1,4 @@
-"""What a run says on the terminal: one line for each event worth telling, and the verdict last."""
+"""What a run prints on the terminal: one line per notable event, and the verdict at the end."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ VERDICT_TEXT = {
     Verdict.SUCCEEDED: "the task went as intended",
     Verdict.IN_PROGRESS: "the task was still in progress at the end, and nothing was wrong",
     Verdict.FAILED: "the task failed",
-    Verdict.INTERRUPTED: "something unsafe or unexpected interrupted it",
+    Verdict.INTERRUPTED: "something unsafe or unexpected interrupted the task",
     Verdict.UNKNOWN: "the task could not be followed",
 }
 
 
 @dataclass(slots=True)
 class Narrator:
-    """Prints what is worth telling of each step. Give it to an agent as an observer.
+    """Prints the notable events of each step. Give it to an agent as an observer.
 
     Attributes:
         console: Where to.
-        as_json: One JSON object a line, for every event, instead of sentences.
-        narrative: Chooses what is told.
+        as_json: Print every event as one line of JSON, instead of sentences.
+        narrative: Chooses what to print.
         last: The last step.
     """
 
@@ -51,13 +51,13 @@ class Narrator:
     last: Step | None = None
 
     def __call__(self, step: Step, frame: Frame | None = None) -> None:
-        """Print what is told of one step."""
+        """Print the notable events of one step."""
         self.last = step
         for event in step.events if self.as_json else self.narrative.lines(step, frame):
             self.print_event(event)
 
     def finish(self) -> None:
-        """Print what is left to be told when the run is over, and how many objects there were."""
+        """Print what remains when the run is over, and a summary."""
         if self.last is None or self.as_json:
             return
         for event in self.narrative.rest(self.last.time, self.last.frame_index):
@@ -72,7 +72,7 @@ class Narrator:
         elif self.console.is_terminal:
             self.console.print(event_row(event))
         else:
-            # A file or a pipe has no width: one line for each event, for whoever searches in them.
+            # A file or a pipe has no width: one line per event, so that it can be searched.
             self.console.print(Text(event_line(event)), soft_wrap=True)
 
 
@@ -82,7 +82,7 @@ def event_line(event: Event) -> str:
 
 
 def event_row(event: Event) -> Table:
-    """One event as a row: time, mark, sentence; long sentences go on below themselves."""
+    """One event as a row: time, mark, sentence; long sentences wrap in their column."""
     style = STYLE[event.severity]
     row = Table.grid(padding=(0, 1), expand=False)
     row.add_column(justify="right", min_width=8, style="dim", no_wrap=True)
@@ -96,9 +96,9 @@ def verdict_line(verdict: Verdict | None, *, has_task: bool = True, part: str = 
     """The verdict as a line of rich markup.
 
     Args:
-        verdict: None stands for a run without a task, watched whole, in which nothing grave was seen.
+        verdict: None stands for a complete run without a task in which nothing unsafe was seen.
         has_task: Whether there was a task to judge.
-        part: What was seen, where that is not the whole source: ` in the first 2.0 s`.
+        part: How much was seen, if not the whole source: ` in the first 2.0 s`.
     """
     if verdict is None:
         return (
@@ -106,17 +106,17 @@ def verdict_line(verdict: Verdict | None, *, has_task: bool = True, part: str = 
         )
     style = VERDICT_STYLE[verdict]
     if not has_task and verdict is Verdict.UNKNOWN:
-        unsure = f"[{style}]but not all could be watched[/{style}]"
+        unsure = f"[{style}]but the scene could not always be watched[/{style}]"
         return f"Verdict: nothing unsafe was seen{part}, {unsure} (no task was given)"
     if not has_task:
-        return f"Verdict: [{style}]something grave was seen[/{style}]{part} (no task was given)"
+        return f"Verdict: [{style}]something unsafe was seen[/{style}]{part} (no task was given)"
     return f"Verdict: [{style}]{verdict.value}[/{style}]{part} ({VERDICT_TEXT[verdict]})"
 
 
 def part_seen(result: RunResult) -> str:
-    """What was seen of a source, where that is not all of it; else empty."""
+    """How much of a source was seen, if not all of it; otherwise empty."""
     if not (result.problem or result.stopped):
         return ""
     frames = "1 frame" if result.steps == 1 else f"{result.steps} frames"
-    until = "that came before it was stopped" if result.stopped else "before the source broke off"
+    until = "before it was stopped" if result.stopped else "before the source broke off"
     return f" in the {frames} ({result.seconds:.1f} s) {until}"

@@ -1,4 +1,4 @@
-"""What `visup --help` shows: the commands by what one wants, a short line each."""
+"""What `visup --help` shows: the commands grouped by purpose, one line each."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from typer.core import TyperGroup
 PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "Watch": {
-            "watch": "watch a video and say whether the work goes well",
-            "demo": "watch the shipped clip, a capture that fails",
-            "check": "say beforehand whether a run can lead to anything",
-            "serve": "many cameras under one supervisor, from a site file",
-            "presets": "what --preset traffic, cell, orbit, bench choose",
+            "watch": "watch a video and report whether the work goes well",
+            "demo": "watch the shipped clip, a failed capture",
+            "check": "check that a run could start and reach a verdict",
+            "serve": "watch many cameras as a service, from a site file",
+            "presets": "what --preset traffic, cell, orbit and bench set",
         },
         "Prepare": {
-            "teach": "show things once, so that they are known from then on",
+            "teach": "outline objects once, so that they are recognised",
             "models": "build, extend, list and query model databases",
             "task": "check, show, simulate and learn task files",
             "rules": "check, list and explain safety rules",
         },
-        "Look into a run": {
-            "console": "runs in the browser: timeline, beliefs, reasons",
-            "step": "step through it, back and forth, and ask why",
-            "replay": "reason again, with other tasks or rules",
-            "export": "its objects for other tools: MOT, COCO, FiftyOne, CSV",
+        "Inspect a run": {
+            "console": "browse runs: video, timeline, beliefs, reasons",
+            "step": "step back and forth through a run, and ask why",
+            "replay": "reason again about a run, with other tasks or rules",
+            "export": "export objects as MOT, COCO, FiftyOne or CSV",
         },
-        "Ask many runs": {
-            "archive": "watch many clips; a lake with the tables of their runs",
-            "query": "ask a lake in SQL",
-            "find": "find where a condition was true, in all runs of a lake",
+        "Query many runs": {
+            "archive": "watch many clips and store their runs in a lake",
+            "query": "query a lake in SQL",
+            "find": "find where a condition held, in all runs of a lake",
         },
         "Extend and measure": {
             "behaviours": "list, check and create plug-ins",
-            "render": "render a scene with masks and truth",
-            "eval": "compute figures against ground truth",
-            "train": "learn from labelled sequences what moves by itself",
-            "debug": "pictures of the workings, for those who improve them",
-            "doctor": "what is installed, what is missing, how fast it is",
+            "render": "render a scene with masks and ground truth",
+            "eval": "measure accuracy and speed against ground truth",
+            "train": "learn from labelled sequences what moves independently",
+            "debug": "visualise intermediate results, for developers",
+            "doctor": "show what is installed, what is missing, how fast it runs",
         },
     }
 )
@@ -58,19 +58,19 @@ class Overview(TyperGroup):
                 formatter.write_dl(list(commands.items()))
 
     def make_context(self, *given: Any, **named: Any) -> Any:
-        """As any command; what is said of words that make no sense is printable."""
+        """As usual, but error messages about bad arguments are made printable."""
         with _printable_refusals():
             return super().make_context(*given, **named)
 
     def invoke(self, ctx: Any) -> Any:
-        """As any command; what is said of words that make no sense is printable."""
+        """As usual, but error messages about bad arguments are made printable."""
         with _printable_refusals():
             return super().invoke(ctx)
 
 
 @contextmanager
 def _printable_refusals() -> Iterator[None]:
-    """Names and values may come from strangers, and are quoted in refusals, which typer prints itself."""
+    """Typer prints its own error messages, which quote names and values that may be untrusted."""
     try:
         yield
     except Exception as refusal:
@@ -82,4 +82,4 @@ def _printable_refusals() -> Iterator[None]:
 
 
 _REFUSAL: Any = BadParameter.__mro__[2]
-"""What all refusals of typer are; older ones have it from click, newer ones of their own."""
+"""Base class of typer's usage errors: click's in older versions, its own in newer ones."""

@@ -1,4 +1,4 @@
-"""The prompt of `visup step`: completion of commands, ids, stages, rules and events; history; help."""
+"""The prompt of `visup step`: completion, history, help."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ _WORDS: Mapping[str, Words] = {
 
 
 def completions(session: Session, line: str) -> list[str]:
-    """What the last word of a line may become.
+    """Completions of the last word of a line.
 
     Args:
         session: Knows who is there, which stages and rules there are, and what is set.
@@ -76,7 +76,7 @@ def completions(session: Session, line: str) -> list[str]:
 
 
 def read_commands(session: Session) -> Iterator[str]:
-    """Lines that the user enters: with history and completion on a terminal, plain from a pipe."""
+    """Lines that the user enters, with history and completion on a terminal, plain from a pipe."""
     if not sys.stdin.isatty():
         yield from sys.stdin
         return
@@ -108,7 +108,7 @@ def toolbar(session: Session) -> str:
 
 
 def history_file() -> Path | None:
-    """Where commands are remembered from session to session; None where nothing can be written."""
+    """File of the command history; None if nothing can be written."""
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     try:
         (base / "visup").mkdir(parents=True, exist_ok=True)

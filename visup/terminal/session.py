@@ -1,4 +1,4 @@
-"""An interactive session: commands in, the agent's steps and what it believes out."""
+"""An interactive session: reads commands, prints the agent's steps and beliefs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 
 
 class Session:
-    """Holds a stepper, with the branches that were begun, and answers commands.
+    """Holds a stepper and the branches begun from it, and carries out commands.
 
     Args:
         agent: The agent.
@@ -71,7 +71,7 @@ class Session:
 
     @property
     def marks(self) -> tuple[str, ...]:
-        """Names of the places that are remembered."""
+        """Names of the marks."""
         return tuple(self._marks)
 
     def words(self) -> list[str]:
@@ -79,12 +79,14 @@ class Session:
         return [*_NAMES, "until", "quit"]
 
     def run(self, commands: Iterable[str]) -> int:
-        """Obey commands until 'quit' or their end.
+        """Carry out commands until 'quit' or their end.
 
         Returns:
             Exit code: 0, or 2 when a command could not be obeyed.
         """
-        self.console.print("[dim]'step' goes on by one frame, 'help' shows the commands.[/dim]")
+        self.console.print(
+            "[dim]Type 'step' to advance by one frame, 'help' for all commands.[/dim]"
+        )
         last, refused = "step", False
         for entered in commands:
             command = entered.split(" #")[0].strip() or last
@@ -100,7 +102,7 @@ class Session:
         return 2 if refused else 0
 
     def execute(self, command: str) -> Answer:
-        """Carry out one command; a unique beginning of its name will do."""
+        """Carry out one command, given by its name or an unambiguous prefix."""
         word, *rest = (
             command.replace("?", "help ", 1).split() if command[0] == "?" else command.split()
         )
@@ -135,7 +137,7 @@ class Session:
             parse_condition(what, self.stepper.mind, self.stepper.names) if what else None
         )
         if stop is not None and self._is_past(stop):
-            return refusal(f"{stop.text} is past: 'go' and 'back' lead there")
+            return refusal(f"{stop.text} has already passed; use 'go' or 'back'")
         stopped = self.stepper.step(count, stop, self._tell)
         return self._place(stopped)
 
@@ -155,7 +157,7 @@ class Session:
                 self.console.print(Text(event_line(event)), soft_wrap=True)
 
     def _place(self, stopped: StepResult | None = None) -> RenderableType:
-        """Where the session is: why it stopped, what is watched, frame and time."""
+        """Where the session is: why it stopped, watched values, frame and time."""
         mind, lines = self.stepper.mind, []
         if stopped is not None:
             lines += [Text(f"stopped: {why}", style="bold") for why in stopped.reasons]
@@ -172,7 +174,7 @@ class Session:
         return Group(*lines)
 
     def _aside(self) -> str:
-        """What is to be known of the place besides frame and time."""
+        """Details of the place besides frame and time."""
         stepper = self.stepper
         told = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
         if stepper.paused:
@@ -205,17 +207,15 @@ class Session:
     def _mark(self, words: Sequence[str]) -> Answer:
         if not words:
             rows = [f"{name}  step {mark.number}" for name, mark in self._marks.items()]
-            return Text("\n".join(rows) or "no place is marked")
+            return Text("\n".join(rows) or "no marks are set")
         self._marks[words[0]] = self.stepper.snapshot()
         return Text(f"step {self.stepper.at} is '{words[0]}'", style="dim")
 
     def _show(self, words: Sequence[str]) -> Answer:
         if self.stepper.mind.frame_index < 0:
-            return refusal("no step was taken yet")
+            return refusal("no step has been taken yet")
         if self._picture is None:
-            return refusal(
-                "the frames of this source cannot be had again, so that none can be shown"
-            )
+            return refusal("no frame can be shown: the frames of this source cannot be read again")
         if words and words[0] == "why":
             return self._show_why(self._picture, words[1:])
         mind = self.stepper.mind
@@ -225,11 +225,11 @@ class Session:
     def _show_why(
         self, picture: Callable[[int], NDArray[np.uint8]], words: Sequence[str]
     ) -> Answer:
-        """The frame that an answer rests on, with the regions that it rests on."""
+        """The frame on which an answer is based, with the regions on which it is based."""
         file = words[-1] if words and words[-1].endswith(PICTURES) else None
         asked = list(words[:-1] if file else words)
         if not asked:
-            return refusal("show why WHAT, such as: show why alert 1")
+            return refusal("usage: show why WHAT, such as: show why alert 1")
         negated, ask = asked[0] == "not", " ".join(asked)
         why = (
             self.stepper.why_not(ask.removeprefix("not").strip())
@@ -238,7 +238,9 @@ class Session:
         )
         frame, regions = why.regions
         if frame is None:
-            return refusal("the answer rests on no region of a frame: nothing can be marked")
+            return refusal(
+                "the answer is not based on any region of a frame, so there is nothing to show"
+            )
         return self._shown(spotlight(picture(frame), regions), frame, file)
 
     def _shown(self, image: NDArray[np.uint8], frame: int, file: str | None) -> Answer:
@@ -259,7 +261,7 @@ class Session:
     def _break(self, words: Sequence[str]) -> Answer:
         if not words:
             every = self.stepper.breakpoints.values()
-            return Text("\n".join(map(str, every)) or "no breakpoint is set")
+            return Text("\n".join(map(str, every)) or "no breakpoints are set")
         return Text(str(self.stepper.break_at(" ".join(words))))
 
     def _breakpoint(self, words: Sequence[str], what: str) -> Answer:
@@ -277,7 +279,7 @@ class Session:
         text = " ".join(words[breaks:])
         if text:
             self.stepper.watch(text, breaks=breaks)
-        return self._place() if self.stepper.watches else Text("nothing is watched")
+        return self._place() if self.stepper.watches else Text("no watches are set")
 
     def _unwatch(self, words: Sequence[str]) -> Answer:
         number = number_in(words)
@@ -315,7 +317,7 @@ class Session:
         ]
         before, after = changed.verdicts
         verdict = Text(f"verdict: {before or 'none'} -> {after or 'none'}")
-        return Group(*(told or [Text("no difference")]), verdict)
+        return Group(*(told or [Text("no differences")]), verdict)
 
     def _leave(self, words: Sequence[str]) -> Answer:
         if len(self.timelines) == 1:
@@ -326,14 +328,14 @@ class Session:
     def _answer(self, words: Sequence[str]) -> Answer:
         number = number_in(words)
         if number is None or len(words) < 2:
-            return refusal("answer ID NAME, such as: answer 2 arm")
+            return refusal("usage: answer ID NAME, such as: answer 2 arm")
         name = " ".join(words[1:])
         if not self.stepper.may_answer:
             branch = self.stepper.branch()
             branch.answer(number, name)
             return self._begin(branch)
         self.stepper.answer(number, name)
-        return Text("taken as fact from the next step on", style="dim")
+        return Text("this counts as fact from the next step on", style="dim")
 
 
 _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProxyType(
@@ -359,10 +361,10 @@ _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProx
         "answer": Session._answer,
     }
 )
-"""Commands that move the session or change something, by their names."""
+"""Commands that move the session or change something, by name."""
 
 _SHORT = {"s": "step"}
-"""Beginnings that stay what they have long been, though another command begins alike."""
+"""Prefixes that keep their old meaning although another command shares them."""
 
 _NAMES = tuple(name for name in COMMANDS if name in _ACTIONS or name in VIEWS)
 

@@ -1,4 +1,4 @@
-"""The commands of `visup step`: how each is written, what it does, what completes it."""
+"""The commands of `visup step`: syntax, description, completion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Command:
 
     @property
     def text(self) -> str:
-        """All that there is to know of it."""
+        """The full help of the command."""
         return f"{self.usage}\n  {self.does}" + (f"\n\n{self.more}" if self.more else "")
 
 
@@ -65,30 +65,35 @@ itself stays as it is. 'compare' shows what the branch changes, 'leave' returns.
 
 _COMMANDS = (
     Command(
-        "step [N] [until WHAT]", "one step, or N, or until a condition holds", _WHERE, ("stop",)
+        "step [N] [until WHAT]",
+        "advance one step, or N, or until a condition holds",
+        _WHERE,
+        ("stop",),
     ),
-    Command("run [until WHAT]", "until a condition holds, or the end", _WHERE, ("stop",)),
-    Command("back [N]", "one step back, or N; forward again gives the same steps"),
+    Command(
+        "run [until WHAT]", "advance until a condition holds, or to the end", _WHERE, ("stop",)
+    ),
+    Command("back [N]", "go back one step, or N; forward gives the same steps"),
     Command(
         "go PLACE",
         "go to a step, a time (12.5s), a mark, 'start' or 'end'",
-        "Steps are numbered from 1. Breakpoints are not looked at on the way.",
+        "Steps are numbered from 1. Breakpoints on the way are ignored.",
         ("mark",),
     ),
-    Command("mark [NAME]", "remember this place for 'go NAME'; or list the marks"),
-    Command("break [WHAT]", "stop there in every run; or list what is set", _WHERE, ("stop",)),
+    Command("mark [NAME]", "mark this step for 'go NAME'; or list the marks"),
+    Command("break [WHAT]", "set a breakpoint; or list all breakpoints", _WHERE, ("stop",)),
     Command("delete N", "delete breakpoint N", completes=("break",)),
-    Command("disable N", "do not stop at breakpoint N for now", completes=("break",)),
-    Command("enable N", "stop at breakpoint N again", completes=("break",)),
+    Command("disable N", "disable breakpoint N for now", completes=("break",)),
+    Command("enable N", "enable breakpoint N again", completes=("break",)),
     Command(
         "watch [EXPRESSION]",
-        "show its value after each step; or show all",
-        f"{_EXPRESSION}\n'watch! EXPRESSION' also stops whenever what it shows changes.",
+        "show a value after each step; or list the watches",
+        f"{_EXPRESSION}\n'watch! EXPRESSION' also stops whenever its value changes.",
         ("expression",),
     ),
-    Command("unwatch N", "no longer show watch N"),
-    Command("why [not] WHAT", "evidence, down to frames and percepts", _WHY, ("why",)),
-    Command("diff [A [B]]", "what changed since the last step, or from step A to B"),
+    Command("unwatch N", "remove watch N"),
+    Command("why [not] WHAT", "show the evidence, down to frames and percepts", _WHY, ("why",)),
+    Command("diff [A [B]]", "show changes since the last step, or from step A to B"),
     Command(
         "assert BELIEF",
         "what if: assume a belief, on a branch",
@@ -111,36 +116,38 @@ _COMMANDS = (
         _BRANCH,
         ("file",),
     ),
-    Command("branch", "another timeline from here, with nothing changed yet", _BRANCH),
-    Command("compare", "how the events of this branch differ"),
-    Command("leave", "back to the timeline that this branch left"),
-    Command("mind", "all that is believed, in short"),
+    Command("branch", "start another timeline here, unchanged so far", _BRANCH),
+    Command("compare", "show how the events of this branch differ"),
+    Command("leave", "return to the timeline that this branch left"),
+    Command("mind", "show a summary of all beliefs"),
     Command(
         "show [why WHAT] [FILE]",
-        "the frame with what is believed drawn over it",
-        "'show why WHAT' lights the regions that the answer to 'why WHAT' rests on,\n"
-        "in the frame that it speaks of. A terminal that can show pictures (kitty,\n"
-        "sixel) shows them, others draw them in characters; with FILE, or from a\n"
-        "pipe, the picture is written.",
+        "show the frame with the beliefs drawn over it",
+        "'show why WHAT' highlights the regions on which the answer to 'why WHAT'\n"
+        "is based, in its frame. A terminal that can show pictures (kitty,\n"
+        "sixel) shows one, others draw it in characters; with FILE, or from a\n"
+        "pipe, the picture is written to a file.",
     ),
-    Command("percepts", "what was perceived in this step, by behaviour"),
-    Command("regions", "what moved in the last frame"),
-    Command("objects", "who is there, with their most likely identities"),
-    Command("candidates ID", "all identities that object ID may have", completes=("object",)),
-    Command("questions", "what the operator is asked"),
+    Command("percepts", "show the percepts of this step, by behaviour"),
+    Command("regions", "show the moving regions of the last frame"),
+    Command("objects", "show all objects and their most likely identities"),
+    Command("candidates ID", "show all possible identities of object ID", completes=("object",)),
+    Command("questions", "show the open questions to the operator"),
     Command(
         "answer ID NAME",
-        "say which model object ID is",
-        "In the past, or of a recorded run, it begins a branch.",
+        "tell visup which model object ID is",
+        "In the past or on a recorded run this starts a branch.",
         ("object",),
     ),
-    Command("relations [ID]", "what holds between objects", completes=("object",)),
-    Command("tasks", "stages, actors and verdicts"),
-    Command("alerts", "what is open"),
-    Command("events [N]", "the latest events with their steps"),
-    Command("directives", "what behaviours are asked for, and why"),
-    Command("behaviours", "what each behaviour did in the last step"),
-    Command("help [COMMAND]", "the commands, or all about one", completes=("command",)),
+    Command(
+        "relations [ID]", "show the relations that hold between objects", completes=("object",)
+    ),
+    Command("tasks", "show stages, actors and verdicts"),
+    Command("alerts", "show the open alerts"),
+    Command("events [N]", "show the latest events with their steps"),
+    Command("directives", "show the requests made to behaviours, and why"),
+    Command("behaviours", "show what each behaviour did in the last step"),
+    Command("help [COMMAND]", "list the commands, or explain one", completes=("command",)),
 )
 COMMANDS: Mapping[str, Command] = MappingProxyType({c.name: c for c in _COMMANDS})
 """By their names."""
@@ -149,7 +156,7 @@ _WIDTH = max(len(c.usage) for c in _COMMANDS)
 HELP = "\n".join(
     [
         *(f"{c.usage:<{_WIDTH}} {c.does}" for c in _COMMANDS),
-        f"{'quit':<{_WIDTH}} end",
-        "A unique beginning of a command is enough; an empty line repeats the last one.",
+        f"{'quit':<{_WIDTH}} leave the session",
+        "Any unambiguous prefix of a command works; an empty line repeats the last one.",
     ]
 )

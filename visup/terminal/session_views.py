@@ -1,4 +1,4 @@
-"""The commands of `visup step` that look and change nothing: the mind, what was perceived, why."""
+"""The read-only commands of `visup step`: the mind, percepts, explanations."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ from visup.terminal.tables import (
 
 Words = Sequence[str]
 View = Callable[[Stepper, Words], RenderableType]
-"""Answers a command, from the words after its name."""
+"""Carries out a command, given the words after its name."""
 
-_NO_STEP = Text("no step was taken yet")
+_NO_STEP = Text("no step has been taken yet")
 
 
 class Refusal(Text):
-    """An answer to what cannot be done."""
+    """The answer to a command that cannot be carried out."""
 
 
 def refusal(text: str) -> Refusal:
-    """An answer to what cannot be done."""
+    """The answer to a command that cannot be carried out."""
     return Refusal(text, style="yellow")
 
 
 def usage(name: str) -> str:
-    """How a command is written, and what it does."""
+    """The syntax of a command, and what it does."""
     return f"{COMMANDS[name].usage}: {COMMANDS[name].does}"
 
 
 def number_in(words: Words) -> int | None:
-    """The whole number that comes first, or None."""
+    """The integer that comes first, or None."""
     return int(words[0]) if words and words[0].isdecimal() else None
 
 
 def observation_of(stepper: Stepper) -> Observation | None:
-    """What was perceived in this step."""
+    """The percepts of this step."""
     if stepper.paused is not None:
         return stepper.paused.seen
     return None if stepper.last is None else stepper.last.observation
@@ -105,7 +105,7 @@ def _events(stepper: Stepper, words: Words) -> RenderableType:
     most = number_in(words) if words else 10
     if not most:
         return refusal(usage("events"))
-    latest = list(stepper.told(last=stepper.at))[-most:]
+    latest = list(stepper.events(last=stepper.at))[-most:]
     rows = Table.grid(padding=(0, 1))
     for number, event in latest:
         rows.add_row(Text(f"step {number}", style="dim"), event_row(event))
@@ -121,7 +121,7 @@ def _relations(stepper: Stepper, words: Words) -> RenderableType:
 
 def _directives(stepper: Stepper, words: Words) -> RenderableType:
     asked = stepper.agent.directives
-    return Group(*map(shown, asked)) if asked else Text("nothing is asked for")
+    return Group(*map(shown, asked)) if asked else Text("no requests")
 
 
 VIEWS: Mapping[str, View] = MappingProxyType(

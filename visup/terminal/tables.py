@@ -1,4 +1,4 @@
-"""What a mind holds, as tables of the terminal: readable at 80 columns."""
+"""Tables of the contents of a mind for the terminal, readable at 80 columns."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from visup.wording import prose
 
 
 def table(*headings: str, title: str | None = None) -> Table:
-    """A table as all of these are."""
+    """A table in the common style."""
     return Table(*headings, title=title, title_justify="left", pad_edge=False)
 
 
 def regions_table(observation: Observation | None) -> RenderableType:
-    """What motion segmentation saw in a frame."""
+    """The regions of a frame."""
     if observation is None:
-        return Text("no step was taken yet")
+        return Text("no step has been taken yet")
     rows = table("region", "box", "area", "velocity px/s", "cut", "confidence")
     for r in observation.of("region"):
         box = ",".join(map(str, r.bbox))
@@ -43,7 +43,7 @@ def regions_table(observation: Observation | None) -> RenderableType:
 
 
 def objects_table(beliefs: Iterable[ObjectBelief]) -> Table:
-    """Who is believed to be there."""
+    """The objects believed to be there."""
     rows = table("id", "identity", "share", "presence", "box", "px/s", "depth")
     for b in sorted(beliefs, key=lambda b: b.id):
         speed = sum(v * v for v in b.region.velocity) ** 0.5
@@ -65,7 +65,7 @@ def candidates_table(belief: ObjectBelief) -> Table:
 
 
 def relations_table(relations: Iterable[Relation], object_id: int | None = None) -> Table:
-    """What holds between objects; of one object and the others also what is seldom asked for."""
+    """Relations between objects; those of a single object include the less common ones."""
     rows = table("relation", "objects", "truth", "since", "value", "confidence")
     told = relations
     if object_id is not None and isinstance(relations, RelationTable):
@@ -80,21 +80,21 @@ def relations_table(relations: Iterable[Relation], object_id: int | None = None)
 
 
 def tasks_tree(mind: Mind) -> RenderableType:
-    """How each task stands."""
+    """The state of each task."""
     if not mind.tasks:
         return Text("no task was given")
     return Group(*map(task_tree, mind.tasks))
 
 
 def task_tree(task: TaskBelief) -> Tree:
-    """How one task stands."""
+    """The state of one task."""
     tree = Tree(Text(prose(f"{task.task}: {task.verdict.value}  {task.evidence}".rstrip())))
     for s in task.stages:
         here = "> " if s.stage == task.current else "  "
         told = f"{here}{s.stage}: {s.status.value} since {s.since:.1f} s  {s.evidence}"
         tree.add(Text(prose(told.rstrip())))
     for b in task.bindings:
-        who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
+        who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "no object"
         tree.add(Text(f"  {b.actor} is bound to {who}"))
     tree.add(Text(prose(f"  {prospects_text(task)}")))
     if task.active < 1.0:
@@ -103,8 +103,8 @@ def task_tree(task: TaskBelief) -> Tree:
 
 
 def alerts_list(alerts: Iterable[Alert]) -> RenderableType:
-    """What is open."""
-    return Text("\n".join(map(alert_line, alerts)) or "no alert is open")
+    """The open alerts."""
+    return Text("\n".join(map(alert_line, alerts)) or "no open alerts")
 
 
 def alert_line(a: Alert) -> str:
@@ -114,8 +114,8 @@ def alert_line(a: Alert) -> str:
 
 
 def questions_list(questions: Iterable[Question]) -> RenderableType:
-    """What waits for an answer."""
-    return Text("\n".join(q.text for q in questions) or "nothing is asked")
+    """The questions that await an answer."""
+    return Text("\n".join(q.text for q in questions) or "no open questions")
 
 
 def behaviours_table(reports: Iterable[Report]) -> RenderableType:

@@ -1,4 +1,4 @@
-"""What if, in words: `touching 1 2 true`, `object 1 arm`, `object 2 hidden`, `rules FILE`."""
+"""What-if commands, in words: `touching 1 2 true`, `object 1 arm`, `object 2 hidden`, `rules FILE`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _PRESENCES = tuple(p.value for p in Presence)
 def parse_assumption(
     mind: Mind, words: Sequence[str], models: Iterable[str] = (), *, retract: bool = False
 ) -> Assumption:
-    """The belief that some words tell.
+    """The belief that the words of a command describe.
 
     Args:
         mind: Where it is to be held.
@@ -43,7 +43,7 @@ def parse_assumption(
     """
     said = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
     if not said:
-        raise SettingsError("no assumption is given", expected=_EXPECTED)
+        raise SettingsError("no belief was given", expected=_EXPECTED)
     if said[0] in ("object", "identity", "presence"):
         return _of_object(mind, said[1:], models, retract)
     return _relation(mind, said, retract)
@@ -63,14 +63,14 @@ def _relation(mind: Mind, words: list[str], retract: bool) -> Assumption:
         _known(mind, object_id)
     truth = rest[-1] if rest and rest[-1] in _TRUTHS else "unknown" if retract else "true"
     if len(ids) != 2 or (rest[-1] not in _TRUTHS and not rest[-1].isdecimal()):
-        what = f"'{' '.join(words)}' is no relation of two objects"
+        what = f"'{' '.join(words)}' is not a relation of two objects"
         raise SettingsError(what, expected=_EXPECTED)
     return AssumedRelation(name, ids, Truth(truth), mind.time)
 
 
 def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: bool) -> Assumption:
     if not words or not words[0].isdecimal() or (len(words) < 2 and not retract):
-        raise SettingsError("which object, and what about it?", expected=_EXPECTED)
+        raise SettingsError("an object and a belief about it are needed", expected=_EXPECTED)
     object_id = int(words[0])
     _known(mind, object_id)
     if retract:

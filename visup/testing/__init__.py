@@ -1,4 +1,4 @@
-"""For those who write behaviours, rules and tasks: clips with known truth, scripted behaviours, a checker.
+"""For authors of behaviours, rules and tasks: clips with ground truth, scripted behaviours, a checker.
 
 >>> from visup.testing import Scripted, check_results
 >>> all(f.passed for f in check_results(Scripted("lamp", ("lamp",), lambda frame: 1.0)))

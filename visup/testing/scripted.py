@@ -43,7 +43,7 @@ class Scripted:
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """Report what the script says of one frame; directives are kept to be looked at."""
+        """Report what the script says about one frame, and record the directives for inspection."""
         self.directives.append(tuple(directives))
         said = self.says(frame)
         values = said if isinstance(said, list) else [] if said is None else [said]

@@ -213,5 +213,5 @@ def test_a_detector_of_ten_lines_sees_in_place_of_visup(tmp_path: Path) -> None:
     run = visup.watch(clip, behaviours=[tmp_path / "cups.py"], motion=False).finish()
     mind = run.steps[-1].mind
     assert [(b.name, b.region.bbox) for b in mind.present()] == [("cup", (21, 20, 20, 20))]
-    with pytest.raises(SettingsError, match="nothing would see"):
+    with pytest.raises(SettingsError, match="nothing would supply regions"):
         visup.watch(clip, motion=False)

@@ -29,7 +29,7 @@ def test_images_come_in_natural_order(tmp_path: Path) -> None:
     assert [round(disc_x(f.image)) for f in frames] == [10 + i for i in range(12)]
     assert [f.time for f in frames] == [i / 25 for i in range(12)]
     assert (source.ended, source.frame_count, source.size) == ("complete", 12, (64, 48))
-    assert "25 fps are assumed" in source.notes[0]
+    assert "25 fps is assumed" in source.notes[0]
 
 
 @given(numbers=st.lists(st.integers(0, 10**6), unique=True), seed=st.integers(0, 99))
@@ -56,7 +56,7 @@ def test_common_kinds_of_image_are_read(tmp_path: Path, suffix: str) -> None:
         ("[Sequence]\nname=x\nimDir=img1\nframeRate=7\nimExt=.png\n", 7.0, ""),
         ("[Sequence]\nframeRate=fast\n", 25.0, "no usable frame rate (fast)"),
         ("[Sequence]\nframeRate=-1\n", 25.0, "no usable frame rate (-1)"),
-        ("not an ini file", 25.0, "25 fps are assumed"),
+        ("not an ini file", 25.0, "25 fps is assumed"),
     ],
 )
 @pytest.mark.parametrize("name", ["mot", "mot/img1"])

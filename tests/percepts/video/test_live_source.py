@@ -62,7 +62,7 @@ def test_a_camera_is_timed_by_the_clock_and_its_loss_is_told() -> None:
     assert [f.index for f in frames] == list(range(5))
     assert [f.time for f in frames] == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
     assert (source.live, source.frame_count, source.fps) == (True, None, 25.0)
-    assert "25 fps are assumed" in source.notes[0]
+    assert "25 fps is assumed" in source.notes[0]
     assert source.ended is Ending.TRUNCATED
     assert source.problem is not None
     assert "stopped delivering" in source.problem

@@ -357,7 +357,7 @@ def test_a_run_that_was_not_judged_claims_nothing() -> None:
     assert verdict_words(quiet)[0].lower() in verdict_line(None)  # as the terminal has it
 
 
-def test_a_report_without_a_task_tells_own_troubles_from_what_was_seen() -> None:
+def test_a_report_without_a_task_tells_system_alerts_from_what_was_seen() -> None:
     alert = Alert(1, "sink_failed", Severity.WARNING, 1.0, 1.0, (), "The sink fails.")
     run = replace(data(), tasks=(), alerts=(alert,), verdict=None)
     assert verdict_words(run)[0] == "Nothing unsafe was seen"

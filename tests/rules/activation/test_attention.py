@@ -52,7 +52,7 @@ def test_who_is_known_rests_with_a_reason() -> None:
     (told,) = asked(KNOWN)
     assert told.kind == "rest"
     assert told.data["region"] == REGION.id
-    assert told.reason == "Object 1 is known to be the arm, and nothing is asked of it now."
+    assert told.reason == "Object 1 is known to be the arm, and no further observation is needed."
 
 
 @pytest.mark.parametrize(

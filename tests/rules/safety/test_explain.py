@@ -108,7 +108,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
 
 def test_what_was_never_judged_cannot_be_explained() -> None:
     mind = watched(30)[-1].mind
-    with pytest.raises(RuleError, match="no rule has been judged"):
+    with pytest.raises(RuleError, match="no rules have been evaluated"):
         explain(Mind(), "collision_course", 1, 2)
     with pytest.raises(RuleError, match="did you mean 'contact'"):
         explain(mind, "contac", 1, 2)

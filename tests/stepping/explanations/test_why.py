@@ -38,7 +38,7 @@ KINDS = ("region", "hypothesis", "depth")
 TOLD = {
     "verdict": ("the verdict on dock is interrupted", "unexpected_object(object 2) is true"),
     "approach": ("stage approach: failing", "the arm and the satellite have been diverging"),
-    "stage captured": ("stage captured: pending", "arm is played by object 3"),
+    "stage captured": ("stage captured: pending", "arm is bound to object 3"),
     "touching 1 2": ("touching(the satellite, the hubble) has been false", "its value is"),
     "coupled 1 3": ("coupled(the satellite, the arm) is false", "touching"),
     "identity 1": ("object 1 is spartan", "votes, share"),
@@ -72,7 +72,7 @@ def test_records_themselves_can_be_asked_about(it: Stepper) -> None:
 
 
 def test_every_event_has_a_reason_that_ends_in_percepts(it: Stepper) -> None:
-    told = [e for _, e in it.told()]
+    told = [e for _, e in it.events()]
     assert {e.kind for e in told} >= {"entry", "identified", "alert", "verdict", "relation"}
     for event in told:
         why = it.why(event)
@@ -87,8 +87,8 @@ MISSING = {
     "stage captured": "before it, approach is failing",
     "captured": "awaited: coupled(the arm, the satellite) is false",
     "approach": "stage approach has begun",
-    "exit 2": "share of it that shows 1, less than 0.12 is needed",
-    "occlusion 1": "share of it that shows 1, less than 0.2 is needed",
+    "exit 2": "visible share 1, less than 0.12 is needed",
+    "occlusion 1": "visible share 1, less than 0.2 is needed",
     "reappearance 1": "object 1 is seen",
     "identified 1": "was identified as spartan",
     "entry 1": "has entered",

@@ -89,7 +89,7 @@ def test_what_comes_next_has_room_for_what_ends_well() -> None:
         assert task.success <= coming + 0.02 <= 1.03
     failing = prospects_text(belief(played, 15.0))
     assert "failure (" in failing
-    assert prospects_text(belief(played, 25.0)) == "next: nothing, it is over"
+    assert prospects_text(belief(played, 25.0)) == "next: nothing, the task is over"
 
 
 def test_success_falls_with_a_failure_and_rises_towards_the_end() -> None:

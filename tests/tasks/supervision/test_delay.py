@@ -65,9 +65,9 @@ def test_a_delay_of_the_first_stage_counts_from_the_beginning(begins: float, goo
     [
         (
             5.0,
-            "s after what comes before it, and should begin no sooner than 5 s",
+            "s after the stage before it, but should begin no sooner than 5 s",
         ),
-        (17.0, "`rinse` should begin no later than 10 s after what comes before it, and did not"),
+        (17.0, "`rinse` should begin no later than 10 s after the stage before it, but did not"),
     ],
 )
 def test_why_it_fails_is_told(begins: float, why: str) -> None:

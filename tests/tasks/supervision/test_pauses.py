@@ -159,7 +159,7 @@ def test_a_pause_and_its_end_are_told() -> None:
         (
             9.2,
             "stage_resumed",
-            "Stage `grasp` goes on: the arm and the part have been touching since 9.0 s.",
+            "Stage `grasp` has resumed: the arm and the part have been touching since 9.0 s.",
         ),
     ]
     assert task_of(played, 6.0).stages[0].status is Status.PAUSED

@@ -12,14 +12,14 @@ from visup.agent import Status
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.supervision.sentences import evidence, in_retrospect, outcome
+from visup.tasks.verification.reported import excludes, joined, since_reported, with_reported
 from visup.tasks.verification.step_monitor import StepMonitor
-from visup.tasks.verification.told import excludes, joined, since_told, with_told
 
 NEARED = StepMonitor(1.0, begun=2.3, helped_since=2.0, helped_at=3.0)
 HELD = StepMonitor(1.0, begun=3.9, held=True, held_s=4.3, fulfilled=True)
 PAIR = ("arm", "part")
-PARTED = with_told((), PAIR, "diverging", 2.4)
-COUPLED = with_told((), PAIR, "coupled", 8.3)
+PARTED = with_reported((), PAIR, "diverging", 2.4)
+COUPLED = with_reported((), PAIR, "coupled", 8.3)
 
 
 @pytest.mark.parametrize(
@@ -41,14 +41,14 @@ COUPLED = with_told((), PAIR, "coupled", 8.3)
         ("converging", replace(NEARED, told=PARTED), (), None, "converging from 2.4 s to 3.0 s"),
         (
             "coupled",
-            replace(HELD, told=with_told((), PAIR, "diverging", 5.6)),
+            replace(HELD, told=with_reported((), PAIR, "diverging", 5.6)),
             (),
             None,
             "since 5.6 s",
         ),
         (
             "coupled",
-            replace(HELD, told=with_told((), PAIR, "touching", 5.6)),
+            replace(HELD, told=with_reported((), PAIR, "touching", 5.6)),
             (),
             None,
             "since 3.9 s",
@@ -108,12 +108,12 @@ TELLINGS = st.lists(st.tuples(st.permutations(PAIR), RELATIONS, st.floats(0, 9))
 def test_no_two_that_exclude_each_other_are_told_for_the_same_time(
     tellings: list[tuple[list[str], str, float]], relation: str, since: float
 ) -> None:
-    told = joined(with_told((), who, what, until) for who, what, until in tellings)
-    begins = since_told(told, PAIR, relation, since)
+    told = joined(with_reported((), who, what, until) for who, what, until in tellings)
+    begins = since_reported(told, PAIR, relation, since)
     assert begins >= since
     untils = [until for _, what, until in tellings if excludes(what, relation)]
     assert begins == max((since, *untils))
-    assert since_told(told, ("arm", "target"), relation, since) == since
+    assert since_reported(told, ("arm", "target"), relation, since) == since
     assert not excludes(relation, relation)
     assert len(told) == len({what for _, what, _ in tellings})
 

@@ -48,7 +48,9 @@ class LakeDatabase:
             statements = self.connection.extract_statements(sql)
             if len(statements) != 1:
                 raise QueryError(
-                    f"these are {len(statements)} statements" if statements else "nothing is asked",
+                    f"these are {len(statements)} statements"
+                    if statements
+                    else "the query is empty",
                     expected="one SELECT",
                 )
             # Not EXPLAIN either: EXPLAIN ANALYZE runs what it explains.

@@ -1,4 +1,4 @@
-"""`visup archive`: lakes of many runs are filled."""
+"""`visup archive`: fill, compact and report on lakes of many runs."""
 
 from __future__ import annotations
 
@@ -51,28 +51,30 @@ FILLED = (
     *("workers", "scheduler", "memory_gb"),
     *("plan", "retry", "chunk"),
 )
-"""Settings of all clips; those of live sources, and of one clip alone, are left out."""
+"""Settings that apply to every clip, without those for live sources or single clips."""
 
 app = typer.Typer(no_args_is_help=True)
 
 
 @dataclass(frozen=True, slots=True)
 class ManyRuns:
-    """How many runs are looked into."""
+    """How runs are processed in parallel."""
 
     workers: Workers = None
 
 
 @dataclass(frozen=True, slots=True)
 class FillOptions:
-    """What else may be wanted of filling a lake."""
+    """Further options for filling a lake."""
 
-    plan: Annotated[bool, Option("Only say what would be done.", "--plan")] = False
-    retry: Annotated[bool, Option("Try clips again that were put aside.", "--retry")] = False
+    plan: Annotated[bool, Option("Only print what would be done.", "--plan")] = False
+    retry: Annotated[bool, Option("Retry clips that were set aside after failing.", "--retry")] = (
+        False
+    )
     chunk: Annotated[
         float | None,
         Option(
-            "Cut longer clips into chunks of so many seconds, which are watched beside each other.",
+            "Split longer clips into chunks of this length, which are watched in parallel.",
             metavar="SECONDS",
             at_least=SHORTEST_CHUNK_S,
         ),
@@ -80,7 +82,7 @@ class FillOptions:
 
     @property
     def cutting(self) -> Cutting | None:
-        """How long clips are cut; None for not at all."""
+        """How to split clips; None for not at all."""
         return None if self.chunk is None else Cutting(self.chunk)
 
 
@@ -100,11 +102,11 @@ def run(
     into: Into,
     settings_file: SettingsFile = None,
 ) -> None:
-    """Watch many clips, on many workers, and put the runs into a lake.
+    """Watch many clips on many workers, and store the runs in a lake.
 
-    A clip whose run is in the lake already is left out: stopped anywhere, the same command goes on where it
-    was. Exit code: 0 when all runs are in the lake, 1 when clips failed (the others are there), 2 on bad
-    input, 130 when you stopped it.
+    Clips whose run is already in the lake are skipped, so the same command continues after an interruption.
+    Exit code: 0 if all runs are in the lake, 1 if some clips failed (the others are stored), 2 for bad
+    input, 130 if you stopped it.
     """
     from visup.archive.filling.clips import clips_of
     from visup.archive.filling.filling import begin_anew, only_filler
@@ -140,9 +142,9 @@ def add(
     ],
     into: Into,
 ) -> None:
-    """Add runs that were watched to a lake; one that is there already is left alone.
+    """Add recorded runs to a lake; runs that are already there are skipped.
 
-    Exit code: 1 when one of them could not be added; the others are.
+    Exit code: 1 if a run could not be added (the others are added), 2 for bad input.
     """
     from visup.agent.model.errors import VisupError
     from visup.archive.adding import add_run
@@ -157,7 +159,7 @@ def add(
             complain(str(fault))
             failed += 1
         else:
-            echo(f"{key}  {folder}" if added else f"{key}  {folder} was there already")
+            echo(f"{key}  {folder}" if added else f"{key}  {folder} was already there")
     if store:
         store.push(lake)
     raise typer.Exit(1 if failed else 0)
@@ -168,12 +170,16 @@ def compact(
     lake: LakePlace,
     now: Annotated[
         bool,
-        typer.Option("--now", help="Remove what is replaced at once; when nobody asks the lake."),
+        typer.Option(
+            "--now",
+            help="Remove replaced files immediately; only while nobody is querying the lake.",
+        ),
     ] = False,
 ) -> None:
-    """Join the files of many runs, so that questions to large lakes are answered in seconds.
+    """Merge the files of many runs, so that queries on large lakes take seconds.
 
-    What is replaced is removed by the next call, ten minutes later at the earliest: others may be reading it.
+    Replaced files are removed by the next call, after ten minutes at the earliest, since a query may still
+    be reading them.
     """
     from visup.archive.filling.filling import only_filler
     from visup.archive.joining import compacting
@@ -186,8 +192,8 @@ def compact(
         if store:
             store.push(found)
     ending = "" if done.partitions == 1 else "s"
-    said = f"Joined: {done.joined} runs; the lake has {done.partitions} partition{ending}."
-    gone = f" Files that were replaced went, of {done.tidied} runs." if done.tidied else ""
+    said = f"Merged {done.joined} runs; the lake has {done.partitions} partition{ending}."
+    gone = f" Replaced files of {done.tidied} runs were removed." if done.tidied else ""
     echo(f"{said}{gone}")
 
 
@@ -199,10 +205,12 @@ def report(
     lake: LakePlace,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The page (default: report.html in the lake's folder)."),
+        typer.Option(
+            metavar="FILE", help="The page to write (default: report.html in the lake's folder)."
+        ),
     ] = None,
 ) -> None:
-    """Write a page about all runs: durations of stages by week and actor, drifts, how runs fail."""
+    """Write a page about all runs: stage durations by week and actor, drift, and how runs fail."""
     from visup.archive.asking.database import open_database
     from visup.archive.filling.stores import is_url
     from visup.archive.reporting.page import write_lake_page
@@ -224,9 +232,9 @@ def replay(
     wanted: Given,
     lake: LakePlace,
 ) -> None:
-    """Reason again about all runs of a lake, with other rules, tasks or actors, and say what changes.
+    """Reason again about all runs of a lake, with other rules, tasks or actors, and report what changes.
 
-    Exit code: 0 when nothing changes, 1 when something does, 2 on bad input.
+    Exit code: 0 if nothing changes, 1 if something does, 2 for bad input.
     """
     from visup.archive.replaying import ChangeSummary, changes
     from visup.archive.storing.places import open_lake
@@ -243,7 +251,7 @@ def replay(
 
 
 def _changed(one: RunChanges) -> str:
-    """What changes of a run, in a line."""
+    """What changes in a run, in one line."""
     lost, gained = one.alerts
     said = [f"{kind}: {lost.get(kind, 0)} lost, {gained.get(kind, 0)} gained"
             for kind in sorted({*lost, *gained})]  # fmt: skip
@@ -255,7 +263,7 @@ def _changed(one: RunChanges) -> str:
 def _filled(
     console: Console, lake: Lake, plan: Plan, where: PoolSettings, store: LakeStore | None
 ) -> FillResult:
-    """Watch what is missing, and tell of each clip."""
+    """Watch the clips that have no run yet, and report on each."""
     from visup.archive.filling.filling import FillResult, fill
     from visup.archive.filling.plan import check_settings
     from visup.archive.filling.pool import open_pool
@@ -273,13 +281,13 @@ def _filled(
                 console.print(f"Dashboard: {pool.dashboard}", soft_wrap=True, markup=False)
             return fill(lake, plan, pool, pushed(store, lake, told))
     except KeyboardInterrupt:
-        console.print("Stopped. The same command goes on from here.")
+        console.print("Stopped. Run the same command again to continue.")
         raise typer.Exit(130) from None
 
 
 @contextmanager
 def _progress(console: Console, plan: Plan) -> Iterator[Callable[[ClipOutcome], None]]:
-    """A line for each clip, and below them on a terminal how far it has come; time is reckoned by bytes."""
+    """One line per clip and, on a terminal, a progress bar; the time left is estimated from file sizes."""
     from rich import progress
 
     sizes = {job.run: job.bytes for job in plan.jobs}
@@ -301,7 +309,7 @@ def _progress(console: Console, plan: Plan) -> Iterator[Callable[[ClipOutcome], 
             done, video_s = done + 1, video_s + outcome.video_s
             _tell_outcome(console, outcome)
             took = bar.tasks[0].elapsed or 0.0
-            speed = f"{video_s / took:.1f} s of video a second" if took > 1.0 else ""
+            speed = f"{video_s / took:.1f} s of video per second" if took > 1.0 else ""
             bar.update(
                 task,
                 advance=sizes[outcome.run],
@@ -321,7 +329,7 @@ def _tell_outcome(console: Console, outcome: ClipOutcome) -> None:
 
 
 def _tell_failure(console: Console, failed: FailedClip) -> None:
-    word = "put aside" if failed.put_aside else "failed"
+    word = "set aside" if failed.put_aside else "failed"
     text = f"{failed.source}: {word}: {failed.reason}"
     console.print(text, style="yellow", soft_wrap=True, markup=False)
 
@@ -333,8 +341,8 @@ def _print_plan(console: Console, into: str, plan: Plan, workers: int) -> None:
     said = [f"{len(plan.jobs)} to watch ({plan.bytes / 1e6:.0f} MB)"]
     cut = [len(job.spans) for job in plan.jobs if job.spans]
     said += [f"{len(cut)} of them in {sum(cut)} chunks"] if cut else []
-    said += [f"{plan.present} in the lake already"] if plan.present else []
-    said += [f"{plan.same} the same as others"] if plan.same else []
+    said += [f"{plan.present} already in the lake"] if plan.present else []
+    said += [f"{plan.same} duplicates"] if plan.same else []
     said += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
     seconds = estimated_s(copy_of(into), plan.bytes, workers)
     if plan.jobs and seconds is not None:
@@ -347,7 +355,7 @@ def _closing(result: FillResult) -> Iterator[str]:
         rate = result.video_s / result.work_s
         yield (
             f"{result.added} runs added, {_duration(result.video_s)} of video; "
-            f"a worker watches {rate:.2f} s of video a second."
+            f"each worker watched {rate:.2f} s of video per second."
         )
     if result.failed:
         yield f"{len(result.failed)} clips have no run:"

@@ -1,4 +1,4 @@
-"""`visup archive calibrate`: how much the confidences of a lake are worth."""
+"""`visup archive calibrate`: how well the confidences of a lake are calibrated."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from visup.archive.lake import Lake
     from visup.evaluation.archive.calibrating import Reliability, RunTruth
 
-NOT_FITTED = "Nothing was fitted: --fit FILE does."
+NOT_FITTED = "No settings were fitted; use --fit FILE."
 
 
 def calibrate(
     lake: LakePlace,
     truth: Annotated[
         Path,
-        typer.Option(metavar="FILE", help="What is true: source,verdict,objects,stages (CSV)."),
+        typer.Option(metavar="FILE", help="Ground truth (CSV): source,verdict,objects,stages."),
     ],
     page: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a page with reliability diagrams.")
@@ -33,12 +33,12 @@ def calibrate(
     fit: Annotated[
         Path | None,
         typer.Option(
-            metavar="TOML", help="Fit how much a vote tells; write settings for `visup watch`."
+            metavar="TOML", help="Fit the weight of votes; write settings for `visup watch`."
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> None:
-    """Say how much confidences are worth: how often what was said so surely was right."""
+    """Check calibration: how often statements of a given confidence were right."""
     from visup.archive.asking.database import open_database
     from visup.archive.storing.places import open_lake
     from visup.evaluation.archive.calibrating import read_truth, reliabilities, truth_by_run
@@ -65,7 +65,7 @@ def calibrate(
 
 
 def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
-    """Fit what is meant to be fitted, and write it; what came of it, a sentence."""
+    """Fit the weight of identity votes and write it; returns a sentence about the result."""
     from visup.agent.model.errors import OutputError
     from visup.agent.storage.atomic import write_whole
     from visup.evaluation.archive.vote_fitting import FEWEST, fitted_evidence, labelled_votes
@@ -75,10 +75,10 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
     labelled = list(labelled_votes(lake, known))
     evidence = fitted_evidence(labelled)
     if evidence is None:
-        return f"{len(labelled)} objects are labelled: from {FEWEST} on, how much a vote tells is fitted."
+        return f"{len(labelled)} objects are labelled; fitting the weight of votes takes at least {FEWEST}."
     how = (
-        f"How much a vote for an identity tells, fitted to {len(labelled)} labelled objects;"
-        f" visup ships with {VoteSettings().evidence:g}."
+        f"Weight of a vote for an identity, fitted to {len(labelled)} labelled objects;"
+        f" the default is {VoteSettings().evidence:g}."
     )
     try:
         write_whole(path, fitted_settings(evidence, how).encode())
@@ -91,11 +91,11 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
 def _reliability_table(one: Reliability) -> Table:
     from visup.terminal.tables import table
 
-    shown = table("how often", "confidence", "right")
+    shown = table("count", "confidence", "right")
     for b in one.bins:
         shown.add_row(f"{b['count']:.0f}", f"{b['confidence']:.2f}", f"{b['right']:.2f}")
     shown.title = (
-        f"{one.kind}: {one.count} said, {one.right:.0%} right,"
+        f"{one.kind}: {one.count} statements, {one.right:.0%} right,"
         f" calibration error {one.error:.3f}, Brier {one.brier:.3f}"
     )
     return shown

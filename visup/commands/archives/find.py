@@ -1,4 +1,4 @@
-"""`visup find`: where in a lake a condition was true."""
+"""`visup find`: where in a lake a condition held."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FindOptions:
-    """Where is looked, and what becomes of what is found."""
+    """Where to search, and what to do with the hits."""
 
     unknown: Annotated[
-        bool, Option("Also when it was unknown; no run is left out then.", "--unknown")
+        bool,
+        Option("Also report where the condition was unknown; searches every run.", "--unknown"),
     ] = False
     as_json: Annotated[bool, Option("Print hits as JSON, one per line.", "--json")] = False
     scan_all: Annotated[
-        bool, Option("Look into every run, also where it cannot be.", "--scan-all")
+        bool, Option("Search every run, even those that an index rules out.", "--scan-all")
     ] = False
     first: Annotated[
-        int | None, Option("Stop after so many runs with hits.", metavar="N", at_least=1)
+        int | None, Option("Stop after this many runs with hits.", metavar="N", at_least=1)
     ] = None
     clips: Annotated[
-        Path | None, Option("Cut what is found out of the footage, as videos.", metavar="DIR")
+        Path | None, Option("Cut the hits out of the footage, as video clips.", metavar="DIR")
     ] = None
     workers: Workers = None
 
@@ -50,14 +51,14 @@ def find(
         str,
         typer.Argument(
             metavar="CONDITION",
-            help="A condition of the rule language, several with `and then`, a rules or a task file.",
+            help="A condition in the rule language, several joined by `and then`, or a rules or task file.",
         ),
     ],
 ) -> None:
-    """Find where in all runs of a lake a condition was true, judged as an agent would have.
+    """Find where a condition held, in all runs of a lake, evaluated exactly as in a live run.
 
-    Runs in which it cannot have been, by their recorded relations, are left out. Exit code: 0 when there are
-    hits, 1 when there are none, 2 on bad input.
+    Runs whose recorded relations rule the condition out are skipped. Exit code: 0 if there are hits, 1 if
+    there are none, 2 for bad input.
     """
     from visup.archive.asking.database import open_database
     from visup.archive.finding.search import find as look
@@ -72,12 +73,10 @@ def find(
     told = _told(console, look(found, search, possible, options.workers), options)
     if not options.as_json:
         share = f" ({100 * told.runs / len(runs):.0f} %)" if runs else ""
-        left = (
-            "" if told.runs == len(possible) else f"; not looked into: {len(possible) - told.runs}"
-        )
+        left = "" if told.runs == len(possible) else f"; not searched: {len(possible) - told.runs}"
         console.print(
             f"Hits: {told.hits}, in {told.hit_runs} of {len(runs)} runs;"
-            f" looked into: {told.runs}{share}{left}."
+            f" searched: {told.runs}{share}{left}."
         )
     raise typer.Exit(0 if told.hits else 1)
 
@@ -106,7 +105,7 @@ def _told(console: Console, found: Iterable[FoundRun], options: FindOptions) -> 
 
 
 def _cut(console: Console | None, found: FoundRun, folder: Path) -> None:
-    """Cut the hits of a run out; footage that is gone is told, and does not stop the others."""
+    """Cut the hits of a run out of its footage; missing footage is reported and does not stop the rest."""
     from visup.agent.model.errors import SourceError
     from visup.archive.finding.clips import cut_hits
     from visup.terminal.console import complain
@@ -133,7 +132,7 @@ def _tell(console: Console, found: FoundRun, as_json: bool) -> None:
         for line in _lines(found.hits):
             console.print(f"  {line}", soft_wrap=True, markup=False)
         console.print(
-            f"  open it: visup step {found.folder}", soft_wrap=True, markup=False, style="dim"
+            f"  inspect it: visup step {found.folder}", soft_wrap=True, markup=False, style="dim"
         )
 
 
@@ -144,4 +143,4 @@ def _lines(hits: tuple[Hit, ...]) -> Iterator[str]:
         word = ", unknown" if hit.truth == "unknown" else ""
         end = f"{hit.end:.1f} s" + (" (the end)" if hit.open else "")
         rule = f"{hit.rule}: " if hit.rule else ""
-        yield f"{rule}{hit.begin:.1f} to {end}: {who or 'nobody in particular'}{sure}{word}"
+        yield f"{rule}{hit.begin:.1f} to {end}: {who or 'no particular object'}{sure}{word}"

@@ -1,4 +1,4 @@
-"""How commands are told which lake is meant."""
+"""The argument and the option that name a lake."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Annotated
 import typer
 
 LakePlace = Annotated[
-    str, typer.Argument(metavar="LAKE", help="A lake of `visup archive`: its folder, or a URL.")
+    str, typer.Argument(metavar="LAKE", help="A lake made by `visup archive`: a folder or a URL.")
 ]
 Into = Annotated[
     str,
     typer.Option(
-        "--into", metavar="LAKE", help="The lake, a folder or URL; made when it is not there."
+        "--into", metavar="LAKE", help="The lake, a folder or URL; created if it does not exist."
     ),
 ]

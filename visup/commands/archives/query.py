@@ -1,4 +1,4 @@
-"""`visup query`: questions to a lake, in SQL."""
+"""`visup query`: query a lake in SQL."""
 
 from __future__ import annotations
 
@@ -23,21 +23,22 @@ SHOWN_ROWS = 50
 
 @dataclass(frozen=True, slots=True)
 class AnswerOptions:
-    """What becomes of an answer, and what is shown besides."""
+    """How a result is written, and what else is shown."""
 
     form: Annotated[
         str | None, Option("table (default), csv, json or parquet.", "--format", "FORM")
     ] = None
     out: Annotated[
-        Path | None, Option("Write the answer there: .csv, .json or .parquet.", metavar="FILE")
+        Path | None,
+        Option("Write the result to this file: .csv, .json or .parquet.", metavar="FILE"),
     ] = None
-    tables: Annotated[
-        bool, Option("Show what can be asked: tables and their columns.", "--tables")
-    ] = False
+    tables: Annotated[bool, Option("Show the tables and their columns.", "--tables")] = False
     examples: Annotated[
-        bool, Option("Show fifteen questions with their answers.", "--examples")
+        bool, Option("Show fifteen example queries with their results.", "--examples")
     ] = False
-    memory_gb: Annotated[float, Option("What a question may take, gigabytes.", at_least=0.1)] = 2.0
+    memory_gb: Annotated[float, Option("Memory that a query may use, gigabytes.", at_least=0.1)] = (
+        2.0
+    )
 
 
 @takes(AnswerOptions)
@@ -48,9 +49,9 @@ def query(
         str | None, typer.Argument(metavar="SQL", help="One SELECT, in the SQL of DuckDB.")
     ] = None,
 ) -> None:
-    """Ask a lake in SQL; it is read and nothing else.
+    """Query a lake in SQL (read-only).
 
-    Exit code: 0 when there is an answer, also an empty one, 2 when the question cannot be answered.
+    Exit code: 0 if the query ran, even with an empty result, 2 if it did not.
     """
     from visup.archive.asking.answers import answer_rows, as_csv, format_of, write_answer
     from visup.archive.asking.database import open_database
@@ -59,7 +60,7 @@ def query(
 
     options = AnswerOptions(**wanted)
     if not (sql or options.tables or options.examples):
-        raise typer.BadParameter("ask something, or see --examples", param_hint="SQL")
+        raise typer.BadParameter("give a query, or see --examples", param_hint="SQL")
     form = format_of(options.form, options.out)
     console = make_console(whole=True)
     with open_database(open_lake(lake), options.memory_gb) as database:
@@ -96,7 +97,7 @@ def _show(console: Console, answer: pa.Table) -> None:
     console.print(shown)
     more = answer.num_rows - head.num_rows
     if more > 0:
-        console.print(f"and {more} more rows: --format csv shows all", markup=False)
+        console.print(f"and {more} more rows; --format csv shows all", markup=False)
 
 
 def _show_examples(console: Console, database: LakeDatabase) -> None:
@@ -116,6 +117,6 @@ def _show_tables(console: Console, database: LakeDatabase) -> None:
         columns = database.ask(f"SELECT * FROM {name} LIMIT 0").column_names
         console.print(f"{name}: {meaning}", markup=False, soft_wrap=True)
         console.print(f"    {', '.join(columns)}", markup=False, soft_wrap=True)
-    said = f"Each relation, the times in which it held: {', '.join(RELATIONS)}"
+    said = f"Each relation, with the times at which it held: {', '.join(RELATIONS)}"
     console.print(said, markup=False, soft_wrap=True)
-    console.print("The tables as they are stored: lake.runs, lake.objects, ...", markup=False)
+    console.print("The stored tables: lake.runs, lake.objects, ...", markup=False)

@@ -1,4 +1,4 @@
-"""An evaluation as a command: its options, its run, its table, its file of figures, its exit code."""
+"""An evaluation as a command: its options, run, table, file of figures and exit code."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Figures = Mapping[str, Any]
-"""With `items` by name, and `total`; others are for the file."""
+"""Has `items` by name, and `total`; other keys go only to the file."""
 
 JSON = Setting(
-    "json_file", Path | None, None, Option("Write the figures to this file too.", "--json")
+    "json_file", Path | None, None, Option("Also write the figures to this file.", "--json")
 )
 
 
@@ -56,7 +56,7 @@ class EvaluationCommand:
     recorded: Callable[[Given], Given] = field(default=dict)
 
     def command(self) -> Callable[..., None]:
-        """What typer makes a command of."""
+        """The function that typer turns into a command."""
 
         def run(json_file: Path | None, **given: Any) -> None:
             self._run(json_file, given)
@@ -99,22 +99,22 @@ def folder_argument(about: str) -> Parameter:
 
 
 def count(name: str, default: int | None, about: str, at_least: int | None = 1) -> Setting:
-    """A whole number."""
+    """An integer option."""
     kind = int if default is not None else int | None
     return Setting(name, kind, default, Option(about, at_least=at_least))
 
 
 def flag(name: str, about: str) -> Setting:
-    """What is on or off."""
+    """A flag."""
     return Setting(name, bool, False, Option(about, f"--{name}"))
 
 
 FOLDER = folder_argument("Folder with the data and its ground truth.")
-LIMIT = count("limit", None, "Frames (or shapes) of each item, for a quick look.", None)
+LIMIT = count("limit", None, "Most frames (or shapes) of each item, for a quick look.", None)
 
 
 def _check_paths(folder: Path | None, json_file: Path | None) -> None:
-    """Refuse what cannot work before an evaluation of minutes begins.
+    """Refuse what cannot work before an evaluation of minutes starts.
 
     Raises:
         SettingsError: The folder does not exist.
@@ -130,6 +130,6 @@ def _check_paths(folder: Path | None, json_file: Path | None) -> None:
 
 @contextmanager
 def _progress_line(verb: str) -> Iterator[Callable[[str], None]]:
-    """A line on standard error that says what is being done, replaced as items are done."""
+    """A status line on standard error, updated as items are done."""
     with make_console(stderr=True).status(verb) as status:
         yield lambda text: status.update(f"{verb}: {text}")

@@ -32,7 +32,7 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
     for option, name in (alone | {"--train": "train", "--also": "also"}).items():
         if options[name]:
             raise SettingsError(
-                f"{option} means nothing without folds", expected="--folds N beside it"
+                f"{option} has no effect without folds", expected="--folds N with it"
             )
     return evaluate_motion(folder, limit=options["limit"], progress=progress)
 
@@ -86,7 +86,11 @@ MOTION = EvaluationCommand(
     ),
     (
         LIMIT,
-        count("folds", None, "Folds of families: choose settings on the others, score on each."),
+        count(
+            "folds",
+            None,
+            "Number of folds of families: settings are chosen on the others, and scored on each.",
+        ),
         Setting(
             "tries",
             list[str] | None,
@@ -95,15 +99,17 @@ MOTION = EvaluationCommand(
         ),
         flag(
             "stability",
-            "Show variants as well: mirrored, half the frames, smaller, compressed.",
+            "Also score variants: mirrored, half the frames, smaller, compressed.",
         ),
         Setting("against", Path | None, None, Option("Figures of an earlier run to compare with.")),
-        flag("train", "Learn what moves anew for each fold, from all others."),
+        flag("train", "Train the foreground model anew for each fold, on all others."),
         Setting(
-            "also", list[Path] | None, None, Option("Folder to learn from besides, for each fold.")
+            "also", list[Path] | None, None, Option("Further folder to train on, for each fold.")
         ),
-        count("seed", 0, "Of what is learnt.", 0),
-        Setting("cache", Path, Path("runs/folds"), Option("Folder for what folds measured.")),
+        count("seed", 0, "Seed of the training.", 0),
+        Setting(
+            "cache", Path, Path("runs/folds"), Option("Folder for intermediate results of folds.")
+        ),
     ),
     FOLDER,
     motion_closing,

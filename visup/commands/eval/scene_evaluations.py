@@ -20,7 +20,7 @@ from visup.commands.eval.evaluation import (
 from visup.commands.options import Setting
 from visup.runs.settings import Option
 
-_SEED = count("seed", 0, "Of all that is drawn.", 0)
+_SEED = count("seed", 0, "Random seed.", 0)
 _ADAPTERS = "visup.commands.eval.adapters"
 _CLIP_NAMES = Parameter(
     "names",
@@ -58,9 +58,9 @@ SCENE_EVALUATIONS = (
     ),
     EvaluationCommand(
         "machines",
-        """Machines at work, rendered and real: taught from a brief, watched, scored against the truth.
+        """Machines at work, rendered and real: taught from a brief, watched, scored against ground truth.
 
-        Beside it, in the same run: OpenCV's CSRT on the taught boxes, with the same tasks and rules.
+        For comparison, OpenCV's CSRT tracks the taught boxes in the same run, with the same tasks and rules.
         """,
         "visup.evaluation.machines.runner:evaluate_machines",
         "watching",
@@ -69,8 +69,10 @@ SCENE_EVALUATIONS = (
             *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
         ),
         (
-            flag("eyes", "Regions are made from the masks of worlds: reasoning by itself."),
-            Setting("baseline", bool, True, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            flag("eyes", "Take regions from the masks of the worlds, to score reasoning alone."),
+            Setting(
+                "baseline", bool, True, Option("Also run the CSRT baseline.", "--baseline/--alone")
+            ),
             LIMIT,
         ),
         FOLDER,
@@ -78,7 +80,7 @@ SCENE_EVALUATIONS = (
     ),
     EvaluationCommand(
         "orbits",
-        "Missions in orbit drawn from a seed: rendered, supervised, scored, thrown away.",
+        "Random missions in orbit: rendered, supervised, scored, discarded.",
         f"{_ADAPTERS}:random_orbits",
         "supervising",
         (
@@ -91,17 +93,17 @@ SCENE_EVALUATIONS = (
             "spin_error",
         ),
         (
-            count("count", 20, "How many missions."),
+            count("count", 20, "Number of missions."),
             _SEED,
-            count("width", 480, "Of the image, pixels.", 64),
-            count("workers", None, "Processes; as many as there are cores by default."),
+            count("width", 480, "Width of the image, pixels.", 64),
+            count("workers", None, "Worker processes (default: one per core)."),
             LIMIT,
         ),
         closing=adapters.orbits_closing,
     ),
     EvaluationCommand(
         "random",
-        """Worlds drawn from a seed: rendered, taught, watched, scored like machines, thrown away.
+        """Random worlds: rendered, taught, watched, scored like machines, discarded.
 
         Kinds are spread evenly over the count; rows are kinds.
         """,
@@ -112,19 +114,21 @@ SCENE_EVALUATIONS = (
             *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
         ),
         (
-            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
-            count("count", 60, "How many worlds."),
+            Setting("kind", list[str] | None, None, Option("Which kinds; all by default.")),
+            count("count", 60, "Number of worlds."),
             _SEED,
-            flag("eyes", "Regions are made from the masks: reasoning by itself."),
-            Setting("baseline", bool, False, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            flag("eyes", "Take regions from the masks, to score reasoning alone."),
+            Setting(
+                "baseline", bool, False, Option("Also run the CSRT baseline.", "--baseline/--alone")
+            ),
             LIMIT,
-            count("workers", None, "Processes that share the work; as many as there are cores."),
+            count("workers", None, "Worker processes (default: one per core)."),
         ),
         closing=adapters.random_closing,
     ),
     EvaluationCommand(
         "learning",
-        """Tasks learned from a few good runs of random missions, watched by their masks, judged on others.
+        """Tasks learned from a few good runs of random missions (by their masks), and tested on others.
 
         Rows are kinds of mission. Exit code 1 when a kind misses its bar: all good runs accepted, nine
         of ten bad ones refused.
@@ -133,18 +137,18 @@ SCENE_EVALUATIONS = (
         "watching and learning",
         ("accepted", "good", "refused", "bad", "unlike"),
         (
-            Setting("kind", list[str] | None, None, Option("Which kinds; five if none.")),
-            count("runs", 3, "Good runs that each task is learned from."),
-            count("count", 10, "Further good runs of each kind, and as many bad ones."),
+            Setting("kind", list[str] | None, None, Option("Which kinds; five by default.")),
+            count("runs", 3, "Good runs to learn each task from."),
+            count("count", 10, "Good runs of each kind to test on, and as many bad ones."),
             _SEED,
-            count("workers", None, "Processes that share the work; as many as there are cores."),
+            count("workers", None, "Worker processes (default: one per core)."),
         ),
         closing=adapters.learning_closing,
         failed=adapters.learning_failed,
     ),
     EvaluationCommand(
         "health",
-        "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
+        "Camera faults injected into good video: found within 1 s, correctly named, false reports.",
         "visup.evaluation.health.runner:evaluate_health",
         "watching",
         (
@@ -152,16 +156,16 @@ SCENE_EVALUATIONS = (
             *("false_reports", "hours", "false_reports_per_hour", "ms"),
         ),
         (
-            Setting("also", list[Path] | None, None, Option("Further folder with sound video.")),
-            count("faults", 100, "How many faults are injected."),
+            Setting("also", list[Path] | None, None, Option("Further folder with good video.")),
+            count("faults", 100, "Number of faults to inject."),
             _SEED,
-            count("limit", None, "Frames of each video when it is run unharmed."),
+            count("limit", None, "Frames of each video to run without faults."),
         ),
-        folder_argument("Folder with sound video anywhere below it."),
+        folder_argument("Folder with good video anywhere below it."),
     ),
     EvaluationCommand(
         "alarms",
-        """Alarms on sound footage, watched without a task: how many of each kind an hour.
+        """Alarms on good footage watched without a task: how many of each kind per hour.
 
         Below the folder stand clips, or recorded runs, which are reasoned about again in seconds.
         """,
@@ -169,11 +173,11 @@ SCENE_EVALUATIONS = (
         "watching",
         ("alarms", "clips", "per_hour", "hours", "noted", "lines_per_min"),
         (LIMIT,),
-        folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
+        folder_argument("Folder with good video, or recorded runs, anywhere below it."),
     ),
     EvaluationCommand(
         "feedback",
-        """Precision of alerts of each kind, from what people said of them in the console.""",
+        """Precision of each kind of alert, from the feedback given in the console.""",
         "visup.evaluation.feedback:evaluate_feedback",
         "counting",
         ("alerts", "right", "false", "precision"),
@@ -182,7 +186,7 @@ SCENE_EVALUATIONS = (
     ),
     EvaluationCommand(
         "clips",
-        """Rendered clips of what footage lacks: pan, shake, zoom, stops, eclipse ...
+        """Rendered clips of rare conditions: pan, shake, zoom, stops, eclipse ...
 
         Each has a bar. Exit code 1 when a clip misses its bar.
         """,
@@ -197,7 +201,7 @@ SCENE_EVALUATIONS = (
     ),
     EvaluationCommand(
         "scale",
-        "Model databases that grow: opening, answering, memory, and what the index loses.",
+        "Growing model databases: time to open and query, memory, and recall lost by the index.",
         f"{_ADAPTERS}:scale",
         "growing",
         (
@@ -210,13 +214,13 @@ SCENE_EVALUATIONS = (
     ),
     EvaluationCommand(
         "robustness",
-        "Damaged database files and odd masks: a clear error, an answer or nothing, within a second.",
+        "Damaged database files and odd masks: must give an error, an answer or nothing within a second.",
         "tests.oracles.shape.robustness:evaluate_robustness",
         "damaging",
         ("trials", "refused", "answered", "nothing", "failed", "worst_s"),
         (
-            count("files", 2000, "How many damaged database files.", 0),
-            count("masks", 2000, "How many odd masks.", 0),
+            count("files", 2000, "Number of damaged database files.", 0),
+            count("masks", 2000, "Number of odd masks.", 0),
             _SEED,
         ),
         closing=adapters.failures_closing("{kind}, number {number}: {what}, {seconds:.2f} s"),
@@ -230,10 +234,10 @@ SCENE_EVALUATIONS = (
         (),
         (
             count("views", 32, "Views of each mesh in the database."),
-            flag("machines", "Add thirteen machines that are made by code."),
-            count("queries", 12, "Silhouettes asked for of each mesh."),
-            count("seed", 0, "Of the queries.", 0),
-            count("limit", None, "Meshes, for a quick look."),
+            flag("machines", "Add thirteen machines generated by code."),
+            count("queries", 12, "Queries per mesh."),
+            count("seed", 0, "Seed of the queries.", 0),
+            count("limit", None, "Most meshes, for a quick look."),
         ),
         folder_argument("Folder of mesh files."),
         adapters.views_closing,

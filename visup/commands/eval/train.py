@@ -12,7 +12,7 @@ app = typer.Typer(no_args_is_help=True)
 
 @app.callback()
 def _group() -> None:
-    """Make the files of what was learnt from labelled data."""
+    """Train the learned parts of visup on labelled data."""
 
 
 @app.command("motion")
@@ -20,14 +20,14 @@ def motion(
     folders: Annotated[
         list[Path], typer.Argument(metavar="DIR...", help="Folders with sequences and their masks.")
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The file to be written.")],
-    seed: Annotated[int, typer.Option(help="Of all that is drawn.")] = 0,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")],
+    seed: Annotated[int, typer.Option(help="Random seed.")] = 0,
     limit: Annotated[int, typer.Option(help="Most frames of each sequence.")] = 250,
-    cache: Annotated[Path, typer.Option(help="Folder for the cues of sequences.")] = Path(
-        "runs/training"
-    ),
+    cache: Annotated[
+        Path, typer.Option(help="Folder in which to cache features of sequences.")
+    ] = Path("runs/training"),
 ) -> None:
-    """Learn which superpixels move by themselves, from sequences with masks.
+    """Learn which superpixels move independently, from sequences with masks.
 
     The same data and seed give the same bytes. MotionSettings(foreground=FILE) uses the file.
     """

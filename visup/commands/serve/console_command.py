@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 OPERATOR_VARIABLE = "VISUP_CONSOLE_TOKEN"
 VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
 PARENT_VARIABLE = "VISUP_CONSOLE_WITH_PARENT"
-"""Set where another process begins it: it ends with that, and leaves the processor to cameras."""
+"""Set by a process that starts the console: it then ends with that process, and runs at low priority."""
 
 SHORTEST_TOKEN = 16
 
 SaveTo = Annotated[
     Path | None,
-    typer.Option(help="Folder into which operators may save tasks, rules and zones."),
+    typer.Option(help="Folder in which operators may save tasks, rules and zones."),
 ]
 
 
@@ -34,19 +34,22 @@ def console(
     places: Annotated[
         list[Path], typer.Argument(metavar="RUN...", help="Run folders, or folders of them.")
     ],
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")] = 8086,
     name: Annotated[
-        list[str] | None, typer.Option(help="A name under which this machine is asked for.")
+        list[str] | None,
+        typer.Option(help="Another host name under which the console is reached; repeatable."),
     ] = None,
     save_to: SaveTo = None,
-    open_browser: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    open_browser: Annotated[
+        bool, typer.Option("--open", help="Open the console in the browser.")
+    ] = False,
 ) -> None:
-    """Look into runs in the browser: picture, timeline, beliefs, and the reason for every sentence.
+    """Browse runs in the browser: video, timeline, beliefs, and the reason for every statement.
 
-    Runs that go on are followed. The address that is printed holds a token that lets in whoever has it;
-    VISUP_CONSOLE_TOKEN sets your own, VISUP_CONSOLE_VIEWER_TOKEN one for those who may only look.
-    Exit code: 0 when it is stopped, 2 on bad input.
+    Live runs are followed. The printed address contains a token that grants access to whoever has it;
+    VISUP_CONSOLE_TOKEN sets your own, VISUP_CONSOLE_VIEWER_TOKEN one for read-only access.
+    Exit code: 0 when stopped, 2 for bad input.
     """
     try:
         from visup.console.access import LOOPBACK
@@ -57,7 +60,7 @@ def console(
         raise ExtraMissingError("the console", "console") from missing
     _check_reach(host)
     if save_to is not None and not save_to.is_dir():
-        raise SettingsError("there is no such folder to save to", where=str(save_to))
+        raise SettingsError("the folder to save to does not exist", where=str(save_to))
     state = ConsoleState(RunLibrary(places), save_to)
     access = _access((*LOOPBACK, host, *(name or ())))
     out = make_console(soft_wrap=True)
@@ -65,8 +68,8 @@ def console(
         _end_with_parent()
 
     def ready(address: str) -> None:
-        out.print(f"The console: {address}", markup=False, highlight=False)
-        out.print("Ctrl-C stops it.", style="dim")
+        out.print(f"Console: {address}", markup=False, highlight=False)
+        out.print("Press Ctrl-C to stop.", style="dim")
         if open_browser:
             webbrowser.open(address)
 
@@ -74,7 +77,7 @@ def console(
 
 
 def _end_with_parent() -> None:
-    """End once standard input does, and leave the processor to cameras."""
+    """End when standard input closes, and run at low priority."""
 
     def wait() -> None:
         while os.read(0, 4096):
@@ -87,19 +90,19 @@ def _end_with_parent() -> None:
 
 
 def _check_reach(host: str) -> None:
-    """Refuse to be reached by others without a token that somebody chose."""
+    """Refuse a host that others can reach unless somebody has chosen a token."""
     from visup.console.access import LOOPBACK
 
     if host not in LOOPBACK and OPERATOR_VARIABLE not in os.environ:
         raise SettingsError(
-            f"at {host} others can reach the console",
+            f"others can reach the console at {host}",
             expected=f"a token of your own in {OPERATOR_VARIABLE}",
-            hint="put a proxy with TLS before it, too: docs/console.md tells how",
+            hint="put it behind a TLS proxy as well, as docs/console.md describes",
         )
 
 
 def _access(hosts: tuple[str, ...]) -> Access:
-    """Who gets in, by tokens of the environment."""
+    """Access rights, by the tokens of the environment."""
     from visup.console.access import Access
 
     operator, viewer = (_token(name) for name in (OPERATOR_VARIABLE, VIEWER_VARIABLE))
@@ -113,7 +116,7 @@ def _token(name: str) -> str | None:
     token = os.environ.get(name)
     if token is not None and (len(token) < SHORTEST_TOKEN or not token.isascii()):
         raise SettingsError(
-            f"the token in {name} is too short, or not of plain letters",
+            f"the token in {name} is too short, or not plain ASCII",
             expected=f"at least {SHORTEST_TOKEN} letters and digits",
         )
     return token

@@ -20,12 +20,12 @@ RUN = "run"
 
 
 class SiteFirst(TyperGroup):
-    """Commands about sites; a word that is none of them is a site file, to be watched."""
+    """Commands about sites; any other word is taken as a site file to watch."""
 
     default_command = RUN
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As of any group, with `run` before the name of a site file."""
+        """As usual, with `run` inserted before the name of a site file."""
         named = next((word for word in args if not word.startswith("-")), None)
         if named is not None and named not in self.commands:
             args = [RUN, *args]
@@ -39,16 +39,15 @@ app = typer.Typer(no_args_is_help=True, cls=SiteFirst)
 def run(
     site_file: SiteFile,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Write what happens as JSON, one object a line.")
+        bool, typer.Option("--json", help="Log as JSON, one object per line.")
     ] = False,
 ) -> None:
-    """Watch all cameras of a site until it is stopped.
+    """Watch all cameras of a site until stopped.
 
-    Each camera has a process of its own, which is begun again when it dies, hangs or takes too much memory,
-    and goes on with all that was believed. SIGTERM or Ctrl-C closes all runs within 5 s; SIGHUP reads the
-    file again, and touches only the cameras that changed. Exit code: 0 when it was stopped or every source
-    was seen to its end, 2 when the file is not as it should be or another service uses its store, 5 when a
-    process did not close in time.
+    Each camera has its own process, which is restarted if it dies, hangs or uses too much memory, and
+    continues from its last checkpoint. SIGTERM or Ctrl-C closes all runs within 5 s; SIGHUP reloads the
+    file and restarts only the cameras that changed. Exit code: 0 if it was stopped or every source ended,
+    2 if the file is invalid or another service uses its store, 5 if a process did not close in time.
     """
     from visup.runs.inputs.stop_signals import stop_signals
     from visup.serving.service import serve
@@ -61,7 +60,7 @@ def run(
 
 
 def _log(*, as_json: bool) -> SiteLog:
-    """What writes each message to standard error with the time, in UTC."""
+    """The log of the service: timestamped messages (UTC) on standard error."""
     from visup.serving.site_log import SiteLog
     from visup.terminal.console import make_console
 
@@ -73,14 +72,14 @@ def _log(*, as_json: bool) -> SiteLog:
 def check(
     site_file: SiteFile,
     speed: Annotated[
-        bool, typer.Option(help="Also measure how many frames a second can be looked at.")
+        bool, typer.Option(help="Also measure how many frames per second can be processed.")
     ] = True,
 ) -> None:
-    """Say beforehand whether all cameras of a site can be watched, and by this machine.
+    """Check that all cameras of a site can be watched, and that this machine is fast enough.
 
-    Every source is opened; tasks, rules, zones, models, behaviours and sinks are loaded; the actors of each
-    task are looked for among the models; and some frames are looked at. Exit code: 0 when all can be
-    watched, 2 when the file is not as it should be or a camera cannot be watched.
+    Opens every source, loads tasks, rules, zones, models, behaviours and sinks, looks for a model for each
+    actor of the tasks, and processes a few frames. Exit code: 0 if all cameras can be watched, 2 if the
+    file is invalid or a camera cannot be watched.
     """
     from visup.serving.site.checking import check_camera, load_lines, store_fault
     from visup.serving.site.reading import read_site
@@ -118,7 +117,7 @@ def _tell(checked: CameraCheck) -> None:
 
 @app.command()
 def schema() -> None:
-    """Print the JSON Schema of site files, by which editors complete and check them."""
+    """Print the JSON Schema of site files, with which editors complete and check them."""
     from visup.serving.site.form import schema_text
     from visup.terminal.console import echo
 

@@ -1,4 +1,4 @@
-"""`visup task format`: task files in one layout."""
+"""`visup task format`: put task files into the standard layout."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from visup.terminal.console import echo
 
 
 def format_files(
-    files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
+    files: Annotated[
+        list[str], typer.Argument(help="Task files; `-` formats standard input to standard output.")
+    ],
     only_check: Annotated[
         bool,
-        typer.Option("--check", help="Change nothing; exit code 1 when a file is not formatted."),
+        typer.Option("--check", help="Change nothing; exit code 1 if a file is not formatted."),
     ] = False,
 ) -> None:
-    """Format task files; words, comments and meaning stay as they are."""
+    """Format task files in place; only the layout changes."""
     from visup.tasks.checks.files import read_text
 
     differ = False
@@ -40,7 +42,7 @@ def _write(file: str, text: str) -> None:
     from visup.agent.model.errors import OutputError, TaskError
 
     if not Path(file).is_file():
-        raise TaskError("it ships with visup and is not changed", where=file)
+        raise TaskError("this task ships with visup and cannot be changed", where=file)
     try:
         Path(file).write_text(text, encoding="utf-8")
     except OSError as e:

@@ -15,26 +15,28 @@ if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
     from visup.tasks.learning.judging import JudgedRun
 
-Runs = Annotated[list[Path], typer.Argument(help="Run folders of `visup watch`, or journals.")]
+Runs = Annotated[
+    list[Path], typer.Argument(help="Run folders of `visup watch`, or their journals.")
+]
 OneTask = Annotated[str, typer.Argument(help="A task file, `file.task:NAME`, or a shipped task.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
 
 
 def learn(
     runs: Runs,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Write the task here.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Task file to write.")],
     bad: Annotated[
         list[Path] | None,
         typer.Option("--bad", metavar="RUN", help="A run that went wrong; repeatable."),
     ] = None,
     name: Annotated[
-        str | None, typer.Option(help="Name of the task; that of the file if left out.")
+        str | None, typer.Option(help="Name of the task (default: that of the file).")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Propose a task file from good runs: stages in the order that all share, with their evidence.
+    """Propose a task file from good runs: the stages in the order they all share, with evidence.
 
-    Exit code: 1 when a good run is not accepted by it or a bad one is.
+    Exit code: 1 if it rejects a good run or accepts a bad one.
     """
     from visup.agent import Verdict
     from visup.runs.learning_runs import declared_actors, run_trace
@@ -61,11 +63,13 @@ def learn(
 
 
 def fit(
-    file: Annotated[Path, typer.Argument(help="A task file; it is changed in place.")],
+    file: Annotated[Path, typer.Argument(help="A task file, changed in place.")],
     runs: Runs,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would change.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only print what would change.")
+    ] = False,
 ) -> None:
-    """Fit `within` and `for` of a task file to good runs; all else in the file stays."""
+    """Fit the times of `within` and `for` in a task file to good runs; nothing else changes."""
     from visup.tasks.checks.files import read_text
     from visup.tasks.checks.load import load_task
     from visup.tasks.learning.fitting import fitted_amounts, with_amounts
@@ -82,9 +86,9 @@ def fit(
 
 
 def coverage(file: OneTask, runs: Runs, as_json: AsJson = False) -> None:
-    """Show which stages of a task runs have gone through, and which never.
+    """Show which stages of a task the runs have covered, and which they never have.
 
-    Exit code: 1 when a stage was never seen through.
+    Exit code: 1 if a stage was never completed.
     """
     from visup.tasks.checks.load import load_task
     from visup.tasks.learning.coverage import coverage_of, share_covered
@@ -105,7 +109,7 @@ def coverage(file: OneTask, runs: Runs, as_json: AsJson = False) -> None:
     else:
         for stage in stages:
             echo(str(stage))
-        echo(f"{share:.0%} of {len(stages)} stages were seen through")
+        echo(f"{share:.0%} of {len(stages)} stages were completed")
     raise typer.Exit(0 if share == 1.0 else 1)
 
 
@@ -114,9 +118,9 @@ def diff(
     second: OneTask,
     as_json: AsJson = False,
 ) -> None:
-    """Say how two tasks differ: by the courses that they allow, not by how they are written.
+    """Show how two tasks differ in the sequences they allow, however they are written.
 
-    Exit code: 0 when they do not differ, 1 when they do.
+    Exit code: 0 if they are equivalent, 1 if they are not.
     """
     from visup.tasks.checks.load import load_task
     from visup.tasks.learning.languages import difference
@@ -138,7 +142,7 @@ def _judged(task: Task, runs: Sequence[Path]) -> list[JudgedRun]:
 
 
 def _writable(path: Path) -> None:
-    """Fail before the work and not after it.
+    """Fail before the work rather than after it.
 
     Raises:
         OutputError: The file cannot be written.
@@ -147,5 +151,7 @@ def _writable(path: Path) -> None:
 
     if not path.parent.is_dir():
         raise OutputError(
-            "there is no such folder", where=str(path.parent), hint="make it, or write elsewhere"
+            "there is no such folder",
+            where=str(path.parent),
+            hint="create it, or write elsewhere",
         )

@@ -1,4 +1,4 @@
-"""`visup task simulate`: walk through the legal courses of a task, list them, draw some."""
+"""`visup task simulate`: walk through the sequences a task allows, list them, or sample them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 def simulate(
     file: Annotated[str, typer.Argument(help="A task file, `file.task:NAME`, or a shipped task.")],
     listed: Annotated[
-        int | None, typer.Option("--list", min=1, help="List this many courses, short ones first.")
+        int | None, typer.Option("--list", min=1, help="List this many sequences, shortest first.")
     ] = None,
     drawn: Annotated[
-        int | None, typer.Option("--sample", min=1, help="Draw this many courses at random.")
+        int | None, typer.Option("--sample", min=1, help="Sample this many sequences at random.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of what is drawn.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the sampling.")] = 0,
 ) -> None:
-    """Walk through a task step by step, or list or draw courses that it may take."""
+    """Walk through a task step by step, or list or sample the sequences it allows."""
     from visup.tasks.checks.load import load_task
 
     task = load_task(file)
@@ -59,10 +59,10 @@ def _sample(task: Task, count: int, seed: int) -> None:
 
 
 def _walk(task: Task) -> None:
-    """Ask at every step which way to go on, until the task ends or the user does."""
+    """Ask at every step how to continue, until the task ends or the user quits."""
     from visup.tasks.tools.simulate import initial_positions, successors
 
-    echo(f"task {task.name}: choose the next step by number; q ends the walk")
+    echo(f"task {task.name}: choose the next step by number; q quits")
     places = initial_positions(task)
     while True:
         for number, place in enumerate(places, 1):

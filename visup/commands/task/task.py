@@ -1,4 +1,4 @@
-"""`visup task`: check, lay out, show, explain, walk through, learn and compare task files."""
+"""`visup task`: check, format, show, explain, simulate, learn and compare task files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from visup.agent.model.errors import VisupError
 
 app = typer.Typer(
-    help="Check, show, lay out, try, learn and compare task files.", no_args_is_help=True
+    help="Check, format, show, simulate, learn and compare task files.", no_args_is_help=True
 )
 app.command("simulate")(simulate)
 app.command("format")(format_files)
@@ -24,17 +24,17 @@ for command in (learning.learn, learning.fit, learning.coverage, learning.diff):
     app.command(command.__name__)(command)
 
 Files = Annotated[list[str], typer.Argument(help="Task files, or names of shipped tasks.")]
-File = Annotated[str, typer.Argument(help="A task file or shipped task.")]
+File = Annotated[str, typer.Argument(help="A task file, or the name of a shipped task.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
 Without = Annotated[
     list[str] | None,
-    typer.Option(help="A kind of percept that will be missing, such as depth; repeatable."),
+    typer.Option(help="A kind of percept that will not be available, such as depth; repeatable."),
 ]
 
 
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
-    """Report every mistake in task files; exit code 2 if there is any."""
+    """Report every mistake in task files; exit code 2 if there are any."""
     from visup.agent.model.errors import SettingsError, TaskError, VisupError
     from visup.rules.language.diagnostics import raise_errors
     from visup.tasks.actions.actions import ALL_PERCEPTS
@@ -67,10 +67,10 @@ def show(
     file: File,
     form: Annotated[
         Literal["tree", "mermaid", "dot"],
-        typer.Option("--format", help="A tree for the terminal, or a picture's source."),
+        typer.Option("--format", help="A tree for the terminal, or source for a diagram."),
     ] = "tree",
 ) -> None:
-    """Draw a task: its tree, or its flow for Mermaid or Graphviz."""
+    """Draw a task as a tree, or as a flow chart for Mermaid or Graphviz."""
     from visup.tasks.checks.load import load_tasks
 
     for task in load_tasks(file):
@@ -86,7 +86,7 @@ def show(
 
 @app.command("list")
 def list_tasks(as_json: AsJson = False) -> None:
-    """List the tasks that ship with visup, each with the first line of its file."""
+    """List the tasks that ship with visup, with a line about each."""
     from visup.tasks.checks.files import read_text, shipped_tasks
 
     about = {name: _first_comment(read_text(name)) for name in shipped_tasks()}
@@ -100,7 +100,7 @@ def list_tasks(as_json: AsJson = False) -> None:
 
 @app.command()
 def actions(as_json: AsJson = False) -> None:
-    """List all that a stage may ask for: actions, words and quantities of rules, plug-ins' own."""
+    """List everything a stage can require: actions, predicates, quantities, also of plug-ins."""
     from visup.tasks.actions.actions import known_actions
     from visup.tasks.actions.describe import written
 
@@ -116,9 +116,9 @@ def actions(as_json: AsJson = False) -> None:
 
 @app.command()
 def explain(
-    code: Annotated[str, typer.Argument(help="A code, as messages show it: E102.")],
+    code: Annotated[str, typer.Argument(help="An error code from a message, such as E102.")],
 ) -> None:
-    """Say what a code means, with a wrong and a right example."""
+    """Explain an error code, with a wrong and a right example."""
     from visup.tasks.diagnostics.explain import explain as explanation
 
     echo(str(explanation(code)))
@@ -126,7 +126,7 @@ def explain(
 
 @app.command()
 def textmate() -> None:
-    """Write the TextMate grammar of task files, for editors that colour text by one."""
+    """Print the TextMate grammar of task files, for syntax highlighting in editors."""
     from visup.tasks.checks.files import textmate_grammar
 
     echo(textmate_grammar(), nl=False)
@@ -134,14 +134,12 @@ def textmate() -> None:
 
 @app.command()
 def syntax(
-    editor: Annotated[
-        Literal["vim", "emacs", "highlightjs"], typer.Argument(help="For which editor.")
-    ],
+    editor: Annotated[Literal["vim", "emacs", "highlightjs"], typer.Argument(help="The editor.")],
     language: Annotated[
-        Literal["task", "rules"], typer.Option(help="Which of the two languages.")
+        Literal["task", "rules"], typer.Option(help="The language to highlight.")
     ] = "task",
 ) -> None:
-    """Write a syntax file for an editor; its words are those of the grammar."""
+    """Print a syntax highlighting file for an editor, generated from the grammar."""
     from visup.tasks.tools.syntaxes import EDITORS, SYNTAXES
 
     echo(EDITORS[editor](SYNTAXES[language]), nl=False)
@@ -149,7 +147,7 @@ def syntax(
 
 @app.command()
 def lsp() -> None:
-    """Serve editors over stdin and stdout by the Language Server Protocol (extra `lsp`)."""
+    """Run a language server (LSP) for editors over stdin and stdout (extra `lsp`)."""
     from visup.agent.model.errors import ExtraMissingError
 
     try:

@@ -23,7 +23,7 @@ STYLES: dict[Kind, str] = {
 
 
 def task_tree(task: Task) -> Tree:
-    """The tree of a task for the terminal: stages with what they ask for, and declarations.
+    """The tree of a task for the terminal: stages with what they require, and declarations.
 
     Args:
         task: A task without mistakes.

@@ -1,4 +1,4 @@
-"""Where the boxes of a task's flow stand: in rows from its beginning down to its end."""
+"""Layout of a task's flow chart: rows of boxes from its beginning down to its end."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Edge = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class FlowBox:
-    """Where a box stands.
+    """Position of a box.
 
     Attributes:
         node: Number of the node of the flow, or its beginning or end.
@@ -44,7 +44,7 @@ class FlowBox:
 
 @dataclass(frozen=True, slots=True)
 class FlowLayout:
-    """Where everything stands.
+    """The layout of the flow chart.
 
     Attributes:
         boxes: By node.

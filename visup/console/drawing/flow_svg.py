@@ -1,4 +1,4 @@
-"""The flow of a task with what is believed of it: how each stage stands, how sure, and what may come next."""
+"""The flow chart of a task with the beliefs about it: status of each stage, confidence, prospects."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def _lines(box: FlowBox, node: Node) -> str:
 
 
 def _said(box: FlowBox, mark: StageMark) -> str:
-    """How it stands and how sure that is, or how likely it is next; at the right, where there is room."""
+    """Status with confidence, or the probability of being next, on the right."""
     if box.width <= ROOMY or not mark.said:
         return ""
     kind = "likely" if mark.kind.endswith("next") else "sure"

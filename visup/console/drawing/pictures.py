@@ -37,7 +37,7 @@ class RunPictures:
         self.problem = ""
         path = Path(source)
         if not source or not (path.is_file() or path.is_dir()):
-            self.problem = "The video is not there any more: pictures show outlines alone."
+            self.problem = "The video is no longer available: pictures show outlines only."
             return
         try:
             self._frames = ClipFrames(source)

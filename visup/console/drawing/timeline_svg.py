@@ -45,7 +45,7 @@ def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float) -> str:
 def in_words(tracks: Sequence[TimelineTrack]) -> str:
     """The same for those who cannot see it."""
     told = [f"{t.label}: {_spans_in_words(t.spans)}" for t in tracks if t.group != "object"]
-    return "; ".join(told) or "Nothing was told."
+    return "; ".join(told) or "No events."
 
 
 def _spans_in_words(spans: Sequence[TrackSpan]) -> str:

@@ -60,7 +60,7 @@ def show_alert(
 
 
 def _below(row: AlertRow, role: ConsoleRole, again: Callable[[], object]) -> None:
-    """Whose it is, how long it lasted, what was said of it, and what may be said."""
+    """Objects, duration, feedback so far, and buttons for feedback."""
     alert = row.alert
     until = "still open" if alert.closed is None else f"until {clock(alert.closed)}"
     told = [row.camera, alert.kind.replace("_", " "), until]

@@ -47,11 +47,11 @@ class DraftEditor:
         self.changed = True
 
     def name(self) -> None:
-        """Say what it is to those who cannot see it; again each time it is shown."""
+        """Set its accessible name, each time it is shown."""
         ui.run_javascript(_NAMED.format(id=self._field.id))
 
     def mark(self, faults: Sequence[DraftFault]) -> None:
-        """Mark the lines of mistakes; who points at one is told."""
+        """Mark the lines of mistakes, with tooltips."""
         last = self.text.count("\n") + 1
         lines: dict[int, str] = {}
         for fault in faults:

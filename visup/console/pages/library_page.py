@@ -29,7 +29,7 @@ def library_page(state: ConsoleState) -> None:
         if len(found) > MOST_SHOWN:
             ui.label(f"{len(found) - MOST_SHOWN} more: search for what you want").classes("dim")
         if not found:
-            ui.label("No run is called so." if wanted else "There is no run yet.").classes("dim")
+            ui.label("No run matches." if wanted else "There are no runs yet.").classes("dim")
 
     with ui.element("div").classes("card w-full"):
         ui.input("Search runs", on_change=lambda e: listed.refresh(str(e.value or ""))).props(

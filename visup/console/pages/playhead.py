@@ -72,7 +72,7 @@ class Playhead:
         self._tell()
 
     def choose(self, object_id: int | None) -> None:
-        """Look at an object; at none when it was looked at already."""
+        """Choose an object, or none if it was chosen already."""
         self.chosen = None if self.chosen == object_id else object_id
         self._tell()
 
@@ -106,14 +106,14 @@ class Playhead:
             self._tell()
 
     def toggle(self) -> None:
-        """Play, or pause; at the end it begins anew."""
+        """Play or pause; at the end, start again."""
         if not self.playing and self.number >= len(self.run.frames) - 1:
             self.go(0)
         self.playing = not self.playing
         self._tell()
 
     def next_event(self, forth: bool = True) -> None:
-        """Jump to the next moment at which something was told, or to the one before."""
+        """Jump to the next or the previous moment with an event."""
         told = sorted({e.time for e in self.run.events})
         here = self.run.times[self.number] if self.run.times else 0.0
         if forth:

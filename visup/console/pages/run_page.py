@@ -1,4 +1,4 @@
-"""The page of one run: picture, timeline, what is believed, what was told, and why."""
+"""The page of one run: picture, timeline, beliefs, events, and explanations."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from visup.console.drawing.timeline_svg import timeline_svg
 from visup.console.pages.frame import button, clock, page_frame, shown_text, verdict_badge
 from visup.console.pages.panels.ask_panel import ask_panel
 from visup.console.pages.panels.belief_panel import belief_panel
+from visup.console.pages.panels.events_panel import alerts_panel, events_panel
 from visup.console.pages.panels.steps_panel import steps_panel
-from visup.console.pages.panels.told_panel import alerts_panel, events_panel
 from visup.console.pages.panels.try_panel import try_panel
 from visup.console.pages.panels.write_panel import write_panel
 from visup.console.pages.picture import RunPicture
@@ -26,8 +26,8 @@ REFRESH_S = 2.0
 
 KEYS = (
     ("space", "play or pause"),
-    ("← →", "one frame back or forth; with Shift ten"),
-    ("p n", "the event before, the next event"),
+    ("← →", "one frame back or forward; ten with Shift"),
+    ("p n", "previous event, next event"),
     ("Home End", "to the start, to the end"),
 )
 
@@ -52,7 +52,7 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
     with page_frame(run.folder.name):
         verdict_badge(run.verdict, ended=run.ended)
     if not run.frames:
-        ui.label("Nothing was judged in this run yet.").classes("card w-full")
+        ui.label("Nothing has been processed in this run yet.").classes("card w-full")
         return
     with ui.element("div").classes("run-grid"):
         with ui.element("section").classes("card").props('aria-label="Picture and timeline"'):
@@ -71,11 +71,11 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
 def _controls(head: Playhead) -> None:
     with ui.element("div").classes("controls").props('role=group aria-label="Playing"'):
         button("first_page", "To the start", lambda: head.go(0))
-        button("skip_previous", "The event before (p)", lambda: head.next_event(forth=False))
+        button("skip_previous", "Previous event (p)", lambda: head.next_event(forth=False))
         button("chevron_left", "One frame back (←)", lambda: head.step(-1))
         play = button("play_arrow", "Play or pause (space)", head.toggle)
-        button("chevron_right", "One frame forth (→)", lambda: head.step(1))
-        button("skip_next", "The next event (n)", head.next_event)
+        button("chevron_right", "One frame forward (→)", lambda: head.step(1))
+        button("skip_next", "Next event (n)", head.next_event)
         button("last_page", "To the end", lambda: head.go(len(head.run.frames) - 1))
         speeds = {s: f"{s:g}×" for s in SPEEDS}
         ui.select(speeds, value=1.0, on_change=lambda e: setattr(head, "speed", e.value)).props(
@@ -125,14 +125,14 @@ def _timeline(head: Playhead) -> None:
 
 
 def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
-    names = ("Now", "Told", "Alerts", "Ask", "Steps", "Try", "Write")
+    names = ("Now", "Events", "Alerts", "Ask", "Steps", "Try", "Write")
     head.panel = names[0]
     with ui.tabs().props("dense align=left no-caps") as tabs:
         made = {name: ui.tab(name) for name in names}
     with ui.tab_panels(tabs, value=made["Now"], animated=False).classes("w-full"):
         with ui.tab_panel(made["Now"]):
             belief_panel(state, head, key, role)
-        with ui.tab_panel(made["Told"]):
+        with ui.tab_panel(made["Events"]):
             events_panel(head)
         with ui.tab_panel(made["Alerts"]):
             alerts_panel(head, key, role)
@@ -173,7 +173,7 @@ def _keys(head: Playhead) -> None:
 
 
 def _follow(state: ConsoleState, key: str, head: Playhead) -> None:
-    """Read on in a run that goes on, and stay at its end if the cursor is there."""
+    """Refresh a live run, and stay at its end if the cursor is there."""
 
     def look() -> None:
         try:

@@ -1,4 +1,4 @@
-"""The alerts of all cameras in one list, the latest first: filtered, looked at, said to be seen."""
+"""The alerts of all cameras in one list, latest first, with filters and acknowledgement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All cameras at once: the latest run of each, how it stands, and the alerts of all of them."""
+"""All cameras: the latest run of each with its state, and the alerts of all."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_ROWS = 60
 
 
 def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
-    """The latest run of each camera, and all runs without one that still go on; by name."""
+    """The latest run of each camera, and all live runs without one; by name."""
     chosen: dict[str, RunEntry] = {}
     for entry in entries:
         name = entry.camera or ("" if entry.ended else str(entry.folder))
@@ -35,7 +35,7 @@ def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
 
 
 def wall_page(state: ConsoleState, role: ConsoleRole) -> None:
-    """Lay out the wall; it looks anew every few seconds, and draws anew what has changed."""
+    """Lay out the wall; it refreshes every few seconds, and redraws what has changed."""
     with page_frame("Cameras"):
         pass
     wall = _Wall(state, role)
@@ -78,7 +78,9 @@ class _Wall:
             for entry in found:
                 _tile(self._state, entry)
         if not found:
-            ui.label("No camera is watched, and no run goes on.").classes("card w-full")
+            ui.label("No camera is being watched, and no run is in progress.").classes(
+                "card w-full"
+            )
 
     @ui.refreshable_method
     def alerts(self, rows: Sequence[AlertRow] = ()) -> None:

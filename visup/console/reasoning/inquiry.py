@@ -1,4 +1,4 @@
-"""Why, why not, and what if, asked of a recorded run: `visup.stepping` behind a lock, for many pages.
+"""Why, why not and what-if for a recorded run: `visup.stepping` behind a lock, for many pages.
 
 The console adds no logic of its own here. Reasons come from the mind that reasoned, which a journal does not
 keep; so the run is reasoned again up to the moment that is asked about. That takes a second for a thousand
@@ -35,7 +35,7 @@ _INCLUDE = re.compile(r"^[^#\n]*\binclude\b", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class AlternativeCourse:
-    """What a branch tells otherwise than the run did.
+    """How a branch differs from the run.
 
     Attributes:
         assumed: What was assumed, in words.
@@ -62,7 +62,7 @@ class Inquiry:
         self._stepper, self._lock = Stepper.of_run(folder), Lock()
 
     def why(self, number: int, what: str) -> Why:
-        """Why something is so after a step, as `why` in `visup step`; `not ...` asks why it is not.
+        """Explain something after a step, as `why` in `visup step`; `not ...` asks why not.
 
         Args:
             number: Of the step, from 1.
@@ -138,7 +138,7 @@ class Inquiry:
         """
         words = what.split()
         if not words:
-            raise SettingsError("no assumption is given", expected="such as: object 2 satellite")
+            raise SettingsError("no belief was given", expected="such as: object 2 satellite")
         with self._lock:
             self._stepper.go(number)
             here = self._stepper
@@ -148,7 +148,7 @@ class Inquiry:
     def as_if_answered(
         self, number: int, object_id: int, name: str, steps: int
     ) -> AlternativeCourse:
-        """How the run would have gone on, had its operator said after a step who an object is.
+        """How the run would have continued if its operator had identified an object after a step.
 
         Args:
             number: Of the step, from 1.

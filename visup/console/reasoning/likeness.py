@@ -13,7 +13,7 @@ BEST = 3
 
 
 def likeness_picture(run: RunView, number: int, object_id: int) -> bytes:
-    """The silhouette of an object, and the views that it looked like when it was last looked at.
+    """The silhouette of an object, and the views that it matched when last matched.
 
     The views are searched anew, among all: a run may have looked only for what its tasks name.
 

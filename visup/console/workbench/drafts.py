@@ -1,4 +1,4 @@
-"""A text that is being written in the page: its mistakes, its tree, and the words that may stand in it."""
+"""A text being edited in the page: its mistakes, its tree, and completions."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _said(fault: Diagnostic) -> str:
 
 
 def words_at(kind: DraftKind, text: str, place: int) -> list[Completion]:
-    """What may stand at a place, with what is begun there already taken into account.
+    """Completions at a position, given what has been typed there.
 
     Args:
         kind: What the text is.

@@ -1,4 +1,4 @@
-"""The objects of a run: who each was, what it looked like, and when it was there."""
+"""The objects of a run: name, picture, and when each was in view."""
 
 from __future__ import annotations
 

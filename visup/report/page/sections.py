@@ -84,11 +84,11 @@ def _tile(name: str, value: str) -> str:
 def narrative(run: RunData) -> str:
     """All sentences in order, each leading to the key frame nearest to it."""
     if not run.events:
-        return "<p class=empty>Nothing happened that was worth telling.</p>"
+        return "<p class=empty>Nothing notable happened.</p>"
     shown = shown_frames(run)
     lines = "".join(_told(run, e, nearest(shown, e)) for e in run.events)
     more = (
-        f"<p class=empty>{run.events_left_out} later sentences are only in the journal.</p>"
+        f"<p class=empty>{run.events_left_out} later events are only in the journal.</p>"
         if run.events_left_out
         else ""
     )
@@ -205,7 +205,7 @@ def _data(jpeg: bytes) -> str:
 
 
 def tasks(run: RunData) -> str:
-    """How each task stood at the end: who played which actor, how each stage ended and why."""
+    """The final state of each task: actors, and how each stage ended and why."""
     if not run.tasks:
         return "<p class=empty>There was no task to follow.</p>"
     return "".join(_task(run, t) for t in run.tasks)
@@ -259,7 +259,7 @@ def similarity(run: RunData) -> str:
     compared = [k for k in shown_frames(run) if any(look.matches for look in k.looks)]
     heaviest = sorted(compared, key=lambda k: (-k.weight, k.time))[:MOST_COMPARED]
     if not heaviest:
-        return "<p class=empty>No region was compared with models; name a database of models.</p>"
+        return "<p class=empty>No region was compared with models; use --models DB.</p>"
     return "".join(_compared(k) for k in sorted(heaviest, key=lambda k: k.time))
 
 

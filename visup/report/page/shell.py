@@ -17,7 +17,7 @@ from visup.report.page.figures import Figure
 SAID = {
     "noscript": '<noscript><p class="notice">The figures need scripts to be drawn; everything else on this'
     " page, and each figure in words, is here without them.</p></noscript>",
-    "whole": "Written by visup. This page holds all that it shows and asks nothing of the network.",
+    "whole": "Written by visup. This page is self-contained and loads nothing from the network.",
 }
 """What bodies of pages may name, and every page says alike."""
 MEDIA = " media-src 'self' file:;"
@@ -82,7 +82,7 @@ def _script_hash(script: str) -> str:
 
 
 def embedded(figures: Sequence[Figure]) -> str:
-    """Figures as JSON that can stand inside a script element without ever ending it."""
+    """Figures as JSON that is safe inside a script element."""
     values = [{"id": f.key, "data": f.traces, "layout": f.layout} for f in figures]
     text = json.dumps(values, separators=(",", ":"), allow_nan=False)
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

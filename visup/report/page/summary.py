@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
-from visup.agent.cycle.own_troubles import grave_kinds, verdict_without_task
+from visup.agent.cycle.system_alerts import grave_kinds, verdict_without_task
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.report.records import KeyFrame, ReportedObject, RunData, StateSpan
 
@@ -22,11 +22,11 @@ VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {
 WITHOUT_TASK: dict[Verdict | None, tuple[str, str]] = {
     None: ("Nothing unsafe was seen", "There was no task to judge."),
     Verdict.INTERRUPTED: (
-        "Something grave was seen",
+        "Something unsafe was seen",
         "There was no task to judge.",
     ),
     Verdict.UNKNOWN: (
-        "Not all could be watched",
+        "The scene could not always be watched",
         "There was no task to judge; nothing unsafe was seen in what could be watched.",
     ),
 }

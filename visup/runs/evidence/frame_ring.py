@@ -1,4 +1,4 @@
-"""The last seconds of what was seen, as JPEG in memory: at most so many seconds, and so many bytes."""
+"""A ring buffer of recent frames as JPEG, limited in seconds and bytes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ QUALITY = 80
 
 @dataclass(frozen=True, slots=True)
 class EncodedFrame:
-    """A frame as it is kept.
+    """An encoded frame.
 
     Attributes:
         time: Seconds of the source.
@@ -29,7 +29,7 @@ class EncodedFrame:
 
 
 def encoded(image: NDArray[np.uint8], time: float) -> EncodedFrame:
-    """A frame as it is kept: no wider than a video of a run.
+    """Encode a frame, no wider than the video of a run.
 
     Args:
         image: (H, W, 3) uint8 BGR.

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import Alert, AlertCondition, Frame, Severity
-from visup.agent.cycle.own_troubles import NOT_RECORDED
+from visup.agent.cycle.system_alerts import NOT_RECORDED
 from visup.agent.execution.runners import error_line
 from visup.agent.model.step import Step
 from visup.agent.storage.atomic import write_whole
@@ -41,7 +41,7 @@ KEYS = ("snapshot", "clip")
 
 
 class _Room:
-    """What is free on the disk of a folder, looked at once in a while.
+    """Free space on the disk of a folder, checked from time to time.
 
     Args:
         folder: Which.
@@ -110,7 +110,7 @@ class EvidenceKeeper:
         return found
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """That evidence cannot be kept, as long as it cannot."""
+        """The fault that evidence cannot be saved, while that is so."""
         if self._fault:
             said = "Pictures and clips of alerts cannot be kept; supervision goes on."
             yield _not_recorded(EVIDENCE, said, self._fault)
@@ -136,7 +136,7 @@ class EvidenceKeeper:
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     def _guarded(self, act: Callable[[], None]) -> None:
-        """Evidence may be lost, supervision goes on: what is wrong is told."""
+        """Evidence may be lost but supervision continues: errors are reported."""
         try:
             act()
         except Exception as fault:

@@ -24,7 +24,7 @@ LARGEST_FILE = 2**16
 
 
 def put_answer(folder: Path, object_id: int, name: str) -> None:
-    """Leave an answer for a run that goes on, in any process.
+    """Leave an answer for a live run, from any process.
 
     Args:
         folder: Of the run.

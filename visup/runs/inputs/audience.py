@@ -1,4 +1,4 @@
-"""Who follows a run while it goes on, and what each is told."""
+"""The audience of a run: observers, progress, operator, notices."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class RunFigures:
 
 @dataclass(frozen=True, slots=True)
 class Audience:
-    """Who follows a run while it goes on.
+    """The audience of a live run.
 
     Attributes:
         observers: Given each step and its frame, after it is recorded.

@@ -32,7 +32,7 @@ def preflight(settings: WatchSettings) -> Iterator[str]:
     with open_video(settings) as video:
         frames = "" if video.frame_count is None else f", {video.frame_count} frames"
         width, height = video.size
-        yield f"source {video.name}: {width} x {height} pixels, {video.fps:g} frames a second{frames}"
+        yield f"source {video.name}: {width} x {height} pixels, {video.fps:g} frames per second{frames}"
         notes = video.notes
     agent = build_agent(settings)
     try:
@@ -69,7 +69,7 @@ def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False)
     if needed and needed <= set(lost):
         raise _refusal(settings, tasks, lost)
     return tuple(
-        f"Nothing tells what the actor '{actor}' looks like: the model database has no "
+        f"It is not known what the actor '{actor}' looks like: the model database has no "
         f"{' or '.join(repr(m) for m in models)}."
         for actor, models in lost.items()
     )
@@ -78,7 +78,7 @@ def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False)
 def unrecognisable(
     tasks: Sequence[Task], actors: Mapping[str, tuple[str, ...]], known: Collection[str]
 ) -> dict[str, tuple[str, ...]]:
-    """Actors that are told by models alone, of which there are none.
+    """Actors that are identified by models only, none of which exists.
 
     Args:
         tasks: All tasks of a run.
@@ -126,9 +126,9 @@ def _refusal(
         f"{settings.models} has no model of them" if settings.models else "there are no models"
     )
     return SettingsError(
-        f"task {names} cannot be followed: nothing tells what its actors look like ({who}; {missing})",
-        expected="a model database that knows them (--models DB), and --actor NAME=MODEL where the "
-        f"names differ; or a task that says it: actor {actor} is red",
+        f"task {names} cannot be followed: it is not known what its actors look like ({who}; {missing})",
+        expected="a model database that contains them (--models DB), and --actor NAME=MODEL where the "
+        f"names differ; or a task that describes them, such as: actor {actor} is red",
         hint=f"outline them once: visup teach {redacted(settings.source)} --models cell.models"
         if not settings.models
         else f"visup models list {settings.models}; then --actor {actor}=MODEL in place of "

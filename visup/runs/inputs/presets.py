@@ -13,7 +13,7 @@ from visup.rules.presence import ObjectSettings
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """What suits a kind of scene; each part has its reason, which `visup presets` tells.
+    """Settings for a kind of scene, each with its reason, which `visup presets` prints.
 
     Attributes:
         name: As it is typed.
@@ -37,7 +37,7 @@ class Preset:
     pace_because: str
 
     def every(self, fps: float) -> int:
-        """Every how many frames of a source one is looked at.
+        """Use every n-th frame of a source: n.
 
         >>> PRESETS["traffic"].every(30.0), PRESETS["traffic"].every(10.0), PRESETS["cell"].every(60.0)
         (2, 1, 1)
@@ -46,7 +46,7 @@ class Preset:
 
 
 def every_for(enough_fps: float, fps: float) -> int:
-    """Every how many frames of a source are looked at, where so many a second are enough.
+    """The n for using every n-th frame, if a given rate is enough.
 
     >>> every_for(5.0, 25.0), every_for(5.0, 24.0), every_for(5.0, 3.0)
     (5, 4, 1)

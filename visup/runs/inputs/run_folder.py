@@ -24,7 +24,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
         # Nobody is told to delete a run that goes on.
         acquire_lock(out / JOURNAL, "this run").release()
         raise OutputError(
-            "the folder holds a run already",
+            "the folder already contains a run",
             where=str(out),
             hint="choose another folder, or delete this one",
         )
@@ -44,7 +44,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
 
 
 def discard_unbegun(folder: Path) -> None:
-    """Take away a folder in which no run could be begun, as on a full disk; what holds anything stays."""
+    """Remove the empty folder of a run that could not be started, as on a full disk."""
     journal = folder / JOURNAL
     with suppress(OSError):
         if journal.stat().st_size == 0:

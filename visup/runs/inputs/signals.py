@@ -1,4 +1,4 @@
-"""Signals of a run: tables and brokers, and whether all that rules and tasks name is told."""
+"""Signals of a run: tables and brokers, and whether all signals used by rules and tasks are provided."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BROKER = "mqtt:"
 
 
 def signal_behaviours(places: Sequence[Path | str]) -> list[SignalBehaviour]:
-    """What tells the signals of a run; nobody where none are given.
+    """The behaviours that provide the signals of a run, if any.
 
     Args:
         places: Tables (CSV), or brokers as `mqtt:HOST[:PORT]/TOPIC`.
@@ -65,14 +65,14 @@ def check_signals(
     for name, who, where in _named(rules, tasks):
         if name in known:
             continue
-        what = f"{who} asks for the signal `{name}`, which nobody tells"
+        what = f"{who} asks for the signal `{name}`, which no source provides"
         near = did_you_mean(name, known) if known else None
         expected = f"one of: {', '.join(sorted(known))}" if known else "`--signal FILE.csv`"
         raise SettingsError(what, where=where or None, expected=expected, hint=near)
 
 
 def _named(rules: Iterable[Rule], tasks: Iterable[Task]) -> Iterator[tuple[str, str, str]]:
-    """Each signal that is named, who names it, and where."""
+    """Each signal that is used, by what, and where."""
     for rule in rules:
         for call in (c for f in rule.formulas for c in calls(f) if c.name in SIGNAL_WORDS):
             if call.name != "signal_known":

@@ -25,7 +25,7 @@ class Speed:
 
     @property
     def load(self) -> float:
-        """How many processors it takes to look at all that is asked for.
+        """The number of processors that the requested frame rates take.
 
         >>> Speed(possible=20.0, wanted=5.0).load
         0.25

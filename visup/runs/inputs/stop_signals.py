@@ -20,7 +20,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @dataclass(slots=True)
 class StopRequest:
-    """What signals asked for.
+    """A request to stop or reload, from a signal.
 
     Attributes:
         received: A stop.

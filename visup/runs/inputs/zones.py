@@ -30,7 +30,7 @@ _EXAMPLE = '[[zone]], name = "dock", polygon = [[100, 80], [300, 80], [300, 240]
 
 
 def load_zones(path: Path) -> tuple[Zone, ...]:
-    """The zones of a settings file; every fault of it is told at once.
+    """Load the zones of a file; all errors are reported together.
 
     Raises:
         SettingsError: The file cannot be read, or is no such file.
@@ -40,7 +40,7 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
 
 
 def read_zones(text: str, path: str) -> tuple[Zone, ...]:
-    """The zones of the text of a settings file; every fault of it is told at once.
+    """Parse the zones in the text of a file; all errors are reported together.
 
     Args:
         text: TOML.
@@ -104,11 +104,11 @@ def _ground(given: object, path: str) -> Ground | None:
     )
     fine = len(image) == len(floor) >= 4 and all(image) and all(floor)
     if not fine or set(table) - {"image", "floor"}:
-        raise SettingsError("the ground is not as it should be", where=where, expected=_GROUND)
+        raise SettingsError("the ground is invalid", where=where, expected=_GROUND)
     metres = tuple((Number(p[0], "m"), Number(p[1], "m")) for p in floor if p is not None)
     ground = Ground(tuple(p for p in image if p is not None), metres)
     if floor_map(ground) is None:
-        what = "three of the points lie in a line, so they do not tell the floor"
+        what = "three of the points lie on a line, so they do not determine the floor"
         raise SettingsError(what, where=where, expected="such as the corners of a rectangle")
     return ground
 
@@ -190,7 +190,7 @@ def _polygon(
     polygon = tuple(p for p in points if p is not None)
     if area(polygon) < least:
         raise SettingsError(
-            "the polygon encloses nothing", where=where, hint="give the corners in their order"
+            "the polygon encloses nothing", where=where, hint="give the corners in order"
         )
     return polygon
 

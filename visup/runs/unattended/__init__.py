@@ -1,4 +1,4 @@
-"""What a run needs that nobody sits beside, for months.
+"""Support for unattended runs of months.
 
 One run follows the other (`next_run.py`), nobody is woken at night for what can wait (`quiet_hours.py`), and
 it is known what its time is spent on (`phase_meter.py`).

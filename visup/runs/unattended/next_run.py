@@ -1,4 +1,4 @@
-"""A run is followed by the next while the same agent goes on: what is believed is lost in no moment.
+"""Consecutive runs with the same agent, so that no beliefs are lost.
 
 The next run has a journal and a checkpoint of its own before the first step that it records, so that whoever
 is killed in between goes on with the one or the other. Books of the old one are closed beside the watching.
@@ -21,7 +21,7 @@ ROLLED = "rolled"
 """How a run ended that is followed by another, in its fact `ended`; `next_run` names that."""
 
 TRY_AGAIN_S = 60.0
-"""Seconds until it is tried again, where the next run cannot be begun."""
+"""Seconds until it is tried again, where the next run cannot be started."""
 
 
 class RunPlaces(Protocol):
@@ -36,7 +36,7 @@ class RunPlaces(Protocol):
         ...
 
     def go_on_with(self, run: Path) -> None:
-        """Have a process that is begun from now on go on with this run.
+        """Make a process that starts from now on resume this run.
 
         Raises:
             OutputError: That cannot be noted.
@@ -85,7 +85,7 @@ class RollOver:
         result: RunResult,
         tasks: Sequence[TaskBelief],
     ) -> None:
-        """Write what is due of a run that is followed by another, in a thread of its own."""
+        """Finish the files of a run that is followed by another, in a separate thread."""
 
         def close() -> None:
             checkpoints.close()

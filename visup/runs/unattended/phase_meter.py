@@ -1,4 +1,4 @@
-"""What each phase of a step takes, so that a service can tell what its time is spent on."""
+"""Time spent in each phase of a step, for the metrics of a service."""
 
 from __future__ import annotations
 

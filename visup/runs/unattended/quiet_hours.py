@@ -1,4 +1,4 @@
-"""Quiet hours: what is not critical waits until they are over, and is told then if it still holds.
+"""Quiet hours: alerts that are not critical wait until they are over, and are sent if still open.
 
 An alert that opens and closes within them is in the journal, with its evidence; no sink hears of it.
 """
@@ -168,7 +168,7 @@ class QuietGate:
         return (*due, *self._released(step, quiet=quiet))
 
     def _released(self, step: Step, *, quiet: bool) -> Sequence[Alert]:
-        """Those that were held and are told now: the quiet is over, or they have become critical."""
+        """Alerts that were held back and are sent now: the quiet hours are over, or they became critical."""
         told = [
             a
             for a in step.mind.alerts

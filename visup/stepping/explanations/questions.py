@@ -113,7 +113,7 @@ def _complete(asked: ParsedQuestion, text: str) -> ParsedQuestion:
 
 
 def _one(asked: ParsedQuestion, mind: Mind) -> int:
-    """The number that is asked about; where there is only one alert or object, that one."""
+    """The number in a question; if there is only one alert or object, that one."""
     if asked.ids:
         return asked.ids[0]
     there = [a.id for a in mind.alerts] if asked.about == "alert" else sorted(mind.objects)

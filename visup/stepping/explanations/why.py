@@ -21,7 +21,7 @@ from visup.agent import (
     TaskBelief,
     Truth,
 )
-from visup.agent.cycle.own_troubles import BEHAVIOUR_FAILED
+from visup.agent.cycle.system_alerts import BEHAVIOUR_FAILED
 from visup.agent.model.errors import SettingsError
 from visup.rules.coupling.evidence import COUPLING
 from visup.rules.safety.queries import explain
@@ -43,7 +43,7 @@ REPORTED = "what was last reported of it:"
 
 
 class RunTimeline(Protocol):
-    """What reasons are looked up in: a stepper."""
+    """The source of explanations: a stepper."""
 
     @property
     def at(self) -> int: ...  # noqa: D102
@@ -54,7 +54,7 @@ class RunTimeline(Protocol):
 
     def mind_at(self, number: int) -> Mind: ...  # noqa: D102
     def observation_at(self, number: int) -> Observation: ...  # noqa: D102
-    def told(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
+    def events(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class ReasonFinder:
         return ReasonFinder(self.course, number, self.course.mind_at(number))
 
     def of(self, what: object) -> Why:
-        """Why something is so.
+        """Explain something.
 
         Raises:
             SettingsError: Nothing is known of it.
@@ -114,7 +114,7 @@ class ReasonFinder:
         return Why(text, tuple(parts), event.frame_index, event.time)
 
     def _opening(self, alert_id: int) -> tuple[int, Event]:
-        for number, event in self.course.told(last=self.number):
+        for number, event in self.course.events(last=self.number):
             if event.kind == "alert" and event.data.get("alert") == alert_id:
                 return number, event
         known = ", ".join(str(a.id) for a in self.mind.alerts) or "none is open now"
@@ -222,7 +222,7 @@ class ReasonFinder:
         )
 
     def identity(self, object_id: int) -> Why:
-        """Why an object is believed to be what it is: answer, votes, and what it looked like last."""
+        """Explain an identity: answer, votes, and the latest matches."""
         b = self._belief(object_id)
         answer = self.mind.answers.get(object_id)
         stated = (Why(f"the operator said that it is {answer}"),) if answer else ()
@@ -259,7 +259,7 @@ class ReasonFinder:
         return tuple(self.object(i) for i in objects if i in self.mind.objects)
 
     def stage(self, stage: str) -> Why:
-        """Why a stage stands as it does: what verification says, what it asks for, who plays in it.
+        """Explain the status of a stage: evidence, requirements, actors.
 
         Raises:
             SettingsError: There is no such stage.
@@ -274,7 +274,7 @@ class ReasonFinder:
     def _stage(self, task: TaskBelief, s: StageBelief) -> Why:
         since = [
             Why(e.text, (), e.frame_index, e.time)
-            for _, e in self.course.told(last=self.number)
+            for _, e in self.course.events(last=self.number)
             if e.kind.startswith("stage_") and e.data.get("stage") == s.stage
         ]
         parts = [Why(s.evidence)] if s.evidence else []
@@ -293,10 +293,10 @@ class ReasonFinder:
 
     def _actors(self, task: TaskBelief) -> tuple[Why, ...]:
         return tuple(
-            Why(f"{b.actor} ({', '.join(b.models)}) is played by nobody yet")
+            Why(f"{b.actor} ({', '.join(b.models)}) is not bound to any object yet")
             if b.object_id is None
             else Why(
-                f"{b.actor} is played by object {b.object_id}, strength {b.strength:.2f}",
+                f"{b.actor} is bound to object {b.object_id}, strength {b.strength:.2f}",
                 (self.object(b.object_id),) if b.object_id in self.mind.objects else (),
             )
             for b in task.bindings
@@ -331,7 +331,7 @@ class ReasonFinder:
         return Why(text, (*stated, *alerts, *stages), *self._here)
 
     def event(self, event: Event) -> Why:
-        """Why an event was told, as things were when it was."""
+        """Explain an event in the mind that reported it."""
         number = self._step_of(event.time)
         then = self.after(number)
         return Why(event.text, then._behind(event), event.frame_index, event.time)

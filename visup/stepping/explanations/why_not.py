@@ -30,7 +30,7 @@ from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import Why, explanation_tree
 
 STANDS = {
-    Status.ACTIVE: "nothing of it was seen yet",
+    Status.ACTIVE: "no part of it was seen yet",
     Status.DONE: "is complete",
     Status.FAILED: "has failed",
     Status.UNKNOWN: "cannot be judged",
@@ -56,7 +56,7 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     found = [explain(mind, name, *ids)] if ids else _each(mind, name)
     if not found:
         count = len(rule_named(evaluation_of(mind), name).variables)
-        return Why(f"{name} is about {count} object(s), and so many are not in view")
+        return Why(f"{name} is about {count} object(s), and that many are not in view")
     nearest = max(found, key=lambda e: (e.verdict is Truth.TRUE, *e.parts[0].interval))
     if nearest.verdict is Truth.TRUE:
         return Why(f"{nearest.text} is true", (explanation_tree(nearest),))
@@ -107,7 +107,7 @@ def stage_unmet(mind: Mind, stage: str) -> Why:
 def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
     for b in task.bindings:
         if b.object_id is None:
-            yield Why(f"{b.actor} ({' or '.join(b.models)}) is played by nobody")
+            yield Why(f"{b.actor} ({' or '.join(b.models)}) is not bound to any object")
     for s in task.stages[:number]:
         if s.status is not Status.DONE:
             yield Why(f"before it, {s.stage} is {s.status.value}: {s.evidence or 'not begun'}")
@@ -143,7 +143,7 @@ class LastStep:
     ) -> tuple[Condition, ...]:
         """What a decision of a reasoner of some kind hung on in this step."""
         if self.before is None or self.observation is None:
-            return (Condition("a step was made", False),)
+            return (Condition("a step has been taken", False),)
         seen = self.observation
         mind = replace(
             self.before,

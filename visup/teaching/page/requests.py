@@ -1,4 +1,4 @@
-"""What the page asks for: facts on the clip, an outline snapped to edges, things to be stored."""
+"""Requests of the page: facts about the clip, snapping an outline to edges, storing objects."""
 
 from __future__ import annotations
 

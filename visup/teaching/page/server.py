@@ -1,4 +1,4 @@
-"""A server for one page and one user: on this machine only, at an address that nobody can guess.
+"""A server for one page and one user, on this machine only, at an unguessable address.
 
 It listens at 127.0.0.1 on a free port; every address begins with a random token; a request must name this
 host (a foreign name that points here is refused), and one of another page is refused.
@@ -194,7 +194,7 @@ class _Handler(BaseHTTPRequestHandler):
         return given
 
     def _answer(self, answer: Callable[[], Answer | bytes | None]) -> None:
-        """Send an answer; what the user can mend is told to him in the page."""
+        """Send an answer; errors that the user can fix are shown in the page."""
         try:
             told = answer()
         except VisupError as e:

@@ -1,4 +1,4 @@
-"""What is believed at the cursor: tasks with their stages, who is there, and who it is that was clicked."""
+"""Beliefs at the cursor: tasks with their stages, objects, and the identity of the chosen object."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _task(task: TaskBelief, head: Playhead) -> None:
     with ui.row().classes("gap-2 items-center"):
         badge(verdict.replace("_", " "), VERDICT_COLOURS.get(verdict, OTHER_COLOUR))
         if task.success is not None and verdict == "in_progress":
-            ui.label(f"will end well: {percent(task.success)}").classes("dim")
+            ui.label(f"probability of success: {percent(task.success)}").classes("dim")
     flow = head.run.flows.get(task.task)
     if flow is not None:
         with (
@@ -105,7 +105,7 @@ def _objects(mind: Mind, head: Playhead) -> None:
             colour = css(object_colour(belief.id))
             ui.element("span").classes("swatch").style(f"background:{colour}")
             name = ui.element("button").classes("plain said")
-            name.props["aria-label"] = f"who object {belief.id} is"
+            name.props["aria-label"] = f"identity of object {belief.id}"
             name.on("click", partial(head.choose, belief.id))
             with name:
                 ui.label(_called(belief, mind))

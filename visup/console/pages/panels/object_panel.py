@@ -28,7 +28,7 @@ def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None
         number: Of the object.
         samples: How sure each of its names was over time.
     """
-    part_heading(f"Who is object {number}")
+    part_heading(f"Identity of object {number}")
     peaks: dict[str, float] = {}
     for _, shares in samples:
         for name, share in shares.items():
@@ -36,7 +36,7 @@ def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None
     best = sorted(peaks, key=lambda n: (-peaks[n], n))[:MOST_CURVES]
     looks = head.run.looks(head.number, number)
     if not best and not looks:
-        ui.label("No model was ever found to look like it.").classes("dim")
+        ui.label("No model has matched it.").classes("dim")
         return
     belief = head.run.mind(head.number).objects.get(number)
     now = {c.name: c.share for c in belief.candidates} if belief else {}
@@ -47,7 +47,7 @@ def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None
         ui.html(_curves(samples, best, head.run.seconds, place), sanitize=False).classes("w-full")
     if looks and head.run.settings and head.run.settings.models:
         address = f"/likeness/{key}/{head.number}/{number}.jpg"
-        worded_button("Beside the views", partial(_show_likeness, address, number))
+        worded_button("Compare views", partial(_show_likeness, address, number))
 
 
 def _show_likeness(address: str, number: int) -> None:

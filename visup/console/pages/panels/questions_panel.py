@@ -1,4 +1,4 @@
-"""What the run asked its operator: each answer is a button.
+"""Questions of the run to its operator, with answers as buttons.
 
 While the run goes on it is told; and in any run one may see what would have followed from it.
 """
@@ -58,7 +58,7 @@ class QuestionsPart:
     def _buttons(self, question: Question) -> None:
         if not self._head.run.ended:
             self._row("answer:", question, self._say)
-        self._row("as if answered:", question, self._try)
+        self._row("if answered:", question, self._try)
 
     def _row(self, what: str, question: Question, act: Callable[[int, str], object]) -> None:
         with ui.row().classes("gap-1 items-center under-line"):
@@ -73,7 +73,7 @@ class QuestionsPart:
         except VisupError as fault:
             ui.notify(shown_text(str(fault)), type="negative")
             return
-        ui.notify("The run is told; it takes this up with its next frame.")
+        ui.notify("Sent to the run; it takes effect with the next frame.")
 
     async def _try(self, object_id: int, name: str) -> None:
         number, steps = self._head.number + 1, len(self._head.run.frames)

@@ -46,7 +46,7 @@ class _Breakpoints:
         self._entry()
         self._listed()
         with ui.row().classes("items-center gap-2"):
-            worded_button("Go on", self._go_on, main=True)
+            worded_button("Continue", self._go_on, main=True)
             self._said = ui.label().classes("why").props("role=status")
 
     def _entry(self) -> None:
@@ -104,7 +104,7 @@ class _Breakpoints:
             when = clock(self._head.run.times[self._head.number])
             self._said.set_text(shown_text(f"{when}  {'; '.join(map(prose, found.reasons))}"))
         elif found.ended:
-            self._said.set_text("Nothing of it happens up to the end.")
+            self._said.set_text("It does not happen before the end.")
         else:
             self._said.set_text("Given up.")
 

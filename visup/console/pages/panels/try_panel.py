@@ -21,7 +21,7 @@ MOST_LINES = 200
 def try_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     """Lay out the panel."""
     if role is not ConsoleRole.OPERATOR:
-        ui.label("Who may only look cannot try things out.").classes("dim")
+        ui.label("Read-only access: you cannot try things out.").classes("dim")
         return
     steps = len(head.run.frames)
 
@@ -81,12 +81,12 @@ async def show_tried(
 
 
 def _show_course(course: AlternativeCourse, head: Playhead) -> None:
-    """What both courses tell, side by side."""
+    """Show the events of both timelines side by side."""
     was, would = (v or "none" for v in course.differs.verdicts)
     verdicts = f"verdict: {was}" if was == would else f"verdict: {was} → {would}"
     ui.label(verdicts.replace("_", " ")).style("font-weight:600")
     if not course.differs:
-        ui.label(f"Nothing else is told, up to {clock(course.until)}.").classes("dim")
+        ui.label(f"No other events, up to {clock(course.until)}.").classes("dim")
     marked = [("−", e) for e in course.differs.gone] + [("+", e) for e in course.differs.new]
     marked.sort(key=lambda m: float(m[1].get("time", 0.0)))
     for mark, event in marked[:MOST_LINES]:

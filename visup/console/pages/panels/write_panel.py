@@ -28,7 +28,7 @@ MOST_FAULTS = 30
 def write_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     """Lay out the panel."""
     if role is not ConsoleRole.OPERATOR:
-        ui.label("Who may only look cannot write here.").classes("dim")
+        ui.label("Read-only access: you cannot write here.").classes("dim")
         return
     _Workbench(state, head, key)
 
@@ -40,7 +40,7 @@ class _Workbench:
         with ui.row().classes("items-center gap-2"):
             kind = ui.select(KINDS, value=self._kind, on_change=lambda e: self._choose(e.value))
             kind.props('dense outlined options-dense aria-label="What is written"')
-            worded_button("Which words?", self._complete)
+            worded_button("Complete", self._complete)
             worded_button("Try it on this run", self._judge, main=True)
         self._zone_tools = ui.row().classes("items-center gap-2")
         with self._zone_tools:
@@ -104,7 +104,7 @@ class _Workbench:
                 made = worded_button(shown_text(word.text), partial(self.editor.put, word))
                 made.tooltip(shown_text(word.about))
             if not found:
-                ui.label("Nothing is known that fits there.").classes("dim")
+                ui.label("No completions.").classes("dim")
 
     # Zones on the picture
 

@@ -1,4 +1,4 @@
-"""What was told: every event and every alert with its time; a click goes there."""
+"""Events and alerts with their times; a click goes there."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def events_panel(head: Playhead) -> None:
             last = event.time <= now < event.time + 1.0
             _line(event.time, event.text, event.severity, head, marked=last)
         if not told:
-            ui.label("Nothing was told.").classes("dim")
+            ui.label("No events.").classes("dim")
 
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Events"'):
         lines()
-    head.listen(lines.refresh, "Told")
+    head.listen(lines.refresh, "Events")
 
 
 def _around(told: Sequence[Event], now: float) -> Sequence[Event]:
@@ -73,13 +73,13 @@ def alerts_panel(head: Playhead, key: str, role: ConsoleRole) -> None:
             row = AlertRow(key, head.run, alert, said.get(alert.id))
             show_alert(row, role, partial(head.go_to_time, alert.opened), listed.refresh)
         if not found:
-            ui.label("No alert is open here." if wanted["open"] else "No alert.").classes("dim")
+            ui.label("No alerts are open here." if wanted["open"] else "No alert.").classes("dim")
 
     def only_open(yes: bool) -> None:
         wanted["open"] = yes
         listed.refresh()
 
-    ui.checkbox("only what is open at the cursor", on_change=lambda e: only_open(bool(e.value)))
+    ui.checkbox("only alerts open at the cursor", on_change=lambda e: only_open(bool(e.value)))
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"'):
         listed()
     head.listen(lambda: listed.refresh() if wanted["open"] else None, "Alerts")

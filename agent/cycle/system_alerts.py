@@ -1,7 +1,7 @@
-"""What alerts say of the supervisor itself rather than of what it watches.
+"""Alerts about the supervisor itself rather than about the scene.
 
-A run without a task has a verdict all the same: whether something grave was seen, and whether all was
-watched.
+A run without a task also has a verdict: whether something unsafe was seen, and whether the scene could
+be watched throughout.
 """
 
 from __future__ import annotations
@@ -20,35 +20,35 @@ SINK_FAILED = "sink_failed"
 SOURCE_DROPPED = "source_dropped"
 
 NOT_PASSED_ON = frozenset({NOT_RECORDED, SINK_FAILED})
-"""Alerts about what was seen and told, but not written or delivered: they say nothing of what was seen."""
+"""Alerts about recording and delivery, which say nothing about the scene."""
 
 NOT_WATCHED = frozenset(
     {BEHAVIOUR_FAILED, CLOCK_JUMPED, FRAMES_DROPPED, REASONING_FAILED, SOURCE_DROPPED}
 )
-"""Alerts about a part that was not perceived, or not reasoned about: nobody knows what was there."""
+"""Alerts about frames that were not perceived or not reasoned about, so that the scene is unknown."""
 
-OWN_TROUBLES = NOT_PASSED_ON | NOT_WATCHED
-"""Kinds of alert that no rule may bear."""
+SYSTEM_ALERTS = NOT_PASSED_ON | NOT_WATCHED
+"""All alerts about the supervisor itself; rules may not have these names."""
 
 
 def grave_kinds(reported: Iterable[Event | Alert]) -> Iterator[str]:
-    """The kinds of those events or alerts that a person should look at; that of the alert for its event."""
+    """Kinds of events or alerts of severity warning and above; for an `alert` event, that of its alert."""
     for it in reported:
         if it.severity >= Severity.WARNING:
             yield str(it.data.get("alert_kind", it.kind)) if isinstance(it, Event) else it.kind
 
 
 def verdict_without_task(kinds: Iterable[str], so_far: Verdict | None = None) -> Verdict | None:
-    """What a run without a task comes to.
+    """The verdict on a run without a task.
 
     Args:
-        kinds: Of what a person should look at (`grave_kinds`).
-        so_far: What came of it before these.
+        kinds: Kinds of warnings and above (`grave_kinds`).
+        so_far: The verdict before these.
 
     Returns:
-        'interrupted' when something grave was seen, else 'unknown' when a part was not watched, else None.
+        'interrupted' if something unsafe was seen, else 'unknown' if part of it was not watched, else None.
     """
     grave = frozenset(kinds)
-    if so_far is Verdict.INTERRUPTED or grave - OWN_TROUBLES:
+    if so_far is Verdict.INTERRUPTED or grave - SYSTEM_ALERTS:
         return Verdict.INTERRUPTED
     return Verdict.UNKNOWN if grave & NOT_WATCHED else so_far

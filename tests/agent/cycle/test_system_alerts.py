@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Alert, Event, Severity, Verdict
-from visup.agent.cycle.own_troubles import (
+from visup.agent.cycle.system_alerts import (
     NOT_PASSED_ON,
     NOT_WATCHED,
     grave_kinds,

@@ -61,7 +61,7 @@ def killed(step: Step, frame: Frame) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_own_troubles_are_no_part_of_what_was_seen(tmp_path: Path, case: str) -> None:
+def test_system_alerts_are_no_part_of_what_was_seen(tmp_path: Path, case: str) -> None:
     if case == "an alert is lost" and not Path("/dev/full").exists():
         pytest.skip("no disk that is always full")
     settings, options = begun(tmp_path, case)
@@ -91,15 +91,15 @@ def test_a_run_asked_from_python_comes_to_the_same(tmp_path: Path) -> None:
     with visup.watch(settings.source, behaviours=settings.behaviours) as run:
         next(iter(run))
         assert run.verdict is Verdict.UNKNOWN
-        assert "but not all could be watched" in run._repr_html_()
+        assert "but the scene could not always be watched" in run._repr_html_()
 
 
 @pytest.mark.parametrize(
     ("verdict", "words"),
     [
         (None, "nothing unsafe was seen"),
-        (Verdict.UNKNOWN, "nothing unsafe was seen, but not all could be watched"),
-        (Verdict.INTERRUPTED, "something grave was seen"),
+        (Verdict.UNKNOWN, "nothing unsafe was seen, but the scene could not always be watched"),
+        (Verdict.INTERRUPTED, "something unsafe was seen"),
     ],
 )
 def test_the_last_line_says_which(verdict: Verdict | None, words: str) -> None:

@@ -1,0 +1,57 @@
+"""Relations of actors as reported, and until when: an incompatible one is reported to begin no sooner.
+
+Relations are detected late and dated back, so two incompatible ones may overlap by some tenths of a
+second. Each is correct by itself, but reported together they contradict each other. The first report
+prevails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+ReportedRelations = tuple[tuple[tuple[str, ...], str, float], ...]
+"""Actors in alphabetical order, a relation, and until when it was reported to hold between them, seconds."""
+
+_JOINED = frozenset({"coupled", "held_by", "moving_together"})
+_EXCLUDED: Mapping[str, frozenset[str]] = MappingProxyType(
+    {
+        "converging": _JOINED | {"diverging", "touching", "in_contact", "on", "keeping_distance"},
+        "diverging": _JOINED | {"converging", "keeping_distance"},
+    }
+)
+
+
+def excludes(first: str, second: str) -> bool:
+    """Whether two relations are never reported for the same time.
+
+    >>> excludes("touching", "converging"), excludes("touching", "diverging")
+    (True, False)
+    """
+    return second in _EXCLUDED.get(first, ()) or first in _EXCLUDED.get(second, ())
+
+
+def with_reported(
+    told: ReportedRelations, actors: Iterable[str], relation: str, until: float
+) -> ReportedRelations:
+    """The reports so far, with a relation reported to hold until a time."""
+    who = tuple(sorted(actors))
+    same = [t for t in told if t[:2] == (who, relation)]
+    until = max((until, *(t[2] for t in same)))
+    return (*(t for t in told if t not in same), (who, relation, until))
+
+
+def joined(parts: Iterable[ReportedRelations]) -> ReportedRelations:
+    """Several sets of reports merged, each relation once."""
+    found: ReportedRelations = ()
+    for who, relation, until in (t for part in parts for t in part):
+        found = with_reported(found, who, relation, until)
+    return found
+
+
+def since_reported(
+    told: ReportedRelations, actors: Iterable[str], relation: str, since: float
+) -> float:
+    """Since when a relation is reported to hold, given since when it is known to, seconds."""
+    who = tuple(sorted(actors))
+    return max((since, *(t[2] for t in told if t[0] == who and excludes(t[1], relation))))
