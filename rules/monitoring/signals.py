@@ -19,7 +19,7 @@ def later(time: float, before: int | None) -> int:
     """The moment of a sample in microseconds, which must come after the one before."""
     try:
         now = round(time * TICKS)
-    except (OverflowError, ValueError):  # infinite, or no number
+    except (OverflowError, TypeError, ValueError):  # infinite, or no number
         raise SettingsError(
             f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
         ) from None
@@ -38,8 +38,14 @@ def known_interval(value: SignalValue) -> Interval:
         return (value, value)
     if value is None:
         return UNKNOWN
-    low, high = value if isinstance(value, tuple) else (value, value)
-    low, high = float(low), float(high)
+    try:
+        low, high = value if isinstance(value, tuple) else (value, value)
+        low, high = float(low), float(high)
+    except (TypeError, ValueError):  # a word, an array, three bounds
+        raise SettingsError(
+            f"a signal is {value!r}",
+            expected="a number, an interval of two, or None where nothing is known",
+        ) from None
     low, high = -inf if low != low else low, inf if high != high else high
     if low > high:
         what = f"a signal is the interval ({low:g}, {high:g})"

@@ -16,7 +16,9 @@ from visup.agent import Status, Verdict
 from visup.agent.model.errors import TaskError
 from visup.tasks.checks.load import parse_task
 from visup.tasks.grammar.nodes import Actor
+from visup.tasks.learning.alignment import aligned
 from visup.tasks.learning.judging import JudgedRun, judged
+from visup.tasks.learning.meetings import MEETINGS
 from visup.tasks.learning.order import (
     Free,
     Item,
@@ -33,13 +35,7 @@ from visup.tasks.learning.order import (
     without,
 )
 from visup.tasks.learning.periods import Period, course_of, periods_of
-from visup.tasks.learning.relevance import (
-    AT_ONCE_S,
-    MEETINGS,
-    CourseEvent,
-    joined,
-    relevant,
-)
+from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.rests import Rest, rests_of
 from visup.tasks.learning.traces import RunTrace, Symbol
 
@@ -201,8 +197,10 @@ def learn_task(
         TaskError: Nothing happens in the good runs that they have in common.
     """
     rows = joined(relevant(good))
-    words = [tuple(e.item for e in row) for row in rows]
-    folded, times = with_loops(words)
+    folded, times = with_loops([tuple(e.item for e in row) for row in rows])
+    if not times:  # what is there more often in some runs than in others is noise then
+        rows = aligned(rows)
+        folded = [tuple(e.item for e in row) for row in rows]
     core = shared(folded, SHARE)
     if not core:
         raise TaskError(

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import ceil, floor
 
+from visup.tasks.learning.meetings import MEETINGS
 from visup.tasks.learning.order import Loop, Times
-from visup.tasks.learning.relevance import MEETINGS, CourseEvent
+from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import Symbol
 
 LEAST_BEATS = 4

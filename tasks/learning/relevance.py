@@ -8,21 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cmp_to_key
 
+from visup.tasks.learning.meetings import CLOSE_S, Meeting, Pair, meetings_of, pairs_by_weight
 from visup.tasks.learning.order import Item, Joint
-from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Symbol
+from visup.tasks.learning.traces import Happening, RunTrace, Symbol
 
-Pair = tuple[str, ...]
-MEETINGS = ("touching", "coupled")
-LET_GO_S = 1.0
-"""What is carried meets others no longer than so long after it was let go."""
-MOSTLY = 0.5
-"""A pair only comes along where its meetings do in more than that share of the runs."""
-CLOSE_S = 2.0
-"""An approach may end so long before its meeting; relations are judged with delays."""
-MUCH_LESS = 0.9
-"""Pairs whose meetings differ by less are told apart by who rests."""
 ENDED_S = 0.3
 """A meeting that ends so long before the run does has ended, and is not cut off."""
 
@@ -52,25 +42,6 @@ class CourseEvent:
     def item(self) -> Item:
         """What happens."""
         return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
-
-
-@dataclass(frozen=True, slots=True)
-class Meeting:
-    """Two that are together for a while.
-
-    Attributes:
-        pair: Who.
-        touching: Their first to last touch.
-        coupled: First to last coupling, or None when they only touch.
-    """
-
-    pair: Pair
-    touching: tuple[float, float]
-    coupled: tuple[float, float] | None
-
-    def spell(self, action: str) -> tuple[float, float] | None:
-        """From when to when, as one of the two."""
-        return self.coupled if action == "coupled" else self.touching
 
 
 def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
@@ -114,12 +85,15 @@ _RANK = {"converging": 0, "touching": 1, "coupled": 1, "apart": 2, "decoupled": 
 
 
 def _words(met: Sequence[Collection[Meeting]]) -> dict[Pair, str]:
-    """How each pair meets: coupled where it is so in every run in which they meet."""
+    """How each pair meets: coupled where one carries the other in every run in which they meet.
+
+    Of two that rest against each other it is chance whether they are taken to be coupled.
+    """
     pairs = {m.pair for rows in met for m in rows}
     return {
         pair: "coupled"
         if all(
-            any(m.coupled for m in rows if m.pair == pair)
+            any(m.carries for m in rows if m.pair == pair)
             for rows in met
             if any(m.pair == pair for m in rows)
         )
@@ -138,10 +112,11 @@ def _events(
             continue
         begin, end = spell
         lasts = end > run.end - ENDED_S
-        approach = _approach(run, pair, meeting.touching[0], begin)
-        if approach is not None and not _held_elsewhere(meeting, begin, meetings):
-            yield CourseEvent(approach, begin)
-        yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
+        if meeting.begun:  # a stage is done by what comes about in it
+            approach = _approach(run, pair, meeting.touching[0], begin)
+            if approach is not None and not _held_elsewhere(meeting, begin, meetings):
+                yield CourseEvent(approach, begin)
+            yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
         if not lasts and (action == "coupled" or _parts(run, pair, end)):
             parting = "decoupled" if action == "coupled" else "apart"
             yield CourseEvent(Happening((parting, pair), end, run.end), end)
@@ -167,90 +142,6 @@ def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happenin
         if h.symbol == ("converging", pair) and h.begin <= begin and h.end >= touch - CLOSE_S
     ]
     return found[-1] if found else None
-
-
-def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
-    """Pairs that touch: in the fewest runs, or for much less long, first; then those that move most.
-
-    What is put on a thing that rests meets that thing, and not what was put on it before.
-    """
-    seconds: dict[Pair, list[float]] = {}
-    for run in runs:
-        mine: dict[Pair, float] = {}
-        for h in run.happenings:
-            if h.symbol[0] in MEETINGS:
-                mine[h.symbol[1]] = mine.get(h.symbol[1], 0.0) + h.end - h.begin
-        for pair, long in mine.items():
-            seconds.setdefault(pair, []).append(long)
-
-    def moved(pair: Pair) -> float:
-        return sum(run.moved_s.get(name, 0.0) for run in runs for name in pair)
-
-    def compared(p: Pair, q: Pair) -> int:
-        runs_more, long, other = len(seconds[p]) - len(seconds[q]), sum(seconds[p]), sum(seconds[q])
-        if runs_more or min(long, other) < MUCH_LESS * max(long, other):
-            return runs_more or (1 if long > other else -1)
-        return 1 if (moved(q), p) > (moved(p), q) else -1
-
-    return sorted(seconds, key=cmp_to_key(compared))
-
-
-def meetings_of(runs: Sequence[RunTrace], pairs: Sequence[Pair]) -> list[list[Meeting]]:
-    """All meetings of each run but those of what is only carried along.
-
-    A pair is carried along in all runs or in none: which of two ends first when one lets go is chance.
-
-    Args:
-        runs: The runs.
-        pairs: All pairs; of several that meet through each other the first one is let be.
-    """
-    real = [[h for h in run.happenings if h.symbol[0] in MEETINGS] for run in runs]
-    for pair in pairs:
-        meet = sum(any(h.symbol[1] == pair for h in row) for row in real)
-        along = sum(any(h.symbol[1] == pair and _carried(h, row, 1) for h in row) for row in real)
-        if along > MOSTLY * meet:
-            # Nearly so in the others, then, is so in them too.
-            real = [[h for h in r if h.symbol[1] != pair or not _carried(h, r, 2)] for r in real]
-    return [_meetings(row) for row in real]
-
-
-def _meetings(real: Sequence[Happening]) -> list[Meeting]:
-    """What happens between the same two with short breaks is one meeting."""
-    found: list[list[Happening]] = []
-    for h in real:
-        of_pair = [g for g in found if g[0].symbol[1] == h.symbol[1]]
-        if of_pair and h.begin <= max(g.end for g in of_pair[-1]) + BREAK_S:
-            of_pair[-1].append(h)
-        else:
-            found.append([h])
-    return [_meeting(group) for group in found]
-
-
-def _meeting(spells: Sequence[Happening]) -> Meeting:
-    coupled = [h for h in spells if h.symbol[0] == "coupled"]
-    return Meeting(
-        spells[0].symbol[1],
-        (spells[0].begin, max(h.end for h in spells)),
-        (coupled[0].begin, max(h.end for h in coupled)) if coupled else None,
-    )
-
-
-def _carried(meeting: Happening, meetings: Sequence[Happening], slack: int) -> bool:
-    """Whether two meet only through a third thing, which one holds and which meets the other.
-
-    It then ends as soon as that is let go, or so many times `LET_GO_S` later.
-    """
-    overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
-    for held in overlap:
-        if held.symbol[0] != "coupled" or meeting.end > held.end + slack * LET_GO_S:
-            continue
-        for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
-            if a not in held.symbol[1] or b in held.symbol[1]:
-                continue
-            (x,) = set(held.symbol[1]) - {a}
-            if any({x, b} == set(m.symbol[1]) and m.end > meeting.end - CLOSE_S for m in overlap):
-                return True
-    return False
 
 
 AT_ONCE_S = 0.3

@@ -14,6 +14,7 @@ from visup.rules.predicates.vocabulary import moving
 from visup.rules.wording.sentences import believed_name
 from visup.tasks.verification.observe import RelationLookup
 
+Span = tuple[float, float]
 Symbol = tuple[str, tuple[str, ...]]
 """An action and its actors, the actors of a pair in the order of the alphabet."""
 
@@ -34,11 +35,13 @@ class Happening:
         symbol: What.
         begin: Seconds.
         end: Seconds.
+        begun: Whether it was seen to begin, and was not so from the start; of contacts.
     """
 
     symbol: Symbol
     begin: float
     end: float
+    begun: bool = True
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class RunTrace:
         minds: What was believed, moment by moment.
         always: Actors that were in the scene from their first sight to the end.
         moved_s: For how long each moved, seconds.
+        moves: When each moved, from when to when, seconds.
         fastest: How fast each moved at most, for `SUSTAINED_S`, px/s.
         diagonal: Of the image, pixels.
     """
@@ -64,6 +68,7 @@ class RunTrace:
     minds: tuple[Mind, ...] = field(repr=False, default=())
     always: frozenset[str] = frozenset()
     moved_s: Mapping[str, float] = field(default_factory=dict)
+    moves: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
     fastest: Mapping[str, float] = field(default_factory=dict)
     diagonal: float = 0.0
 
@@ -77,24 +82,29 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
     """
     kept = tuple(minds)
     spells: dict[Symbol, list[list[float]]] = {}
+    always: set[Symbol] = set()
     gone: set[str] = set()
     named: set[str] = set()
-    moved: dict[str, float] = {}
+    moved: dict[str, list[Span]] = {}
     speeds: dict[str, list[tuple[float, float]]] = {}
     before = kept[0].time if kept else 0.0
     for mind in kept:
         names = names_of(mind)
         for actor, speed, moves in _motions(mind, names):
-            moved[actor] = moved.get(actor, 0.0) + (mind.time - before if moves else 0.0)
+            if moves:
+                moved.setdefault(actor, []).append((before, mind.time))
             if speed is not None:
                 speeds.setdefault(actor, []).append((mind.time, speed))
         before = mind.time
         named |= set(names.values())
         gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
         for symbol, truth in _held(mind, names):
-            _note(spells.setdefault(symbol, []), truth, mind.time)
+            if symbol[0] == "touching" and truth is Truth.TRUE and symbol not in spells:
+                always.add(symbol)
+            if truth is not Truth.UNKNOWN:
+                _note(spells.setdefault(symbol, []), truth, mind.time)
     begin, end = (kept[0].time, kept[-1].time) if kept else (0.0, 0.0)
-    found = [h for s, rows in spells.items() for h in _happenings(s, rows, end)]
+    found = [h for s, rows in spells.items() for h in _happenings(s, rows, end, s not in always)]
     found += [p for h in found if (p := _parted(h, end)) is not None]
     return RunTrace(
         name,
@@ -103,7 +113,8 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         end,
         kept,
         frozenset(named - gone),
-        moved,
+        {actor: sum(b - a for a, b in spans) for actor, spans in moved.items()},
+        {actor: _merged(spans) for actor, spans in moved.items()},
         {actor: _sustained(row) for actor, row in speeds.items()},
         image_diagonal(kept[0].frame_size) if kept else 0.0,
     )
@@ -117,6 +128,15 @@ def _motions(mind: Mind, names: dict[int, str]) -> Iterator[tuple[str, float | N
         if number in names:
             seen = mind.objects[number].last_seen == mind.time and speeds[row] == speeds[row]
             yield names[number], float(speeds[row]) if seen else None, codes[row] == YES
+
+
+def _merged(spans: Sequence[Span]) -> tuple[Span, ...]:
+    """Spans in order, with those that follow each other at once as one."""
+    found: list[Span] = []
+    for begin, end in spans:
+        follows = bool(found) and begin <= found[-1][1]
+        found.append((found.pop()[0] if follows else begin, end))
+    return tuple(found)
 
 
 def _sustained(speeds: Sequence[tuple[float, float]]) -> float:
@@ -160,11 +180,14 @@ def _note(rows: list[list[float]], truth: Truth, now: float) -> None:
         rows[-1].append(now)
 
 
-def _happenings(symbol: Symbol, rows: list[list[float]], end: float) -> Iterator[Happening]:
-    for row in rows:
+def _happenings(
+    symbol: Symbol, rows: list[list[float]], end: float, begun: bool
+) -> Iterator[Happening]:
+    """Of the rows of what is so, each that lasts; the first was so from the start unless it has begun."""
+    for number, row in enumerate(rows):
         begin, until = row[0], row[1] if len(row) > 1 else end
         if until - begin >= LEAST_S[symbol[0]]:
-            yield Happening(symbol, begin, until)
+            yield Happening(symbol, begin, until, begun or number > 0)
 
 
 def _parted(coupling: Happening, end: float) -> Happening | None:

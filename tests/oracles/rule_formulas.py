@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from random import Random
+from typing import Any
+
+import numpy as np
 
 from visup.rules.formula.nodes import (
     ZERO,
@@ -177,3 +180,21 @@ def random_value(rng: Random) -> Interval:
         return (inf, inf)
     value = rng.randint(-10, 10) / 4
     return (value, value if rng.random() < 0.8 else value + rng.randint(0, 4) / 4)
+
+
+NUMBERS = (float, np.float64, np.float32, np.float16, np.array)
+NOTHING = (None, nan, np.float64(nan), np.float32(nan), (nan, nan), (-inf, np.float64(nan)))
+
+
+def as_given(rng: Random, value: Interval) -> Any:
+    """A value as users have it: numbers of Python or NumPy, one for what is certain, NaN or None for unknown.
+
+    All that `random_value` draws is exact in each of these.
+    """
+    low, high = value
+    if value == (-inf, inf) and rng.random() < 0.8:
+        return rng.choice(NOTHING)
+    if low == high and rng.random() < 0.7:
+        whole = low.is_integer() and rng.random() < 0.5
+        return rng.choice((int, np.int64, np.int8))(low) if whole else rng.choice(NUMBERS)(low)
+    return rng.choice(NUMBERS)(low), rng.choice(NUMBERS)(high)

@@ -96,7 +96,8 @@ def _against_oracle(count: int, seed: int) -> dict[str, Any]:
         times = drawn_formulas.random_times(rng, rng.randint(5, 25))
         values = [{name: drawn_formulas.random_value(rng) for name in SIGNALS} for _ in times]
         monitor = Monitor(formula)
-        told = [monitor.step(t, v) for t, v in zip(times, values, strict=True)]
+        given = [{n: drawn_formulas.as_given(rng, v) for n, v in row.items()} for row in values]
+        told = [monitor.step(t, v) for t, v in zip(times, given, strict=True)]
         truth = rule_oracle.robustness(
             formula, [(ticks(t), v) for t, v in zip(times, values, strict=True)]
         )

@@ -18,6 +18,7 @@ from tests.oracles.rule_formulas import (
 from tests.oracles.rule_oracle import robustness
 from visup.agent import Truth
 from visup.agent.model.errors import SettingsError
+from visup.rules.dense_time import DenseTimeMonitor
 from visup.rules.formula.nodes import Formula, Predicate
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula
@@ -282,9 +283,19 @@ def test_a_reversed_interval_is_refused(value: Interval) -> None:
         monitor.step(0.0, {"x": value})
 
 
-@pytest.mark.parametrize("times", [(0.0, 0.0), (1.0, 0.5), (0.0, inf), (float("nan"),), (-inf,)])
+@pytest.mark.parametrize("value", ["open", np.array([1.0, 2.0]), (1.0, 2.0, 3.0), ("a", "b"), {}])
+def test_what_is_no_number_is_refused_in_words(value: Any) -> None:
+    for made in (Monitor, DenseTimeMonitor):
+        with pytest.raises(SettingsError, match="a signal is"):
+            made(parse_formula("x() > 0", signals("x"))).step(0.0, {"x": value})
+
+
+WRONG_TIMES: list[tuple[Any, ...]] = [(0.0, 0.0), (1.0, 0.5), (0.0, inf), (float("nan"),), (-inf,)]
+
+
+@pytest.mark.parametrize("times", [*WRONG_TIMES, (None,), ("3",), (0.0, np.array([1.0, 2.0]))])
 def test_times_that_do_not_increase_are_refused_and_leave_the_monitor_as_it_was(
-    times: tuple[float, ...],
+    times: tuple[Any, ...],
 ) -> None:
     monitor = Monitor(parse_formula("x() > 0 for 1 s", signals("x")))
     for time in times[:-1]:

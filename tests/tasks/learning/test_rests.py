@@ -7,14 +7,18 @@ from hypothesis import strategies as st
 
 from visup.tasks.learning.relevance import relevant
 from visup.tasks.learning.rests import LEAST_ALLOWED, REST, TIMES_SEEN, rests_of
-from visup.tasks.learning.traces import Happening, RunTrace, _sustained
+from visup.tasks.learning.traces import SUSTAINED_S, Happening, RunTrace, _sustained
 
 DIAGONAL = 600.0
 SPEEDS = st.floats(0.0, 60.0)
 
 
+WORK = {"gripper": ((0.5, 12.0),), "part": ((3.0, 8.0),)}
+"""When who is on the move, where a gripper carries a part."""
+
+
 def run(*happenings: Happening, **fastest: float) -> RunTrace:
-    return RunTrace("run", happenings, 0.0, 12.0, fastest=fastest, diagonal=DIAGONAL)
+    return RunTrace("run", happenings, 0.0, 12.0, moves=WORK, fastest=fastest, diagonal=DIAGONAL)
 
 
 @given(st.lists(st.tuples(SPEEDS, SPEEDS), min_size=1, max_size=4))
@@ -33,7 +37,8 @@ def test_who_never_moves_fast_rests_and_is_allowed_what_was_seen_and_more(
 @given(st.lists(st.floats(0.0, 100.0), min_size=1, max_size=40))
 def test_a_speed_that_one_frame_shows_is_not_kept_up(speeds: list[float]) -> None:
     rows = [(k / 15, s) for k, s in enumerate(speeds)]
-    dumb = [min(speeds[k : k + 4]) for k in range(len(speeds) - 3)]
+    width = round(15 * SUSTAINED_S) + 1
+    dumb = [min(speeds[k : k + width]) for k in range(len(speeds) - width + 1)]
     assert _sustained(rows) == max(dumb, default=0.0)
 
 
@@ -49,6 +54,30 @@ def carried(let_go: float, gone: float) -> RunTrace:
     )
 
 
+def test_who_passes_before_a_fixture_long_before_it_brings_something_does_not_meet_it() -> None:
+    pair = ("fixture", "gripper")
+    others = [h for h in carried(9.0, 9.4).happenings if h.symbol[1] == ("gripper", "part")]
+    others.append(Happening(("touching", ("fixture", "part")), 7.0, 12.0))
+    passes = (Happening(("touching", pair), begin, 9.4) for begin in (7.0, 0.9))
+    rows = relevant([run(*others, p) for p in passes])
+    assert all(("touching", ("fixture", "part")) in {e.symbol for e in row} for row in rows)
+    assert not any(e.symbol[1] == pair for row in rows for e in row)
+
+
+def test_two_that_rest_against_each_other_touch_however_they_are_believed_to_be_coupled() -> None:
+    rests = Happening(("coupled", ("fixture", "part")), 9.2, 12.0)
+    rows = relevant([run(*carried(9.0, 9.4).happenings, rests)] * 2)
+    words = {e.symbol for row in rows for e in row}
+    assert ("coupled", ("gripper", "part")) in words
+    assert ("coupled", ("fixture", "part")) not in words
+
+
+def test_what_was_so_from_the_start_is_no_stage() -> None:
+    since = Happening(("touching", ("lid", "table")), 0.9, 12.0, begun=False)
+    rows = relevant([run(*carried(9.0, 9.4).happenings, since)] * 2)
+    assert not any(e.symbol[1] == ("lid", "table") for row in rows for e in row)
+
+
 def test_who_is_carried_along_is_the_same_in_all_runs() -> None:
     rows = relevant([carried(9.0, 9.4), carried(9.0, 9.9), carried(9.0, 10.1)])
     symbols = [{e.symbol for e in row} for row in rows]
@@ -61,7 +90,7 @@ def test_a_contact_of_two_at_rest_that_ceases_to_be_seen_is_no_parting() -> None
     rows = relevant([carried(9.0, 9.4), carried(9.0, 9.5)])
     assert not any(e.symbol[0] == "apart" for row in rows for e in row)
     away = Happening(("diverging", ("fixture", "part")), 9.5, 12.0)
-    parted = [RunTrace("run", (*r.happenings, away), 0.0, 12.0) for r in (carried(9.0, 9.4),) * 2]
+    parted = [run(*r.happenings, away) for r in (carried(9.0, 9.4),) * 2]
     symbols = [e.symbol for row in relevant(parted) for e in row]
     pair = next(s[1] for s in symbols if s[0] == "touching")
     assert (("apart", pair) in symbols) == (pair == ("fixture", "part"))
