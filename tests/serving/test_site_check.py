@@ -35,7 +35,7 @@ def test_a_site_that_can_be_watched(visup: Call, site: Path) -> None:
     assert done.code == 0
     assert "camera cell" in done.out
     assert "96 x 72 pixels" in done.out
-    assert "frames a second can be looked at, 25.0 are asked for" in done.out
+    assert "frames per second can be processed, 25.0 are requested" in done.out
     assert done.out.splitlines()[-1] == "It can be watched."
     assert not (site.parent / "visup-runs").exists()
 
@@ -90,11 +90,11 @@ def test_whoever_follows_the_advice_has_room(
     checks = [checked(f"c{i}", *rate) for i, rate in enumerate(rates)]
     lines = list(load_lines(checks, processors))
     whole = sum(wanted / possible for possible, wanted in rates)
-    assert lines[0] == f"all cameras together take {whole:.1f} of {processors} processors"
-    advice = [line for line in lines if "a pace for each" in line]
+    assert lines[0] == f"all cameras together use {whole:.1f} of {processors} processors"
+    advice = [line for line in lines if "feasible values of pace" in line]
     assert bool(advice) == (whole > 0.8 * processors and len(rates) > 1)
     for line in advice:
-        paces = [float(each.split()[1]) for each in line.partition("would: ")[2].split(", ")]
+        paces = [float(each.split()[1]) for each in line.partition("of pace: ")[2].split(", ")]
         needed = sum(p / possible for p, (possible, _) in zip(paces, rates, strict=True))
         least = sum(0.5 / possible for possible, _ in rates)  # no pace below half a frame a second
         assert needed <= 0.8 * processors + least

@@ -16,36 +16,36 @@ if TYPE_CHECKING:
 Value = Callable[[CameraStatus], float | None]
 
 _COUNTERS: tuple[tuple[str, str, Value], ...] = (
-    ("visup_frames_seen", "Frames that were looked at.", lambda c: c.totals.get("frames")),
+    ("visup_frames_seen", "Frames that were processed.", lambda c: c.totals.get("frames")),
     (
         "visup_frames_dropped",
         "Frames that were dropped to keep pace.",
         lambda c: c.totals.get("dropped"),
     ),
     ("visup_cpu_seconds", "Processor time of its processes.", lambda c: c.totals.get("cpu_s")),
-    ("visup_restarts", "How often the process of a camera was begun again.", lambda c: c.restarts),
+    ("visup_restarts", "Restarts of the process of a camera.", lambda c: c.restarts),
 )
 _GAUGES: tuple[tuple[str, str, Value], ...] = (
     (
         "visup_camera_ready",
-        "1 while a camera is watched, or seen to its end.",
+        "1 while a camera is being watched, or its source has ended.",
         lambda c: float(c.state in READY_STATES),
     ),
     (
         "visup_lag_seconds",
-        "How long ago it was what is judged now.",
+        "Age of the frame being processed.",
         lambda c: c.latest.get("lag_s"),
     ),
-    ("visup_step_age_seconds", "How long ago a step was told of.", lambda c: c.step_age_s),
+    ("visup_step_age_seconds", "Time since the last step was reported.", lambda c: c.step_age_s),
     (
         "visup_objects",
-        "Objects that are believed to be in view.",
+        "Objects believed to be in view.",
         lambda c: c.latest.get("objects"),
     ),
-    ("visup_alerts_open", "Alerts that are open.", lambda c: c.latest.get("alerts_open")),
+    ("visup_alerts_open", "Open alerts.", lambda c: c.latest.get("alerts_open")),
     (
         "visup_memory_bytes",
-        "Memory that the process of a camera has in use.",
+        "Memory used by the process of a camera.",
         lambda c: None if c.memory_mb is None else c.memory_mb * 2**20,
     ),
 )

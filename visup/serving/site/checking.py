@@ -83,24 +83,24 @@ def load_lines(checks: Sequence[CameraCheck], processors: int | None = None) -> 
     if not measured:
         return
     whole = sum(s.load for _, s in measured)
-    yield f"all cameras together take {whole:.1f} of {count} processors"
+    yield f"all cameras together use {whole:.1f} of {count} processors"
     for camera, speed in measured:
         if speed.load > 1.0:
             yield (
-                f"{WARNING}camera {camera.name}: {speed.wanted:.1f} frames a second are asked for, "
-                f"{speed.possible:.1f} can be looked at; pace = {_pace(ENOUGH * speed.possible)} would do"
+                f"{WARNING}camera {camera.name}: {speed.wanted:.1f} frames per second are requested, "
+                f"{speed.possible:.1f} can be processed; pace = {_pace(ENOUGH * speed.possible)} is feasible"
             )
     if whole > ENOUGH * count and len(measured) > 1:
         share = min(ENOUGH, ENOUGH * count / len(measured))
         each = (f"{c.name} {_pace(min(s.wanted, share * s.possible))}" for c, s in measured)
-        yield f"{WARNING}that leaves no room; a pace for each that would: {', '.join(each)}"
+        yield f"{WARNING}that leaves no reserve; feasible values of pace: {', '.join(each)}"
 
 
 def speed_line(speed: Speed) -> str:
     """What a camera takes, in words."""
     return (
-        f"speed: {speed.possible:.1f} frames a second can be looked at, {speed.wanted:.1f} are asked "
-        f"for: {100 * speed.load:.0f} % of a processor"
+        f"speed: {speed.possible:.1f} frames per second can be processed, {speed.wanted:.1f} are "
+        f"requested: {100 * speed.load:.0f} % of a processor"
     )
 
 

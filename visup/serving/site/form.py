@@ -28,48 +28,50 @@ class RecordingTable(_Table):
     state_every: float = Field(
         default=10.0,
         ge=1,
-        description="Seconds between two checkpoints from which a camera goes on.",
+        description="Seconds between the checkpoints from which a camera resumes.",
     )
     run_hours: float = Field(
-        default=24.0, gt=0, description="A run is followed by the next after so many hours."
+        default=24.0, gt=0, description="Hours after which the next run starts."
     )
     run_gb: float = Field(
-        default=5.0, gt=0, description="So is one whose journal is larger, gigabytes."
+        default=5.0,
+        gt=0,
+        description="Size of the journal at which the next run starts, gigabytes.",
     )
 
 
 class EvidenceTable(_Table):
     """Pictures and clips of alerts."""
 
-    wanted: bool = Field(default=True, description="Whether alerts have pictures and clips.")
+    wanted: bool = Field(default=True, description="Whether to save pictures and clips of alerts.")
     before_s: float = Field(
         default=8.0, ge=0, le=120, description="Seconds of a clip before its alert."
     )
     after_s: float = Field(default=8.0, ge=0, le=120, description="Seconds of a clip after it.")
     memory_mb: float = Field(
-        default=32.0, ge=1, le=1000, description="Memory for frames before an alert, megabytes."
+        default=32.0, ge=1, le=1000, description="Memory for buffered frames, megabytes."
     )
     link: str | None = Field(
         default=None,
         pattern=r"^https?://",
-        description="Address under which the store can be read, for links; else they are names of files.",
+        description="URL at which the store is served, for links; file names by default.",
     )
 
 
 class RetentionTable(_Table):
     """What is kept for how long; of a run that goes on nothing is deleted but evidence."""
 
-    days: float = Field(default=30.0, gt=0, description="Days that runs are kept.")
+    days: float = Field(default=30.0, gt=0, description="Days to keep runs.")
     evidence_days: float = Field(
-        default=180.0, gt=0, description="Days that pictures and clips of alerts are kept."
+        default=180.0, gt=0, description="Days to keep pictures and clips of alerts."
     )
     store_gb: float | None = Field(
-        default=None, gt=0, description="Room that the store may take, gigabytes."
+        default=None, gt=0, description="Disk space that the store may use, gigabytes."
     )
     free_gb: float = Field(
         default=1.0,
         ge=0,
-        description="Room to be left on the disk, gigabytes: else the oldest evidence is deleted.",
+        description="Disk space to leave free, gigabytes; otherwise the oldest evidence is deleted.",
     )
 
 
@@ -79,7 +81,7 @@ class MonitoringTable(_Table):
     listen: str = Field(
         default="127.0.0.1:9464",
         pattern=r"^$|^([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\]):[0-9]{1,5}$",
-        description="ADDRESS:PORT, this machine alone by default; empty for nowhere.",
+        description="ADDRESS:PORT, only this machine by default; empty for none.",
     )
 
 
@@ -90,11 +92,11 @@ class ConsoleTable(_Table):
         pattern=r"^([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\]):[1-9][0-9]{0,4}$",
         description="ADDRESS:PORT, such as 127.0.0.1:8086.",
     )
-    token: str = Field(description="Lets in who may act; of at least 16 letters and digits.")
-    viewer_token: str | None = Field(default=None, description="Lets in who may only look.")
-    names: Names = Field(default=(), description="Names under which this machine is asked for.")
+    token: str = Field(description="Token for full access; at least 16 letters and digits.")
+    viewer_token: str | None = Field(default=None, description="Token for read-only access.")
+    names: Names = Field(default=(), description="Further host names of this machine.")
     save_to: str | None = Field(
-        default=None, description="Folder into which tasks, rules and zones may be saved."
+        default=None, description="Folder in which tasks, rules and zones may be saved."
     )
 
 
@@ -102,22 +104,18 @@ class WebhooksTable(_Table):
     """How servers of webhooks know that records come from here; values may be placeholders."""
 
     headers: dict[str, str] = Field(default={}, description="Headers of each request.")
-    key: str | None = Field(default=None, description="Key by which each record is signed.")
+    key: str | None = Field(default=None, description="Key with which each record is signed.")
 
 
 class LimitsTable(_Table):
     """What the process of a camera may take before it is ended and begun anew."""
 
-    memory_mb: float = Field(
-        default=2000.0, ge=200, description="Memory in use, megabytes (Linux)."
-    )
-    silent_s: float = Field(
-        default=90.0, ge=1, description="Seconds without a step or a word of life."
-    )
+    memory_mb: float = Field(default=2000.0, ge=200, description="Memory limit, megabytes (Linux).")
+    silent_s: float = Field(default=90.0, ge=1, description="Seconds without a sign of life.")
     start_s: float = Field(default=180.0, ge=5, description="Seconds until the first step.")
     spare: bool = Field(
         default=True,
-        description="Whether a process stands ready for whichever camera ends next (some 300 MB).",
+        description="Whether to keep a spare process ready to replace the next that ends (about 300 MB).",
     )
 
 
@@ -126,7 +124,7 @@ class CameraTable(_Table):
 
     name: str = Field(
         pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$",
-        description="A name of its own, of letters, digits, dot, hyphen and _: also that of its folder.",
+        description="A unique name of letters, digits, dot, hyphen and _, also used for its folder.",
     )
     source: str = Field(
         min_length=1,
@@ -136,31 +134,31 @@ class CameraTable(_Table):
     tasks: Names = Field(default=(), description="Task files, or names of shipped tasks.")
     models: str | None = Field(default=None, description="Model database.")
     actors: dict[str, str | Names] = Field(
-        default={}, description="The model or models that an actor of a task looks like."
+        default={}, description="Actor of a task -> its model or models."
     )
     bystanders: Names = Field(default=(), description="Models that play no part in any task.")
     rules: Names = Field(default=(), description="Rules files, instead of the shipped rules.")
-    zones: str | None = Field(default=None, description="File with zones that rules can name.")
+    zones: str | None = Field(default=None, description="File of zones that rules can refer to.")
     signals: Names = Field(default=(), description="Tables of signals (CSV), or mqtt:HOST/TOPIC.")
     detections: str | None = Field(
         default=None,
-        description="A YOLO network (.onnx), or a file of boxes, in place of visup's own eyes.",
+        description="A YOLO network (.onnx) or a file of boxes, instead of motion segmentation.",
     )
     behaviours: Names = Field(
-        default=(), description="Behaviours of your own: FILE.py or module:Class."
+        default=(), description="Your own behaviours: FILE.py or module:Class."
     )
     plugins: Names = Field(default=(), description="Names of installed behaviours to add.")
-    isolate: Names = Field(default=(), description="Behaviours that run in a process of their own.")
+    isolate: Names = Field(default=(), description="Behaviours to run in their own processes.")
     preset: str | None = Field(
         default=None,
-        description="Rules, memory and pace for a kind of scene.",
+        description="Rules, memory and frame rate for a kind of scene.",
         json_schema_extra={"enum": [*PRESETS, None]},
     )
     pace: float | None = Field(
-        default=None, gt=0, le=1000, description="So many frames a second are enough."
+        default=None, gt=0, le=1000, description="Frames per second that are enough."
     )
     fps: float | None = Field(
-        default=None, gt=0, le=1000, description="Frame rate, where the source has none."
+        default=None, gt=0, le=1000, description="Frame rate, if the source does not state one."
     )
     fov: float | None = Field(
         default=None, gt=0, lt=180, description="Vertical field of view of the camera, degrees."
@@ -172,22 +170,22 @@ class CameraTable(_Table):
     patience_s: float = Field(
         default=60.0,
         ge=0,
-        description="How long a stream that drops is tried again within a process.",
+        description="How long to keep reconnecting to a stream that has dropped, seconds.",
     )
     rest_s: float = Field(
         default=8.0,
         ge=0,
         le=60,
-        description="Seconds between two looks for motion while nothing in the picture changes; 0 for none.",
+        description="Seconds between two searches for motion while nothing changes; 0 to search every frame.",
     )
-    attention: bool = Field(default=False, description="Match well-known objects less often.")
+    attention: bool = Field(
+        default=False, description="Match objects less often once their identity is sure."
+    )
     quiet: Names = Field(
         default=(),
         description="Hours in which only critical alerts go to sinks: 22:00-06:00, or Sat-Sun 00:00-24:00.",
     )
-    sinks: Names = Field(
-        default=(), description="Where its alerts go besides the sinks of the site."
-    )
+    sinks: Names = Field(default=(), description="Further sinks for its alerts.")
 
     @field_validator("preset")
     @classmethod
@@ -205,18 +203,19 @@ class SiteTable(_Table):
         min_length=1,
         description="Folder of all runs; each camera has its own in it.",
     )
-    sinks: Names = Field(default=(), description="Where alerts of all cameras go, as of `--sink`.")
+    sinks: Names = Field(default=(), description="Where alerts of all cameras go, as for `--sink`.")
     recording: RecordingTable = RecordingTable()
     evidence: EvidenceTable = EvidenceTable()
     retention: RetentionTable = RetentionTable()
     monitoring: MonitoringTable = MonitoringTable()
     timezone: str | None = Field(
-        default=None, description="Of quiet hours, such as Europe/Berlin; that of the machine."
+        default=None,
+        description="Time zone of quiet hours, such as Europe/Berlin; by default the machine's.",
     )
     limits: LimitsTable = LimitsTable()
     webhooks: WebhooksTable = WebhooksTable()
     console: ConsoleTable | None = Field(
-        default=None, description="Show all runs in the browser; without it nothing listens."
+        default=None, description="Show all runs in the browser; off by default."
     )
     camera: tuple[CameraTable, ...] = Field(
         description="One table [[camera]] for each camera.",
