@@ -106,7 +106,7 @@ class AppearanceBehaviour:
         ]
 
     def _outline(self, track: ThingTrack, scene: Scene) -> RegionOutline | None:
-        """What is seen of a thing; drawn anew only when that has changed."""
+        """The visible outline of an object; redrawn only when it has changed."""
         known = self._drawn.get(track.name)
         if track.visible is None:
             return None

@@ -1,4 +1,4 @@
-"""Things that a task tells by their place alone are taught by the first picture: what lies there is it."""
+"""Objects that a task identifies by their place only are taught from the first picture."""
 
 from __future__ import annotations
 

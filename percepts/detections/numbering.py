@@ -90,7 +90,7 @@ class BoxNumbering:
         return tuple(self._told(owner[p], d) for p, d in enumerate(found) if _is_told(owner.get(p)))
 
     def save(self) -> Mapping[str, Any]:
-        """What must be remembered to go on, as plain values."""
+        """The state to resume from, as plain values."""
         things = [[*_rows(t.state), t.name, t.frame, t.odds, t.told] for t in self._things]
         return {"things": things, "next": self._next}
 

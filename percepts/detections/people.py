@@ -1,4 +1,4 @@
-"""People who stand or walk, by the detector that OpenCV carries with it: nothing is fetched.
+"""People who stand or walk, by the detector included in OpenCV, without any download.
 
 Histograms of oriented gradients, weighed by the linear machine that was learnt from the pictures of Dalal and
 Triggs, "Histograms of Oriented Gradients for Human Detection" (2005). It knows people seen whole, upright and

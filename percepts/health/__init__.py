@@ -1,4 +1,4 @@
-"""Health of the camera's image: what must never be taken for motion.
+"""Health of the camera's image: faults that must never be mistaken for motion.
 
 `behaviour.py` reports one `Health` for each frame. What it rests on: `image_quality.py` (one image by
 itself: dark, saturated, noisy, broken), `standstill.py` (all or a large part of the image stands still or

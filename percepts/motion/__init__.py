@@ -5,12 +5,12 @@ Read `segmenter.py` first: it is the loop, and each of its steps lives in a room
 - `features/`: the working image, motion constraints at its points, superpixels.
 - `layers/`: affine motions fitted to constraints; the background's; labels of superpixels.
 - `tracks/`: objects over time: prediction, update, salience, merging, initiation, deletion.
-- `foreground/`: soft evidence of what moves by itself, learnt; belief, and the objects it makes up.
+- `foreground/`: learned soft evidence of independent motion; the belief, and the objects formed from it.
 - `static_camera/`: background subtraction while the camera does not move, fused with the layers.
 - `outlines/`: from label probabilities to a mask and its contour.
-- `output/`: the regions reported, directives obeyed, and since when each region has been in view.
+- `output/`: the reported regions, directives, and since when each region has been in view.
 
-`behaviour.py` offers all this to the agent.
+`behaviour.py` makes this available to the agent.
 """
 
 from visup.percepts.motion.behaviour import MotionBehaviour

@@ -1,17 +1,17 @@
-"""Shape: what a region is, by its silhouette (paper, section 4).
+"""Shape: recognition of regions by their silhouettes (paper, section 4).
 
 Read the rooms in this order:
 
 - `silhouette/`: a mask in normal form: one outline of unit area, and a map of its area.
 - `shocks/`: skeleton, shocks, shock graph and its topological signatures.
-- `matching/`: how alike two shapes are: graphs, outlines, areas; shapes that a border cuts.
-- `index/`: what is stored of a view, and which views are worth a full comparison.
-- `database/`: the file, its views, and the search for the views that a silhouette looks like.
-- `refinement/`: orientations made exact with a model's own mesh.
+- `matching/`: similarity of shapes: graphs, outlines, areas; shapes truncated by the border.
+- `index/`: the stored form of a view, and the choice of views for full comparison.
+- `database/`: the file, its views, and the search for views that match a silhouette.
+- `refinement/`: orientations refined with the mesh of the model.
 - `building/`: views rendered from meshes, exemplars of silhouettes, the database built from both.
-- `drawing/`: pictures for people: contact sheets, and why a silhouette matches a view.
+- `drawing/`: contact sheets, and pictures of why a silhouette matches a view.
 
-`behaviour.py` offers all this to the agent.
+`behaviour.py` makes this available to the agent.
 """
 
 from visup.percepts.shape.behaviour import ShapeBehaviour, ShapeSettings

@@ -22,7 +22,7 @@ class SignalSource(Protocol):
 
     @property
     def names(self) -> frozenset[str]:
-        """All that it may ever tell; empty when that is not known beforehand."""
+        """All signals that it may report; empty if that is not known in advance."""
 
     def at(self, time: float) -> Mapping[str, Value]:
         """What is known at a time, seconds of the video; what is not known is left out."""
@@ -42,7 +42,7 @@ class SignalBehaviour(Stateless):
 
     @property
     def names(self) -> frozenset[str]:
-        """All that may ever be told; empty when some source cannot say so."""
+        """All signals that may be reported; empty if some source cannot say."""
         if not all(s.names for s in self._sources):
             return frozenset()
         return frozenset[str]().union(*(s.names for s in self._sources))

@@ -24,7 +24,7 @@ EXPECTED = (
 
 @dataclass(frozen=True, slots=True)
 class SignalTable:
-    """Signals over time; each row stands until the next one.
+    """Signals over time; each row is valid until the next one.
 
     Attributes:
         times: Seconds, rising.
@@ -37,7 +37,7 @@ class SignalTable:
     names: frozenset[str]
 
     def at(self, time: float) -> Mapping[str, Value]:
-        """The row that stands at a time; nothing is known before the first."""
+        """The row valid at a time; nothing is known before the first."""
         place = bisect_right(self.times, time)
         return self.rows[place - 1] if place else {}
 

@@ -52,7 +52,7 @@ class MqttSignals:
         self._client.loop_start()
 
     def at(self, time: float) -> Mapping[str, Value]:
-        """What was told last."""
+        """The latest values."""
         return dict(self._known)
 
     def take(self, topic: str, payload: bytes) -> None:

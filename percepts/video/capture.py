@@ -22,7 +22,7 @@ class Capture(Protocol):
     """What is used of `cv2.VideoCapture`."""
 
     def isOpened(self) -> bool:
-        """Whether frames can be asked for."""
+        """Whether frames can be read."""
         ...
 
     def grab(self) -> bool:

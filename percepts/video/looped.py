@@ -13,7 +13,7 @@ LOOP = "loop:"
 
 
 class LoopedCapture:
-    """A capture of a clip that begins anew at its end, each frame when its time has come.
+    """A capture of a clip that restarts at its end, each frame at its time.
 
     Like a camera it waits for nobody: who asks late is given the next frame at once, until the clip's
     own times are caught up with.

@@ -1,4 +1,4 @@
-"""Keeping OpenCV and FFmpeg from talking to the user: visup has a message of its own."""
+"""Silences OpenCV and FFmpeg, since visup reports errors itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keeping pace with the clock: whoever is late gets the newest frame, and what lies between is dropped.
+"""Real time: a late reader gets the newest frame, and those in between are dropped.
 
 The policy, in one place: *the newest frame that is due*. A frame is due when it was received, or, of
 a recording that is played as a camera would deliver it, when its time has come. Frames that were due

@@ -153,7 +153,7 @@ class _Pictures:
             yield stamp / 1e9, connection.msgtype, data
 
     def rate(self) -> float | None:
-        """Pictures per second, or None when that cannot be told."""
+        """Pictures per second, or None if unknown."""
         times = [t for t, _, _ in islice(self.messages(), RATE_MESSAGES)]
         lasted = [b - a for a, b in pairwise(times) if b > a]
         return 1.0 / median(lasted) if lasted else None

@@ -248,7 +248,7 @@ def _head(path: Path) -> bytes:
 
 
 def _not_a_video(head: bytes) -> str | None:
-    """What a file is instead of a video, as far as its first bytes tell."""
+    """What a file is instead of a video, judging by its first bytes."""
     if head.startswith((b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\0", b"MM\0*")):
         return STILL_IMAGE
     return TEXT if _is_text(head) else None

@@ -60,7 +60,7 @@ class TimedVerdict:
 
 
 class DenseTimeMonitor:
-    """Judges a formula for all moments, in the order of time, each told as soon as it is decided.
+    """Evaluates a formula at all times in order, reporting each verdict as soon as it is decided.
 
     >>> from visup.rules.language.parser import parse_formula
     >>> from visup.rules.predicates.vocabulary import signals

@@ -17,7 +17,7 @@ Fold = Callable[[Any, Any], Any]
 
 
 class Piece(NamedTuple):
-    """A stretch of time in which a value stands.
+    """An interval of time with a constant value.
 
     Attributes:
         begin: Microseconds, or minus infinity.
@@ -122,7 +122,7 @@ class Lane:
 
 
 class Sweep:
-    """Goes through time, lane by lane, and tells what is active in each piece.
+    """Sweeps through time and yields what is active in each piece.
 
     Args:
         lanes: The lanes.

@@ -1,4 +1,4 @@
-"""What is remembered of each object by which people tell it: colours, size, first place, first motion.
+"""Memory of the traits of each object: colours, size, first position, first motion.
 
 The reasoner works only where somebody asks: an agent whose tasks tell no actor so has none.
 """

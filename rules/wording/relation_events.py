@@ -65,7 +65,7 @@ class RelationEventReasoner:
         return {pair: t for pair, t in old.items() if all(i in mind.objects for i in pair)}
 
     def _new(self, name: str, last: Told | None, mind: Mind) -> bool:
-        """Whether it is not what was told of these objects last, or too soon after that."""
+        """Whether it differs from the last event about these objects, and does not come too soon after it."""
         if last is None:
             return name != "keeping_distance"
         return last[0] != name and mind.time - last[1] >= self.settings.quiet_s

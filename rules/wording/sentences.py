@@ -11,19 +11,19 @@ from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
 TOLD = 0.7
-"""Likelihood from which on an object is told to be something; see `VoteSettings.settle`."""
+"""Likelihood from which on the identity of an object is reported; see `VoteSettings.settle`."""
 
 TOLD_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", None)
-"""Object id -> the model that it was last told to be; None where nobody tells names. Who counts the votes
-remembers it."""
+"""Object id -> the identity last reported; None where identities are not reported. The reasoner that counts
+votes maintains it."""
 
 KIND_NAMES: MemoryKey[tuple[str, ...]] = MemoryKey("rules.kind_names", ())
-"""Names that detectors give to all things of a kind, in order; who counts the votes remembers them."""
+"""Class labels given by detectors, in order; maintained by the reasoner that counts votes."""
 
 SURE, LIKELY = 0.95, 0.5
-"""Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
+"""Confidence from which on sentences say 'is', and 'appears to be'; below that, 'may be'."""
 
-# As it is, and its infinitive. What stands in braces in a template is told as its confidence allows.
+# Verb and infinitive. A verb in braces in a template is graded by its confidence.
 _SINGULAR = {
     "is": "be",
     "enters": "enter",
@@ -61,15 +61,15 @@ def believed_name(mind: Mind, object_id: int) -> str | None:
 def spoken_name(mind: Mind, object_id: int) -> str | None:
     """The name of an object in sentences: as `believed_name`, but only once the name has been reported.
 
-    What leads the votes for a moment is no news, and names that come and go would be a story that contradicts
-    itself: who is called otherwise than before was told to be so.
+    A momentary lead in the votes is not reported, since names that come and go would make the narrative
+    contradict itself: an object is only renamed once that has been reported.
 
     Args:
         mind: The mind.
         object_id: Any object id.
 
     Returns:
-        A name, or None when none was told.
+        A name, or None if none was reported.
     """
     name, told = believed_name(mind, object_id), mind.recall(TOLD_NAMES)
     played = any(b.object_id == object_id for task in mind.tasks for b in task.bindings)
@@ -79,9 +79,9 @@ def spoken_name(mind: Mind, object_id: int) -> str | None:
 
 
 def is_of_kind(mind: Mind, object_id: int) -> bool:
-    """Whether of an object only its kind is known, as reported by a detector, and no task casts it.
+    """Whether only the class of an object is known, from a detector, and it plays no actor of a task.
 
-    Of a kind there may be several: each is 'a person', and none is 'the person'.
+    There may be several of a class: each is 'a person', and none is 'the person'.
     """
     belief, kinds = mind.objects.get(object_id), mind.recall(KIND_NAMES)
     if belief is None or belief.name not in kinds:
@@ -90,7 +90,7 @@ def is_of_kind(mind: Mind, object_id: int) -> bool:
 
 
 def individual_name(mind: Mind, object_id: int) -> str | None:
-    """What an object alone is called: its spoken name, but no name of a kind."""
+    """The individual name of an object: its spoken name, unless that is a class label."""
     return None if is_of_kind(mind, object_id) else spoken_name(mind, object_id)
 
 
@@ -108,8 +108,8 @@ def describe(mind: Mind, object_id: int) -> str:
 
     Returns:
         Such as 'object 2, believed to be the satellite' ('a person', where only its kind is known),
-        'object 2, in the part of the gripper' when a task takes it for that though it does not look so, or
-        'object 3' when nobody knows what it is.
+        'object 2, in the part of the gripper' if a task casts it as that although it looks different, or
+        'object 3' when it is not identified.
     """
     name = spoken_name(mind, object_id)
     if name is None:
@@ -141,12 +141,12 @@ def short(mind: Mind, object_id: int) -> str:
 
 
 def seems(confidence: float) -> str:
-    """The verb that a confidence earns: 'is', 'appears to be' or 'may be'."""
+    """The verb for a confidence: 'is', 'appears to be' or 'may be'."""
     return graded("is", confidence)
 
 
 def graded(verb: str, confidence: float) -> str:
-    """A verb as strong as a confidence allows.
+    """A verb graded by confidence.
 
     Args:
         verb: One of `VERBS`.

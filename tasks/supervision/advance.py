@@ -1,4 +1,4 @@
-"""When a hypothesis goes on: which transitions what is seen speaks for, and how probable each is."""
+"""Advancing hypotheses: the transitions that observations support, and their probabilities."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Supported = Sequence[tuple[OpenTransition, Support]]
 
 @dataclass(frozen=True)
 class Advance:
-    """How hypotheses go on in one time step.
+    """Advances hypotheses by one time step.
 
     Attributes:
         steps: What is read off the monitors of steps.
@@ -100,7 +100,7 @@ class Advance:
         return all(self.steps.over(x) for x in transition.left)
 
     def _goes_on(self, transition: OpenTransition) -> bool:
-        """Whether what a transition leaves has lasted for as long as it must, and still goes on."""
+        """Whether what a transition leaves has lasted for as long as it must, and still holds."""
         return any(
             x.step.hold_s is not None and self.observe(x.step).holds is Truth.TRUE
             for x in transition.left
@@ -113,7 +113,7 @@ class Advance:
     def _support(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, ways: int
     ) -> Support:
-        """How strongly something speaks for a transition, one of so many ways on."""
+        """How strongly an observation supports a transition, given the number of alternatives."""
         finished = self._all_over(transition)
         if self._goes_round(transition):
             return Support.NONE
@@ -135,7 +135,7 @@ class Advance:
     def _chance(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, support: Support, ends: bool
     ) -> float:
-        """Probability that the course goes on now by a transition that is supported."""
+        """Probability that a supported transition is taken now."""
         hmm, skipped = self.steps.hmm, self._skipped(transition)
         if support <= dict(hypothesis.considered).get(transition.entered, Support.NONE):
             # What was weighed already counts once; but what was seen to begin may begin later on.
@@ -178,7 +178,7 @@ class Advance:
         return step.condition("begins") is None and self._lasted(step, self.observe(step).helps)
 
     def _skipped(self, transition: OpenTransition) -> float:
-        """Probability that the steps that a transition leaves are left as they stand."""
+        """Probability of leaving the steps of a transition in their current state."""
         return math.prod(self._passed_over(x) for x in transition.left)
 
     def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
@@ -235,7 +235,7 @@ class Advance:
         return all(self._before(s, turn, asked) for s in transition.entered)
 
     def _before(self, step: TaskStep, turn: float, asked: set[frozenset[str]]) -> bool:
-        """Whether a step was done well before a moment, and by nothing that the course had asked for."""
+        """Whether a step was done well before a time, and not because the course required it."""
         meaning, seen = self.steps.actions[step.action], self.observe(step)
         held_by = seen.held_by
         if meaning.lasts or meaning.measures or held_by is None:
@@ -245,7 +245,7 @@ class Advance:
         return frozenset(step.actors) not in asked
 
     def _in_turn(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
-        """A step that begins, with since when what shows it counts, and is told."""
+        """A step that begins, with the time from which its evidence counts and is reported."""
         left = transition.left
         same = any(leaf.step.same_as(x.step) for x in left)
         begun = (x.payload.begun for x in left)
@@ -254,7 +254,7 @@ class Advance:
         return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told))
 
     def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
-        """What has been told once a step is left: of it, and of what came before it."""
+        """The reports once a step is left: about it, and about what preceded it."""
         step, monitor = left.step, left.payload
         if self._ending(left, followed := self._followed(transition)).status is not Status.DONE:
             return monitor.told
@@ -271,7 +271,7 @@ class Advance:
         return replace(leaf, payload=replace(leaf.payload, after=over))
 
     def _over_at(self, left: Leaf[StepMonitor]) -> float:
-        """When a step was over: what goes on until the next thing begins, when it was last seen."""
+        """When a step was over; one that lasts until the next begins, when it was last seen."""
         by_itself = self.steps.over(left)
         at = left.payload.fulfilled_at if by_itself else left.payload.helped_at
         return self.now if at is None else at
@@ -322,5 +322,5 @@ def _may_end(transition: OpenTransition) -> bool:
 
 
 def _goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
-    """Whether a step asks for what is going on already: it can only begin once that ceased."""
+    """Whether a step requires what already holds: it can begin only once that has ceased."""
     return any(step.same_as(x.step) and not x.payload.ceased for x in left)

@@ -1,4 +1,4 @@
-"""Which stages have begun: a stage whose turn has come waits until something of it is seen."""
+"""Which stages have begun: a stage whose turn has come waits until some evidence of it is seen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from visup.tasks.supervision.snapshot import TaskSnapshot
 def with_begun(
     before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], *, stirs: bool
 ) -> tuple[StageBelief, ...]:
-    """Stages, each with whether it has begun.
+    """Update whether each stage has begun.
 
     Args:
         before: The stages as they were believed last, in the same order.
@@ -46,7 +46,7 @@ CAME_LATER_S = 0.3
 
 
 def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
-    """Whether one who plays in the steps that are most likely under way moves, or has just come."""
+    """Whether an actor of the most likely current steps moves, or has just appeared."""
     if posterior is None or posterior.likeliest.finished is not None:
         return False
     actors = {a for leaf in leaves(posterior.likeliest.state) for a in leaf.step.actors}

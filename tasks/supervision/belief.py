@@ -132,7 +132,7 @@ def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
 
 
 def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
-    """What is believed of a task that is probably not going on.
+    """The belief about a task that is probably not in progress.
 
     Who could play its actors is still looked at, and while it is not excluded, what it asks for is
     still expected.
@@ -150,7 +150,7 @@ def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
 
 
 def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float]]:
-    """For each stage that some hypothesis has begun the probability of each of its standings."""
+    """For each stage that has begun in some hypothesis, the probability of each of its states."""
     found: dict[str, dict[Standing, float]] = {}
     for weighted in posterior.hypotheses.values():
         for stage, standing in standings(weighted.value).items():
@@ -162,7 +162,7 @@ def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float
 
 
 def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
-    """How a stage most likely stands: first whether it is pending, under way or behind, then how."""
+    """The likeliest state of a stage: first whether it is pending, active or past, then its status."""
     progress = {p: sum(m for (q, _), m in chances.items() if q is p) for p in Progress}
     place = max(Progress, key=lambda p: round(progress[p], DIGITS))
     standing = max((s for s in chances if s[0] is place), key=lambda s: round(chances[s], DIGITS))
@@ -174,7 +174,7 @@ def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
 def stage_beliefs(
     model: MonitoredPhases, posterior: TaskHypotheses, snapshot: TaskSnapshot
 ) -> Iterator[StageBelief]:
-    """How each stage stands by all hypotheses together, in the order of the task."""
+    """The belief about each stage over all hypotheses, in the order of the task."""
     marginals = stage_marginals(posterior)
     for stage in stage_names(model.task):
         chances = marginals.get(stage, {NOT_BEGUN: 1.0})
@@ -191,7 +191,7 @@ def stage_beliefs(
 def _stage_belief(
     model: MonitoredPhases, hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot
 ) -> StageBelief:
-    """What a hypothesis tells of a stage that it has begun."""
+    """The belief of one hypothesis about a stage that has begun in it."""
     now = snapshot.mind.time
     past = next((p for p in hypothesis.past if p.stage == stage), None)
     leaf = under_way(hypothesis).get(stage)
@@ -219,7 +219,7 @@ def _pause(hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot) -> Pa
 
 
 def _outcome(posterior: TaskHypotheses) -> tuple[Verdict, float, TaskHypothesis]:
-    """The likeliest verdict, its probability, and the likeliest hypothesis by which it is so.
+    """The likeliest verdict, its probability, and the likeliest hypothesis with that verdict.
 
     Whether a task that is not over has begun is asked only once it is likely not to be over.
     """
@@ -267,7 +267,7 @@ def _under_way(posterior: TaskHypotheses) -> dict[str, float]:
 
 
 def _current(posterior: TaskHypotheses) -> str:
-    """The stage most likely under way; of several at the same time the one that stands worst."""
+    """The stage most likely active; of several at the same time, the one with the worst status."""
     chances = _under_way(posterior)
     most = round(max(chances.values()), DIGITS)
     tied = {s for s, chance in chances.items() if round(chance, DIGITS) == most}
@@ -315,7 +315,7 @@ def _missing(model: MonitoredPhases, snapshot: TaskSnapshot) -> str:
 def _expected(
     model: MonitoredPhases, snapshot: TaskSnapshot, posterior: TaskHypotheses
 ) -> tuple[Expectation, ...]:
-    """What is under way asks for, and the entry to what may come next; each told once."""
+    """The requirements of active steps and of possible next ones, each listed once."""
     asked = dict.fromkeys(a for node in posterior.hypotheses for a in model.requirements(node))
     wanted = (
         Expectation(name, snapshot.objects(actors))

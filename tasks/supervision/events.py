@@ -1,4 +1,4 @@
-"""What supervision tells: events where a belief about a task changes, concerns while it is bad."""
+"""Events of supervision when a belief about a task changes, and alert conditions while it is bad."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
 def activity_events(
     before: TaskActivity, now: TaskActivity, belief: TaskBelief, mind: Mind
 ) -> Iterator[Event]:
-    """Events of a task that is inferred to be going on, or not to be after all."""
+    """Events of a task that is inferred to be in progress, or not to be after all."""
     if before.reportable == now.reportable:
         return
     kind = "task_active" if now.reportable else "task_inactive"
@@ -98,7 +98,7 @@ def played(belief: TaskBelief, actors: Sequence[str]) -> tuple[int, ...]:
 def revision_events(
     before: TaskBelief, now: TaskBelief, revisions: Sequence[Revision], mind: Mind
 ) -> Iterator[Event]:
-    """Events of stages that were told done, and are believed not to have happened after all."""
+    """Events of stages that were reported done, and are now believed not to have happened."""
     done, still = done_stages(before), done_stages(now)
     earliest = {r.step.stage: r for r in revisions}  # they come with the last step first
     for stage, revision in earliest.items():
@@ -117,7 +117,7 @@ def revision_events(
 
 
 def done_stages(belief: TaskBelief) -> set[str]:
-    """The stages that are told done."""
+    """The stages that are reported done."""
     return {s.stage for s in belief.stages if s.status is Status.DONE}
 
 
@@ -167,7 +167,7 @@ def _kinds(was: StageBelief | None, now: StageBelief) -> Iterator[str]:
 
 
 def _worth_telling(was: Verdict, now: Verdict) -> bool:
-    """A task that begins to be seen is told by its stages; every other change by itself."""
+    """Whether a change of verdict is an event; the beginning of a task is reported by its stages."""
     return not (was is Verdict.UNKNOWN and now is Verdict.IN_PROGRESS)
 
 
@@ -188,7 +188,7 @@ def _stage_event(
 
 
 def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
-    """The sentence with which a task begins: it says who is believed to take part."""
+    """The sentence for the beginning of a task, which names the objects that take part."""
     who = ", and ".join(describe(mind, i) for i in _objects(belief))
     return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
 

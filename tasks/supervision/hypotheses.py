@@ -91,7 +91,7 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 
 
 def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
-    """For each stage under way the step that stands worst, in the order of the text."""
+    """For each active stage the step with the worst status, in the order of the text."""
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
         other = found.get(leaf.step.stage)
@@ -114,7 +114,7 @@ def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
 
 
 def standings(hypothesis: TaskHypothesis) -> Mapping[str, Standing]:
-    """How each stage stands by a hypothesis; those that are pending are left out."""
+    """The status of each stage in a hypothesis, without those that are pending."""
     found: dict[str, Standing] = {p.stage: (Progress.BEHIND, p.status) for p in hypothesis.past}
     for stage, leaf in under_way(hypothesis).items():
         if found.get(stage) == (Progress.BEHIND, Status.FAILED):

@@ -1,4 +1,4 @@
-"""Invariants: what must never or always be so, over stages or a whole task."""
+"""Invariants: what must never or always hold, during stages or a whole task."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _breaks(invariant: Invariant, snapshot: TaskSnapshot, memory: TaskMemory) ->
 
 
 def _under_way(memory: TaskMemory) -> frozenset[str]:
-    """The stages under way by the best hypothesis, with those in which they stand."""
+    """The active stages in the best hypothesis, with the stages that contain them."""
     posterior = memory.posterior
     if posterior is None or posterior.likeliest.finished is not None:
         return frozenset()
@@ -49,7 +49,7 @@ def _under_way(memory: TaskMemory) -> frozenset[str]:
 
 
 def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
-    """Whether an invariant speaks of how bodies stand to each other, or to a zone: to break it is unsafe.
+    """Whether an invariant is about two bodies, or a body and a zone, so that breaking it is unsafe.
 
     What must never be of one body alone (that the charger moves) is a matter of the work: it fails.
     """
@@ -83,7 +83,7 @@ def _reason(invariant: Invariant, since: float) -> str:
 
 
 def _told(model: MonitoredPhases, belief: TaskBelief, reason: str) -> str:
-    """What is said of a broken invariant: what the task has come to by it, in the verdict's own words."""
+    """The sentence for a broken invariant, in the words of the verdict."""
     if reason == belief.evidence and belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
         return verdict_sentence(model.task.name, belief.verdict, reason)
     if belief.verdict is Verdict.SUCCEEDED:  # which stays so: it came too late for that

@@ -90,7 +90,7 @@ class MonitoredPhases:
 
     @cached_property
     def spare(self) -> Mapping[str, str]:
-        """The actors that nobody waits for, since each is one of many: with what they are called together."""
+        """The actors that are not waited for, since each is one of many, with their common name."""
         return {a.name: a.spare for a in self.task.actors if a.spare}
 
     @cached_property
@@ -107,7 +107,7 @@ class MonitoredPhases:
         return {}
 
     def requirements(self, node: int) -> tuple[Requirement, ...]:
-        """What is asked for at a node of the automaton: actors, and relations between these.
+        """Requirements at a node of the automaton: actors, and relations between them.
 
         Of each step under way what it holds and expects, of each that may come next its beginning.
         """
@@ -216,7 +216,7 @@ class MonitoredPhases:
         )
 
     def gain(self, hypothesis: TaskHypothesis, observe: Observe) -> float:
-        """The evidence of a second that a task is going on, as a hypothesis has it.
+        """Evidence per second that a task is in progress, according to a hypothesis.
 
         The logarithm of how much likelier what is seen is than in a scene where none of it is asked
         for: there what holds is as seldom as here its contrary.
@@ -244,7 +244,7 @@ class MonitoredPhases:
     def _settled(
         self, hypothesis: TaskHypothesis, finished: float, observe: Observe, now: float
     ) -> bool:
-        """Whether a task has been done for so long that nothing undoes it."""
+        """Whether a task has been done for so long that its success is final."""
         steps = [x.step for x in leaves(hypothesis.state)]
         worked = min(observe(s).elapsed(s, finished, now) for s in steps)
         return worked > self.settings.regret_s

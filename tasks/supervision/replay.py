@@ -33,7 +33,7 @@ LONGEST_STEP_S = 1.0
 
 @dataclass(frozen=True, eq=False)
 class PastLook:
-    """What was believed at one moment while an actor was looked for.
+    """The beliefs at one moment while an actor was being searched for.
 
     Attributes:
         mind: What was believed of the objects, without what nobody asks for later.
@@ -67,7 +67,7 @@ def remembered(
 
 
 def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -> bool:
-    """Whether an actor that was looked for is found in an object that was there before."""
+    """Whether an actor was found in an object that had been there before."""
     was = {b.actor: b.object_id for b in before}
     found = [b.object_id for b in now if b.object_id is not None and was.get(b.actor) is None]
     return any(i in mind.objects and mind.objects[i].first_seen < mind.time for i in found)
@@ -76,7 +76,7 @@ def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -
 def replayed(
     model: MonitoredPhases, looks: Sequence[PastLook], bindings: Sequence[Binding]
 ) -> tuple[TaskHypotheses | None, Kept]:
-    """The hypotheses about a task after what was kept, had it been known who plays whom.
+    """The hypotheses about a task replayed over recent observations, with the casting now known.
 
     Args:
         model: The task with its filter.
@@ -111,13 +111,13 @@ def followed(
 
 
 def _as_of(binding: Binding, mind: Mind) -> Binding:
-    """A binding as it would have been: nobody plays the actor before its object is there."""
+    """A binding as it would have been: unbound until its object appears."""
     there = binding.object_id in mind.objects
     return binding if there else replace(binding, object_id=None, strength=0.0)
 
 
 def _stripped(mind: Mind) -> Mind:
-    """A mind with what a task asks for alone; all else would keep older minds alive."""
+    """A mind reduced to what a task requires, so that older minds are not kept alive."""
     kept = RelationMemory(measured=mind.recall(RELATIONS).measured)
     memory = {RELATIONS.name: kept, ZONES.name: mind.recall(ZONES)}
     return replace(

@@ -16,11 +16,11 @@ from visup.tasks.verification.reported import since_reported
 from visup.tasks.verification.step_monitor import StepMonitor
 
 SHORT_S = 0.6
-"""What lasted less long than this is told with its beginning, seconds."""
+"""Shorter intervals are reported with their beginning, seconds."""
 
 
 def names(words: Sequence[str]) -> str:
-    """Names as they are said: `the arm and the satellite`; of nobody, a signal is meant."""
+    """Names in a sentence: `the arm and the satellite`; without names, `the signal`."""
     the = [f"the {w.replace('_', ' ')}" for w in words]
     if len(the) < 2:
         return the[0] if the else "the signal"
@@ -30,7 +30,7 @@ def names(words: Sequence[str]) -> str:
 def evidence(
     step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor, now: float, actions: Words
 ) -> str:
-    """Why a step stands as it does: one clause, without capital and full stop.
+    """The evidence for the status of a step: one clause, without capital and full stop.
 
     Args:
         step: The step.
@@ -139,7 +139,7 @@ def _held(
 
 
 def in_retrospect(why: str, at: float) -> str:
-    """What was going on when a stage was left, said later: whether it still is, is another matter.
+    """Evidence at the time when a stage was left, in the past perfect, since it may no longer hold.
 
     >>> in_retrospect("the arm and the part have been coupled since 3.9 s", 4.9)
     'at 4.9 s the arm and the part had been coupled since 3.9 s'
@@ -159,7 +159,7 @@ def lasted(
     followed: Sequence[float] = (),
     denied: float | None = None,
 ) -> tuple[float, float | None]:
-    """Since when and until when a step that is done is told to have been what it should be, seconds.
+    """The interval reported for a step that is done, seconds.
 
     The arguments are those of `outcome`.
 
@@ -178,7 +178,7 @@ def lasted(
 
 
 def _first_known(monitor: StepMonitor) -> float:
-    """When a step was first what it should be: since before that was noticed, which `begun` tells."""
+    """When a step first held, which is before that was noticed (`begun`)."""
     known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
     return min(known, default=-math.inf)
 
@@ -186,7 +186,7 @@ def _first_known(monitor: StepMonitor) -> float:
 def last_held(
     meaning: ActionDefinition, monitor: StepMonitor, now: float, followed: Sequence[float]
 ) -> float:
-    """Until when a step that has been left is told to have been what it should be, seconds.
+    """The end of the interval reported for a step that has been left, seconds.
 
     Args:
         meaning: Its action.
@@ -230,7 +230,7 @@ def paused_by(pause: Pause, task: Task, actions: Words) -> str:
 
 
 def _late(step: TaskStep, monitor: StepMonitor) -> str:
-    """Which time ran out before a step was over, or had begun."""
+    """The evidence for a step that ended or began too late."""
     due = monitor.missed
     if due is not None:
         return f"`{due.stage}` should be done within {due.seconds:g} s, but was not"
@@ -242,7 +242,7 @@ def _late(step: TaskStep, monitor: StepMonitor) -> str:
 
 
 def stage_sentence(kind: str, stage: str, task: str, why: str, undone: bool = False) -> str:
-    """The sentence of an event of a stage; `undone` when it was told complete, and is not."""
+    """The sentence of an event of a stage; `undone` if it was reported complete, and no longer is."""
     said = UNDONE if undone else STAGE_WORDS[kind]
     return f"{said.format(stage=stage, task=task)}: {why}."
 
@@ -257,7 +257,7 @@ def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
 Words = Mapping[str, ActionDefinition]
 
 UNDONE = "Stage `{stage}` is no longer complete"
-"""Of a stage that was told complete and is failing, or has failed."""
+"""For a stage that was reported complete and is failing, or has failed."""
 
 STAGE_WORDS = {
     "stage_started": "Stage `{stage}` of task `{task}` has begun",

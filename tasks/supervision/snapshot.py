@@ -1,4 +1,4 @@
-"""One task at one moment: who plays its actors, and what is seen of its actions."""
+"""One task at one moment: the objects that play its actors, and the observations of its actions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from visup.tasks.verification.stage_conditions import ConditionEvaluator
 
 
 class TaskSnapshot:
-    """One task at one moment: who plays its actors, and what is seen of its actions.
+    """One task at one moment: the objects that play its actors, and the observations of its actions.
 
     Args:
         mind: What is believed.
@@ -70,7 +70,7 @@ class TaskSnapshot:
 
     @property
     def kept(self) -> Kept:
-        """What is to be kept of the facts for the next step."""
+        """The state of the facts to keep for the next step."""
         # Nobody asks for what is paused: it is so after the pause since it was so before.
         return self._relations.kept(self.pauses, self.pauses.now(self._pausing) is not None)
 

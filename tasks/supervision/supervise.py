@@ -175,7 +175,7 @@ def _due(memory: TaskMemory, now: float) -> bool:
 def _inferred(
     before: tuple[TaskMemory, ...], seen: tuple[TaskMemory, ...], now: float
 ) -> tuple[TaskMemory, ...]:
-    """What is remembered of tasks once it is inferred which of them are going on."""
+    """The memory of tasks after inference of which are in progress."""
     if len(seen) == 1:
         return seen
     dt = now - before[0].inferred
@@ -194,14 +194,14 @@ def _inferred(
 
 
 def _ends(before: TaskMemory, now: TaskMemory) -> bool:
-    """Whether a task that was told about has just ended."""
+    """Whether a task that was reported on has just ended."""
     return before.activity.reportable and now.belief.verdict in OVER
 
 
 def _with_activity(
     told: TaskBelief, memory: TaskMemory, activity: TaskActivity, now: float
 ) -> TaskMemory:
-    """A memory with its activity; of a task that is not going on nothing is believed but that.
+    """A memory with its activity; for a task that is not in progress, nothing else is believed.
 
     What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
     what interrupts it, which is no matter of the task.
@@ -275,7 +275,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
 
 
 def _awaited(model: MonitoredPhases, bindings: Sequence[Binding]) -> bool:
-    """Whether an actor without whom the task cannot be judged is still looked for."""
+    """Whether an actor that the task depends on is still being searched for."""
     unbound = (b.actor for b in bindings if b.object_id is None)
     return any(not model.task.actor(a).optional for a in unbound)
 
@@ -283,7 +283,7 @@ def _awaited(model: MonitoredPhases, bindings: Sequence[Binding]) -> bool:
 def _events(
     model: MonitoredPhases, memory: TaskMemory, new: TaskMemory, mind: Mind
 ) -> Iterator[Event]:
-    """What is told of one task after a step."""
+    """The events of one task after a step."""
     yield from activity_events(memory.activity, new.activity, new.belief, mind)
     if not new.activity.reportable and memory.activity.reportable:
         return  # that it is not going on says all
@@ -298,7 +298,7 @@ def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondi
 
 
 def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
-    """Steps of stages that were told done and are not any more, nor lie behind as it is told now."""
+    """Steps of stages that were reported done and are not any more."""
     before, after = memory.posterior, new.posterior
     undone = done_stages(memory.belief) - done_stages(new.belief)
     if before is None or after is None or not undone:

@@ -1,4 +1,4 @@
-"""Which of several tasks are going on, told from how well each explains what is seen.
+"""Which of several tasks are in progress, inferred from how well each explains the observations.
 
 Each task gathers evidence: the logarithm of how likely what is seen of its actions is if it is going on,
 against a scene in which it is not (`Follower.gain`). Evidence fades, so that a task that was done long
@@ -38,7 +38,7 @@ EXCLUDED = 0.05
 
 @dataclass(frozen=True, slots=True)
 class TaskActivity:
-    """What is believed of whether a task is going on.
+    """The belief about whether a task is in progress.
 
     Attributes:
         evidence: Logarithm of how much likelier what was seen is if it is.
@@ -54,12 +54,12 @@ class TaskActivity:
 
     @property
     def reportable(self) -> bool:
-        """Whether it is likely enough to be told about."""
+        """Whether it is likely enough to be reported on."""
         return self.chance >= REPORTABLE
 
     @property
     def excluded(self) -> bool:
-        """Whether it is so unlikely that what it asks for is not expected of anybody."""
+        """Whether it is so unlikely that its requirements are not expected."""
         return self.chance < EXCLUDED
 
 
@@ -77,7 +77,7 @@ def updated_activities(
     dt: float,
     over: Sequence[bool] | None = None,
 ) -> tuple[TaskActivity, ...]:
-    """How likely each of several tasks is going on.
+    """The probability that each of several tasks is in progress.
 
     Args:
         before: What was believed of each.
@@ -139,7 +139,7 @@ def shares(evidence: Sequence[float], none: bool) -> list[float]:
 
 
 def rivals(cast: Sequence[frozenset[int]]) -> Iterator[tuple[int, ...]]:
-    """Groups of tasks that are linked by objects that they share; one that shares none stands alone."""
+    """Groups of tasks that are linked by shared objects."""
     left = list(range(len(cast)))
     while left:
         group = [left.pop(0)]

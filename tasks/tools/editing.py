@@ -130,7 +130,7 @@ def hover(text: str, file: str, word: NameUse) -> str | None:
 
 
 def definition(text: str, file: str, word: NameUse) -> Span | None:
-    """Where a stage, actor, zone or parameter is defined, or None; `span.file` tells the file."""
+    """Where a stage, actor, zone or parameter is defined, or None; `span.file` is the file."""
     task, _ = diagnose(text, file)
     if word.kind == "include":
         return None
@@ -158,7 +158,7 @@ def references(text: str, word: NameUse) -> list[NameUse]:
 
 
 def completions(text: str, file: str, line: int, column: int) -> list[Completion]:
-    """What may stand at a place, by what stands before it in its line."""
+    """Completions at a position, from the text before it in its line."""
     rows = text.split("\n")
     before = rows[line - 1][: column - 1] if 0 < line <= len(rows) else ""
     task, _ = diagnose(text, file)

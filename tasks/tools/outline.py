@@ -63,7 +63,7 @@ def outline(task: Task) -> Branch:
 
 
 def _stage(task: Task, name: str, drawn: set[str]) -> Iterator[Branch]:
-    """What a stage asks for; nothing when it is drawn already."""
+    """The requirements of a stage; nothing if it is drawn already."""
     stage = task.stage(name)
     if stage is None or name in drawn:
         return

@@ -1,4 +1,4 @@
-"""What is kept of facts from step to step: how long they are so, how often, when they paused work."""
+"""State of facts from step to step: how long they have held, how often, when they paused work."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What is kept of the facts of a task at one moment, for the next.
+    """State of the facts of a task at one moment, for the next.
 
     Attributes:
         time: Seconds of that moment, or None before the first.

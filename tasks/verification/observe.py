@@ -186,7 +186,7 @@ class RelationLookup:
         return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
 
     def kept(self, pauses: PauseRecord, carry: bool) -> Kept:
-        """What is to be kept of this moment.
+        """The state to keep of this moment.
 
         Args:
             pauses: When work was paused.

@@ -73,7 +73,7 @@ class StepModel:
         return WAITING if monitor.begun is None else 1
 
     def gain(self, leaf: Leaf[StepMonitor], seen: ActionObservation) -> float:
-        """The evidence of a second that a step is going on; see `MonitoredPhases.gain`."""
+        """Evidence per second that a step is in progress; see `MonitoredPhases.gain`."""
         fit = self.hmm.fit
         if not seen.observed or self.over(leaf):
             return 0.0

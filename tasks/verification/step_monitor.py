@@ -36,7 +36,7 @@ class Moment(NamedTuple):
 
 @dataclass(frozen=True)
 class StepMonitor:
-    """What is kept about a step under way; times in seconds.
+    """State of the monitor of an active step; times in seconds.
 
     Attributes:
         entered: When the step was entered.
@@ -113,7 +113,7 @@ class StepMonitor:
 
 
 def entered(now: float) -> StepMonitor:
-    """What is kept about a step that begins now."""
+    """The monitor of a step that begins now."""
     return StepMonitor(entered=now, since=now, after=now)
 
 
@@ -125,7 +125,7 @@ def update(
     moment: Moment,
     settings: TaskSettings,
 ) -> StepMonitor:
-    """Take one observation into what is kept about a step.
+    """Update the monitor of a step with one observation.
 
     Args:
         monitor: What was kept.
@@ -172,7 +172,7 @@ def update(
 
 
 def _note_told(monitor: StepMonitor, step: TaskStep, status: Status, now: float) -> StepMonitor:
-    """A change of status is told, with the relation by which it came."""
+    """Record a reported change of status, with the relation that caused it."""
     by = monitor.helped_by if status is Status.PROGRESSING else None
     by = monitor.contrary if status in BAD else by
     return (
@@ -198,7 +198,7 @@ def _note_lateness(
 
 
 def _note_haste(monitor: StepMonitor, step: TaskStep, seen: ActionObservation) -> StepMonitor:
-    """What begins sooner than its course allows counts for nothing until it begins anew."""
+    """Disregard what begins sooner than its delay allows, until it begins again."""
     if monitor.held or monitor.early or seen.held_by is None or seen.holds is not Truth.TRUE:
         return monitor
     passed = seen.elapsed(step, monitor.after, seen.held_by.since)
@@ -213,7 +213,7 @@ def _not_yet(
     settings: TaskSettings,
     worked: Worked,
 ) -> tuple[StepMonitor, ActionObservation]:
-    """What was so before its turn counts for nothing until it has ceased; after a while it is a fault."""
+    """Disregard what held before its turn, until it has ceased; after a while it is a failure."""
     if not seen.observed:
         return monitor, seen
     if seen.holds is not Truth.TRUE:

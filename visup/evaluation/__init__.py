@@ -1,10 +1,10 @@
-"""Evaluation: figures of `visup eval`, each against a ground truth, an oracle or a bar.
+"""Evaluation: the figures of `visup eval`, against ground truth, an oracle or a target.
 
 Rooms, by what is evaluated:
 
 - `motion`: segmentation and tracking (J, F, ghosts, id switches, MOTA, IDF1).
 - `shape`: shape retrieval and view recognition.
-- `health`: camera faults injected into sound video.
+- `health`: camera faults injected into good video.
 - `missions`: the whole supervisor on missions with ground truth.
 - `simulation`: percepts simulated from a mission's ground truth, with the errors of real ones.
 - `reasoning`: missions reasoned about without perception, relations of boxes.

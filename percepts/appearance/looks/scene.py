@@ -1,4 +1,4 @@
-"""A frame as taught things are looked for in it: of bounded size."""
+"""A frame in which taught objects are searched for, of bounded size."""
 
 from __future__ import annotations
 

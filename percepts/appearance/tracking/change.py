@@ -1,4 +1,4 @@
-"""Where the picture has changed of late: where things that move are looked for first."""
+"""Where the picture has changed recently, which is where moving objects are searched for first."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def _seen_moving(
 
 
 def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
-    """A hidden thing is looked for where it was."""
+    """Search for a hidden object where it was."""
     assert track.pose is not None
     scene, it, pose = motion.scene, track.looks, track.pose.moved(motion.camera)
     if track.rest is not None and motion.static:

@@ -1,1 +1,1 @@
-"""Commands about many runs: lakes are filled (`archive`), and asked."""
+"""Commands about many runs: filling lakes (`archive`), and querying them."""

@@ -261,7 +261,7 @@ def soak(frames: int, traffic: float, progress: Progress) -> Figures:
 
 
 def totals_closing(figures: Figures) -> Iterator[str]:
-    """Each total on a line of its own."""
+    """Each total on its own line."""
     for name, value in figures["total"].items():
         yield f"{name}: {value:.6g}"
 
@@ -336,7 +336,7 @@ def serving_closing(figures: Figures) -> Iterator[str]:
 
 
 def serving_failed(figures: Figures) -> bool:
-    """Whether an alert was lost or told twice, or a camera was away too long."""
+    """Whether an alert was lost or sent twice, or a camera was down too long."""
     from visup.evaluation.serving.rehearsal import failed
 
     return failed(figures)

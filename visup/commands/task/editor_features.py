@@ -96,7 +96,7 @@ def uses(ls: LanguageServer, params: lsp.ReferenceParams) -> list[lsp.Location]:
 
 
 def prepare_rename(ls: LanguageServer, params: lsp.PrepareRenameParams) -> lsp.Range | None:
-    """Where a name stands that can be renamed; None refuses."""
+    """The range of a name that can be renamed; None refuses."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     word = _word(document, params.position)
     if word is None or not alike(document, word):
