@@ -1,4 +1,4 @@
-"""Watch the clip that ships with visup: the story, its verdict, and a picture of each alert."""
+"""Watch the clip that ships with visup: print its events and verdict, and save a picture of each alert."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Watch until an object is identified, then look at what is believed and why."""
+"""Watch until an object is identified, then inspect the beliefs and the reasons for them."""
 
 from __future__ import annotations
 

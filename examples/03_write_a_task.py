@@ -1,4 +1,4 @@
-"""Write a task, see its tree, and see what visup says when it has a mistake."""
+"""Write a task, print its tree, and see what visup reports when it contains a mistake."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A behaviour of your own: report a lamp, a spot much brighter than the rest of the image.
+"""Write your own behaviour: report a lamp, a spot much brighter than the rest of the image.
 
 Run it by itself, or give the file to `visup watch CLIP --behaviour examples/04_own_behaviour.py`.
 """

@@ -1,4 +1,4 @@
-"""Find out what a silhouette looks like: the five best views in the shipped model database."""
+"""Match a silhouette: print the five best views in the shipped model database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An object detector from an ONNX file: what a network finds becomes percepts (`visup[onnx]`).
+"""An object detector from an ONNX file: detections of a network become percepts (`visup[onnx]`).
 
 The network is made here, of one layer, so that the example needs no download: it averages blocks of
 16 x 16 pixels. Put your own detector in its place; the behaviour stays the same.

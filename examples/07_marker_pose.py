@@ -1,4 +1,4 @@
-"""Where a fiducial marker is in space: OpenCV's ArUco as a behaviour.
+"""The pose of a fiducial marker: OpenCV's ArUco as a behaviour.
 
 Stick a printed marker on a tool or a table, and its position and attitude are in the mind.
 """

@@ -1,8 +1,8 @@
 """A depth camera beside the colour camera: measured depth in place of depth from size.
 
 The camera is a stand-in: it makes a depth image for each frame. With a real one, open it in `start`
-and ask it for its latest image. `depth` percepts take part in all that is built on them: relations
-that look into the scene, rules about depth.
+and read its latest image. `depth` percepts are used by everything that builds on them: relations
+in depth, rules about depth.
 """
 
 from __future__ import annotations

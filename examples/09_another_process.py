@@ -1,4 +1,4 @@
-"""A behaviour in a process of its own: when it hangs it is killed, told of, and started anew."""
+"""A behaviour in its own process: when it hangs it is killed, reported, and restarted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Step a supervisor like a program: stop, look inside, go back, ask why, and try what if."""
+"""Step a supervisor like a program: stop, inspect, go back, ask why, and try what-if."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ if __name__ == "__main__":
         it = Stepper(build_agent(settings), source)
         it.watch("speed(a)")
 
-        # A breakpoint, and a stop inside the next step with its half-made mind.
+        # A breakpoint, and a stop inside the next step with its intermediate mind.
         it.break_at("identified")
         print("stopped:", *it.step(until="20.0").reasons)
         it.step(until="update")
         print("inside frame", it.mind.frame_index, "after", it.paused and it.paused.phase.value)
 
-        # Back, and forth again to the very same.
+        # Back, and forward again to exactly the same state.
         first = it.back()
         it.back(5)
         print("from there to here:", it.diff(it.at, it.made))
         again = it.step(5).step
         print("the same events again:", first and again and first.events == again.events)
 
-        # Why is it so, and why not otherwise?
+        # Why, and why not?
         why = it.why("identity 1")
         print(why)
         print(f"it rests on {len(why.percepts)} percepts")
         print(it.why_not("stage captured"))
 
-        # What if it were something else from here on? The course itself stays as it is.
+        # What if it were something else from here on? The original timeline is not changed.
         branch = it.branch(AssumedIdentity(1, "spartan"))
         branch.step(10)
         changed = branch.compare()

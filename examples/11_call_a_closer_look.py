@@ -1,4 +1,4 @@
-"""An expensive behaviour runs only when it is called: a closer look while two things are near each other."""
+"""An expensive behaviour runs only when needed: a closer look while two objects are near each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Show three bottles once, say what ought to happen to them, and watch (docs/your-own-cell.md)."""
+"""Teach three bottles, say what should happen to them, and watch (docs/your-own-cell.md)."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def scenario_that_is_none(folder: Path) -> list[object]:
         (foreign_database, "other.db"),
         (text_database, "text.db"),
         (out_is_a_file, "taken"),
-        (out_holds_a_run, "holds a run already"),
+        (out_holds_a_run, "already contains a run"),
         (unreadable_actor, "NAME=MODEL"),
         (unknown_actor, "satellite"),
         (unknown_task, "dock"),

@@ -144,7 +144,7 @@ def test_relations_lie_over_the_picture_and_a_click_says_who_it_is(
     knob = "document.querySelectorAll('.overlay .vector circle')[1].getBoundingClientRect()"
     x, y = browser.value(f"(() => {{ const r = {knob}; return [r.x + 2, r.y + 2]; }})()")
     browser.click(x, y)
-    browser.until("document.body?.innerText.toUpperCase().includes('WHO IS OBJECT 2')")
+    browser.until("document.body?.innerText.toUpperCase().includes('IDENTITY OF OBJECT 2')")
     browser.until("!!document.querySelector('.overlay .chosen')")
     shows(browser, "0.90")
     switch(browser, "relations")

@@ -18,7 +18,7 @@ def test_a_replay_leaves_a_report(visup: Call, clip: Path, tmp_path: Path, gone:
     done = visup("replay", tmp_path / "run", "--out", tmp_path / "again")
     assert done.code == 0, done.err
     assert f"Report:  {tmp_path / 'again' / 'report.html'}" in done.out
-    assert ("outlines alone" in done.out) == gone
+    assert ("outlines only" in done.out) == gone
     page = (tmp_path / "again" / "report.html").read_text()
     first = (tmp_path / "run" / "report.html").read_text()
     assert page.count("<img") == first.count("<img") > 0

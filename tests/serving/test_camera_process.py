@@ -58,7 +58,7 @@ def test_a_file_is_watched_and_told_of(tmp_path: Path) -> None:
     assert told[-1].data["live"] is False
     again, refused = watched(CameraJob(job.settings, OPTIONS, tmp_path / "run", resume=True))
     assert again == 2
-    assert "this run is over" in refused[-1].data["text"]
+    assert "this run is complete" in refused[-1].data["text"]
     assert Recording.open(tmp_path / "run").count() == 12
 
 

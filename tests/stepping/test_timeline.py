@@ -175,7 +175,7 @@ def test_an_answer_stays_when_going_back_over_it() -> None:
     it.step(30)
     it.answer(1, "arm")
     it.back(4)
-    with pytest.raises(SettingsError, match="later steps were made"):
+    with pytest.raises(SettingsError, match="later steps were taken"):
         it.answer(2, "arm")
     it.step(4)
     first = it.step().step
