@@ -29,6 +29,11 @@ from visup.percepts.motion.static_camera.blob_track import (
     template_window,
     tone_histogram,
 )
+from visup.percepts.motion.static_camera.bodies import (
+    are_bodies,
+    body_width,
+    with_bodies_apart,
+)
 from visup.percepts.motion.static_camera.templates import best_template_shift, split_blob
 
 CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
@@ -53,6 +58,8 @@ def track_blobs(known: BlobTracks, view: Foreground, last_key: int) -> tuple[Blo
         All objects, hidden ones too; the greatest key given.
     """
     ahead = [_predicted(s, view.seconds) for s in known]
+    slender = body_width(ahead)
+    view = with_bodies_apart(view, ahead, slender)
     claims = _claims(ahead, view)
     out: list[BlobTrack] = []
     taken = np.zeros(view.count + 1, dtype=bool)
@@ -66,7 +73,7 @@ def track_blobs(known: BlobTracks, view: Foreground, last_key: int) -> tuple[Blo
     left = []
     for i, s in enumerate(ahead):
         alone = all(len(rivals[b]) == 1 for b in claims[i])
-        whole, others = _merged_parts(s, parts[i], alone)
+        whole, others = _merged_parts(s, parts[i], alone, slender)
         left += others
         pieces = (
             alone
@@ -144,7 +151,7 @@ def _blob_appearance(mask: Mask, view: Foreground) -> tuple[tuple[float, float],
 
 
 def _merged_parts(
-    s: BlobTrack, parts: Sequence[Mask], alone: bool
+    s: BlobTrack, parts: Sequence[Mask], alone: bool, slender: float
 ) -> tuple[Mask | None, list[Mask]]:
     """The parts of an object as one mask, and those too far from the largest to be its own."""
     if not parts:
@@ -155,7 +162,8 @@ def _merged_parts(
     # What rests before an object parts it for as long as it takes to pass, and no longer.
     two = s.split_px > PASSED * max(s.shape.shape)
     for part in order[1:]:
-        if two and _is_large_part(part, whole):
+        bodies = s.split_px > 0 and are_bodies(whole, part, slender)
+        if (two or bodies) and _is_large_part(part, whole):
             others.append(part)
             continue
         near = cv2.dilate(whole.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
