@@ -29,6 +29,7 @@ UPRIGHT = 0.65  # the same, at most
 KNOWN_FRAMES = 5  # frames after which a body that stood alone tells how wide bodies are
 WIDE = 1.6  # bodies' widths from which a blob may hold two
 MOST = 3  # bodies in one blob
+APART = 2  # frames apart from others after which one is known by itself
 THIN_PX = 4  # a body that is less wide is a speck
 NOTCH = (
     0.86  # height of the outline between two bodies, as a share of the lower: shoulders are at 0.82
@@ -127,6 +128,7 @@ def _shared(blob: int, labels: Labels, tracks: Sequence[BlobTrack]) -> int:
     count = 0
     for s in tracks:
         at, own = template_window(s, labels.shape)
-        inside = crop(s.shape, own) & (crop(labels, at) == blob)
-        count += s.isolated_frames >= 2 and 2 * np.count_nonzero(inside) > np.count_nonzero(s.shape)
+        inside = int(np.count_nonzero(crop(s.shape, own) & (crop(labels, at) == blob)))
+        known = s.isolated_frames >= APART
+        count += int(known and 2 * inside > int(np.count_nonzero(s.shape)))
     return count
