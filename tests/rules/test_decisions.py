@@ -12,7 +12,7 @@ from tests.rules.runs import think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Event, Mind, Observation, Outcome, Presence, Reasoner
 from visup.rules.coupling.reasoner import CouplingReasoner
-from visup.rules.identity.votes import IdentityReasoner
+from visup.rules.identity.identification import IdentityReasoner
 from visup.rules.presence.lifecycle import TRANSITIONS, state_of
 from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.presence.reasoner import PresenceReasoner

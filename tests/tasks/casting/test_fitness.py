@@ -12,7 +12,7 @@ from tests.rules.scenes import SIZE, Rect, box_region, seen
 from tests.tasks.scripted import belief
 from visup.agent import Binding, Mind, Percept, Report, ReportState, TaskBelief, Verdict
 from visup.agent.cycle.answers import resolve_model
-from visup.rules.identity.votes import answered_model
+from visup.rules.identity.identification import answered_model
 from visup.rules.reasoners import default_reasoners
 from visup.tasks import parse_task
 from visup.tasks.casting.matching import match

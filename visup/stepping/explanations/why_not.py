@@ -20,7 +20,8 @@ from visup.agent import (
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.reasoner import CouplingReasoner
-from visup.rules.identity.votes import IdentityReasoner, object_votes
+from visup.rules.identity.identification import IdentityReasoner
+from visup.rules.identity.votes import object_votes
 from visup.rules.presence.reasoner import PresenceReasoner
 from visup.rules.safety.explain import RuleExplanation
 from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named

@@ -1,0 +1,241 @@
+"""Who is who: votes on names are counted, and told when they are clear.
+
+The vote itself stands in `votes.py`. What the operator answers is no evidence but a fact, and settles the
+vote.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+from visup.agent import (
+    Candidate,
+    Event,
+    Hypothesis,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Presence,
+)
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
+from visup.rules.identity.votes import (
+    VOTES,
+    LookKind,
+    ObjectVotes,
+    Tally,
+    VoteMemory,
+    VoteSettings,
+    candidates,
+    confirmed_candidate,
+    faded,
+    joined,
+    unknown_probability,
+    weights,
+    worth,
+)
+from visup.rules.pose.reasoner import pose_support
+from visup.rules.presence.association import hypotheses_by_object, recognised
+from visup.rules.presence.reasoner import visible_share
+from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
+from visup.rules.wording.sentences import (
+    KIND_NAMES,
+    TOLD_NAMES,
+    seems,
+    with_article,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class NamesHeard:
+    """What was said of an object in one step.
+
+    Attributes:
+        kind: By its whole silhouette, by what the image border left of it, or by what found it.
+        hypotheses: Names and views, in any order; empty where nobody looked.
+    """
+
+    kind: Literal["whole", "cut", "found"]
+    hypotheses: tuple[Hypothesis, ...] = ()
+
+
+def awaited(mind: Mind, object_id: int) -> frozenset[str]:
+    """Models that actors of tasks stand for and that no other object in view is believed to be."""
+    wanted = {model for models in mind.actors.values() for model in models}
+    found = {
+        b.name
+        for b in mind.objects.values()
+        if b.id != object_id and b.confirmed and b.presence is not Presence.LEFT
+    }
+    return frozenset(wanted - found)
+
+
+def answered_model(mind: Mind, answer: str) -> str:
+    """The model that an answer means: the first of an actor's, where the answer names an actor."""
+    bindings = (b for task in mind.tasks for b in task.bindings if b.actor == answer)
+    return next((b.models[0] for b in bindings if b.models), answer)
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityReasoner:
+    """Reasoner of the cogitate phase: counts votes and tells who is who."""
+
+    settings: VoteSettings = field(default_factory=VoteSettings)
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Count one step; see `Reasoner`."""
+        return self._judged(mind, observation, None)
+
+    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
+        """What the decision 'identified' of a step hangs on, for every object.
+
+        Args:
+            mind: As this reasoner got it in that step.
+            observation: What was perceived.
+        """
+        log = DecisionLog()
+        self._judged(mind, observation, log)
+        return log
+
+    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+        old = mind.recall(VOTES) or VoteMemory(observation.time)
+        dt = max(0.0, observation.time - old.time)
+        hypotheses = hypotheses_by_object(mind, observation)
+        found = recognised(mind, observation)
+        mind = _with_kinds(mind, hypotheses)
+        every: dict[int, ObjectVotes] = {}
+        events: list[Event] = []
+        beliefs: list[ObjectBelief] = []
+        for object_id, belief in sorted(mind.objects.items()):
+            before = old.of.get(object_id, ObjectVotes())
+            look = _look(belief, hypotheses.get(object_id, ()), found)
+            votes = self._count(mind, belief, before, look, dt)
+            believed = self._believe(mind, belief, votes)
+            beliefs.append(believed)
+            votes = self._lead(votes, believed.candidates, observation.time)
+            if decide(self._conditions(believed, votes, mind), log, "identified", (object_id,)):
+                now = mind.with_objects(believed)
+                events.append(_identified(now, believed, votes.reported, observation))
+                votes = replace(votes, reported=votes.leader)
+            every[object_id] = votes
+        mind = mind.with_objects(*beliefs)
+        mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(every)))
+        told = {i: votes.reported for i, votes in every.items() if votes.reported is not None}
+        mind = mind.remember(TOLD_NAMES, MappingProxyType(told))
+        return Outcome(mind, tuple(events))
+
+    def _conditions(
+        self, belief: ObjectBelief, votes: ObjectVotes, mind: Mind
+    ) -> Iterator[Condition]:
+        """Of an object's being identified as what leads its votes."""
+        s = self.settings
+        if not belief.candidates:
+            answered = mind.answers.get(belief.id) == UNKNOWN_OBJECT
+            yield Condition("the operator did not say that it is none of the models", not answered)
+            yield Condition("it may be one of the models", False)
+            most = votes.counts[0][1] if votes.counts else 0.0
+            yield at_least("votes of the best name", most, s.known_votes)
+            yield at_least("votes of the best name, beside none of the models,", most, votes.none)
+        name = belief.name
+        yield Condition("it was not identified so before", votes.reported != name)
+        yield at_least(f"likelihood of {name}", belief.confidence, s.settle)
+        yield at_least("leads for", mind.time - votes.leads_since, s.settle_s, " s", slack=1e-9)
+        yield Condition("it has entered", belief.confirmed)
+
+    def _count(
+        self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes, look: NamesHeard, dt: float
+    ) -> ObjectVotes:
+        s = self.settings
+        visible = visible_share(mind, belief.id)
+        hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
+        blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
+        tau = s.tau_hidden_s if hidden or blind else s.tau_s
+        waited = awaited(mind, belief.id)
+        said, share = Tally(), 0.0
+        if look.hypotheses and not (hidden or blind):
+            new = 1.0 if votes.heard is None else min(1.0, (mind.time - votes.heard) / s.apart_s)
+            said, share = self._weighed(mind, belief.id, look, waited), new * visible
+            votes = replace(votes, heard=mind.time)
+        tallies = {}
+        for kind, tally in (("whole", votes.whole), ("cut", votes.cut), ("found", votes.found)):
+            # What is known of the whole is kept while the border cuts it, as that of what is hidden.
+            kept = kind == "whole" and look.kind == "cut"
+            fade = dt, s.tau_hidden_s if kept else tau
+            heard = said if kind == look.kind else Tally()
+            tallies[kind] = faded(tally, heard, share, fade, s.most_candidates)
+        return joined(replace(votes, **tallies), s, waited)
+
+    def _weighed(
+        self, mind: Mind, object_id: int, look: NamesHeard, waited: Collection[str]
+    ) -> Tally:
+        """What a look says: weights of names, and of its being none of the models."""
+        s = self.settings
+        kind: LookKind = getattr(s, look.kind)
+        heard = weights(look.hypotheses, s, waited, kind.awaited)
+        # Views that do not hang together over time speak against a name (paper, figure 5).
+        likely = ((n, w * pose_support(mind, object_id, n)) for n, w in heard.items())
+        return Tally(tuple(likely), worth(s.stranger, s))
+
+    def _believe(self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes) -> ObjectBelief:
+        s = self.settings
+        answer = mind.answers.get(belief.id)
+        if answer == UNKNOWN_OBJECT:
+            return replace(belief, candidates=(), unknown=1.0)
+        if answer is not None:
+            name = answered_model(mind, answer)
+            said = (confirmed_candidate(name, votes.counts),)
+            return replace(belief, candidates=said, unknown=0.0)
+        return replace(
+            belief,
+            candidates=candidates(votes.counts, s, votes.none),
+            unknown=unknown_probability(votes.counts, s, votes.none),
+        )
+
+    def _lead(self, votes: ObjectVotes, named: tuple[Candidate, ...], now: float) -> ObjectVotes:
+        """The votes with who leads clearly, and since when."""
+        clear = named and named[0].confidence >= self.settings.settle
+        leader = named[0].name if clear else None
+        since = votes.leads_since if leader == votes.leader else now
+        return replace(votes, leader=leader, leads_since=since)
+
+
+def _look(belief: ObjectBelief, said: tuple[Hypothesis, ...], found: Collection[int]) -> NamesHeard:
+    """What was said of an object, as what kind of look."""
+    if belief.id in found:
+        return NamesHeard("found", said)
+    return NamesHeard("cut" if belief.region.cut else "whole", said)
+
+
+def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> Mind:
+    """The mind that knows which names are those of kinds."""
+    heard = {h.name for said in hypotheses.values() for h in said if h.of_kind}
+    known = mind.recall(KIND_NAMES)
+    return (
+        mind if heard <= set(known) else mind.remember(KIND_NAMES, (*sorted(heard | set(known)),))
+    )
+
+
+def _identified(
+    mind: Mind, belief: ObjectBelief, before: str | None, observation: Observation
+) -> Event:
+    # By its model alone: the part that it plays in a task may be another's, and lags behind.
+    words, how = with_article(mind, belief.name), seems(belief.confidence)
+    if before is None:
+        text = f"Object {belief.id} {how} {words}."
+    else:
+        was = with_article(mind, before)
+        text = f"Object {belief.id}, taken for {was}, {how} {words}."
+    data = MappingProxyType({"name": belief.name, "before": before})
+    return Event(
+        "identified",
+        observation.time,
+        observation.frame_index,
+        text,
+        (belief.id,),
+        belief.confidence,
+        data=data,
+    )
