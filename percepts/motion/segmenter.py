@@ -28,6 +28,7 @@ from visup.percepts.motion.features.motion_constraints import (
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import Superpixels, superpixels
 from visup.percepts.motion.features.work_image import Floats, ImageHistory, WorkImage, prepare_image
+from visup.percepts.motion.foreground.cues import CueMemory, FrameCues, flow_cues
 from visup.percepts.motion.foreground.following import (
     TrackPosterior,
     follow_foreground,
@@ -55,7 +56,7 @@ from visup.percepts.motion.layers.dense_labelling import (
     label_cells,
 )
 from visup.percepts.motion.layers.layer_discovery import affine_rate
-from visup.percepts.motion.output.cast_shadows import CastShadowFilter
+from visup.percepts.motion.output.cast_shadows import CastShadowFilter, comparable_image
 from visup.percepts.motion.output.region_report import (
     apply_ignore,
     looked_at,
@@ -89,6 +90,7 @@ from visup.percepts.motion.tracks.track_prediction import label_priors, predict_
 from visup.percepts.motion.tracks.warping import dense_likelihood, flow_back
 
 Numbered = TypeVar("Numbered", Track, Region)
+Shown = Future[tuple[FrameCues, CueMemory]]
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
 
 
@@ -173,31 +175,39 @@ class MotionSegmenter:
         scene, predicted, prior = self._measured_frame(image, self._cells)
         self._cells = scene.cells
         tracks, prior = self._initiated(fit_tracks(predicted, scene), scene, prior)
-        evidence, labelling = self._labelled(scene, tracks, prior, directives)
+        evidence, labelling, shown = self._labelled(scene, tracks, prior, directives)
+        small = self._beside.submit(comparable_image, frame)
         keys = tuple(t.key for t in tracks)
         tracks = self._updated(tracks, scene, evidence, labelling)
         wanted = looked_at(directives, tracks, scene)
         tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, wanted)
-        self._follow_foreground(scene, TrackPosterior(tracks, keys, labelling.posterior))
+        self._follow_foreground(scene, shown, TrackPosterior(tracks, keys, labelling.posterior))
         regions = self._reported(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
-        regions = self._shadows.step(frame, scene, regions, static=self._static.active)
+        small_image, static = small.result(), self._static.active
+        regions = self._shadows.step(frame, small_image, scene, regions, static=static)
         return select_regions(regions, directives)
 
-    def _follow_foreground(self, scene: FrameMeasurements, tracked: TrackPosterior) -> None:
-        """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
+    @property
+    def _asks(self) -> bool:
+        """Whether the belief is asked what moves in this frame."""
         unused = self._static.active or self._foreground.calm
-        if self._model is None or (unused and not self._always):
+        return self._model is not None and (self._always or not unused)
+
+    def _follow_foreground(
+        self, scene: FrameMeasurements, shown: Shown | None, tracked: TrackPosterior
+    ) -> None:
+        """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
+        if self._model is None or shown is None:
             self._foreground = resting(self._foreground, scene)
             tracks = self._under_ids_of_objects(tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
         least, stands = min_region_area(scene, self.settings), partial(stands_there, scene)
         admission = Admission(least, self._ids, stands, alone=not self._foreground.calm)
-        old = self._history.back(1)
         cues, self._foreground = follow_foreground(
-            self._foreground, self._model, scene, old, tracked, admission
+            self._foreground, self._model, scene, shown.result(), tracked, admission
         )
         tracks = self._under_ids_of_objects(tracked.tracks)
         share = self._foreground.belief.share
@@ -241,16 +251,22 @@ class MotionSegmenter:
         tracks: Tracks,
         prior: Floats,
         directives: Sequence[Directive],
-    ) -> tuple[PointEvidence, Labelling]:
-        """What points say of the tracks, and the labels of the superpixels that follow (the E step)."""
+    ) -> tuple[PointEvidence, Labelling, Shown | None]:
+        """What points say of the tracks, and the labels of the superpixels that follow (the E step).
+
+        With what flow shows of the superpixels, where it is asked for: that is found meanwhile.
+        """
         near = claimable_cells(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
         dense = self._beside.submit(dense_likelihood, scene, tracks, old, near, self.settings.noise)
+        last, memory = self._history.back(1), self._foreground.memory
+        shown = self._beside.submit(flow_cues, scene, last, memory) if self._asks else None
         evidence = point_likelihoods(scene, tracks, near, self.settings)
         evidence = apply_ignore(directives, scene, evidence)
         by_appearance = appearance_prior(scene.cells, prior)
         expected = LabelPrior(prior, by_appearance, stationary_cells(tracks, scene))
-        return evidence, label_cells(scene.cells, evidence, dense.result(), expected, self.settings)
+        found = label_cells(scene.cells, evidence, dense.result(), expected, self.settings)
+        return evidence, found, shown
 
     def _updated(
         self,

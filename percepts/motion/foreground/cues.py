@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.foreground._cues_jit import (
@@ -116,26 +117,27 @@ def track_cues(posterior: Floats, confirmed: NDArray[np.bool_]) -> TrackCues:
     return TrackCues(shares.astype(np.float32), posterior.argmax(axis=1).astype(np.int32))
 
 
-def frame_cues(
-    scene: FrameMeasurements,
-    flow: Floats,
-    old: WorkImage,
-    tracked: TrackCues,
-    memory: CueMemory | None,
+def with_tracks(cues: FrameCues, tracked: TrackCues) -> FrameCues:
+    """The cues of a frame with what tracks say of its superpixels, in place of nothing."""
+    values = cues.values.copy()
+    values[:, -tracked.shares.shape[1] :] = tracked.shares
+    return replace(cues, values=values, part=tracked.part)
+
+
+def flow_cues(
+    scene: FrameMeasurements, old: WorkImage, memory: CueMemory | None
 ) -> tuple[FrameCues, CueMemory]:
-    """The cues of a frame.
+    """The cues of a frame that need no tracks, which are found meanwhile; those are 0.
 
     Args:
         scene: The frame as measured.
-        flow: (h, w, 2) float32, from the newest image back to the one before.
         old: The image before.
-        tracked: What tracks say of its superpixels.
         memory: Of the frame before; None when there is none of the same size.
 
     Returns:
         The cues, and what is to be remembered.
     """
-    cells, image = scene.cells, scene.image
+    cells, image, flow = scene.cells, scene.image, scene.flow
     labels = cells.labels
     found = flow_statistics(labels, flow, image.gx, image.gy, cells.count)
     background = scene.measured[0].background
@@ -161,7 +163,7 @@ def frame_cues(
         np.hypot(way[:, 0], way[:, 1]) / (way[:, 2] + 0.5),
         _border_distance(cells),
         *_frame_cues(length, np.hypot(*ground.T), median, background.scale),
-        *tracked.shares.T,
+        *np.zeros((2, cells.count), np.float32),
     ]
     values = np.column_stack(columns).astype(np.float32)
     link = cells.link
@@ -175,7 +177,7 @@ def frame_cues(
         here if memory is not None else here[:0],
         there if memory is not None else there[:0],
         looked,
-        tracked.part,
+        np.zeros(cells.count, np.int32),
     )
     return cues, CueMemory(labels, way)
 

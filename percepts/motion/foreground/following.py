@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.work_image import Floats, WorkImage
+from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import Belief, unbiased, updated
 from visup.percepts.motion.foreground.cues import (
     CueMemory,
     FrameCues,
     TrackCues,
-    frame_cues,
     track_cues,
+    with_tracks,
 )
 from visup.percepts.motion.foreground.objects import (
     Admission,
@@ -120,7 +120,7 @@ def follow_foreground(
     state: ForegroundState,
     model: ForegroundModel,
     scene: FrameMeasurements,
-    old: WorkImage,
+    shown: tuple[FrameCues, CueMemory],
     tracked: TrackPosterior,
     admission: Admission,
 ) -> tuple[FrameCues, ForegroundState]:
@@ -130,14 +130,14 @@ def follow_foreground(
         state: After the frame before.
         model: What was learnt.
         scene: The frame as measured.
-        old: The image before.
+        shown: Its cues that need no tracks, and what is remembered of them (`flow_cues`).
         tracked: Its tracks.
         admission: What is asked of an object.
 
     Returns:
         The cues of the frame, and the state.
     """
-    cues, memory = frame_cues(scene, scene.flow, old, tracked.cues(), state.memory)
+    cues, memory = with_tracks(shown[0], tracked.cues()), shown[1]
     belief = updated(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
     objects = follow_objects(state.objects, cues, belief, tracks, scene.time, admission)

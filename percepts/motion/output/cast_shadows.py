@@ -70,12 +70,19 @@ class CastShadowFilter:
         self._evidence: dict[int, float] = {}
 
     def step(
-        self, frame: Frame, scene: FrameMeasurements, regions: Sequence[Region], *, static: bool
+        self,
+        frame: Frame,
+        image: Floats,
+        scene: FrameMeasurements,
+        regions: Sequence[Region],
+        *,
+        static: bool,
     ) -> tuple[Region, ...]:
         """The regions of a frame that are no shadows.
 
         Args:
             frame: The frame.
+            image: The same as `comparable_image` makes it.
             scene: As measured; gives the camera's motion since the frame before.
             regions: All that move, frame pixels.
             static: Whether the camera is known to be static.
@@ -83,7 +90,6 @@ class CastShadowFilter:
         Returns:
             Those that are left, in the same order.
         """
-        image = _prepared(frame)
         ground = self._ground
         if ground is None or ground.bare.shape != image.shape:
             nowhere = np.full_like(image, np.nan)
@@ -159,7 +165,8 @@ def _detail(image: Floats, where: Mask) -> Floats:
     return np.asarray(grey - cv2.blur(grey, (7, 7)) / np.maximum(count, 1e-3), dtype=np.float32)
 
 
-def _prepared(frame: Frame) -> Floats:
+def comparable_image(frame: Frame) -> Floats:
+    """A frame as it is compared with the ground, (h, w, 3) float32, at most SIZE pixels long."""
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)

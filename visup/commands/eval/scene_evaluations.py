@@ -200,6 +200,18 @@ SCENE_EVALUATIONS = (
         lambda given: {"clips": given["names"] or "all"},
     ),
     EvaluationCommand(
+        "crowds",
+        """What a frame costs with one mover in view, and with up to forty, in processor time.
+
+        Exit code 1 when it grows by more than the bar, 1.5.
+        """,
+        "visup.evaluation.motion.crowds:evaluate_crowds",
+        "segmenting",
+        ("ms", "ratio", "regions", "growth"),
+        (count("frames", 200, "Frames for each number of movers.", 12), _SEED),
+        failed=lambda figures: figures["total"]["growth"] > 1.5,
+    ),
+    EvaluationCommand(
         "scale",
         "Growing model databases: time to open and query, memory, and recall lost by the index.",
         f"{_ADAPTERS}:scale",

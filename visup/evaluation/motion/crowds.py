@@ -1,0 +1,154 @@
+"""`visup eval crowds`: what a frame costs with one mover in view, and with forty.
+
+Textured discs go their ways over a textured ground that a camera pans over. What is shown is drawn from a
+seed and is the same on every machine; times are those of the processor, for a machine is seldom quiet.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame
+from visup.evaluation.figures import Progress, silent
+from visup.percepts.motion.segmenter import MotionSegmenter
+
+MOVERS = (1, 5, 10, 20, 40)
+SIZE = (480, 854)  # height, width
+FPS = 25.0
+UNTIMED = 10  # frames at first, in which movers are found
+BAR = 1.5  # how much longer a frame may take with any number of movers than with one
+RADIUS = (16.0, 40.0)
+SPEED = 4.0  # standard deviation of a mover's step along x and y, pixels a frame
+PAN = (2.0, 0.6)  # of the camera, pixels a frame
+
+Image = NDArray[np.uint8]
+Doubles = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mover:
+    """A textured disc: (2,) where it is at first, (2,) its step from frame to frame, pixels; its radius."""
+
+    start: Doubles
+    step: Doubles
+    radius: float
+    skin: Image
+
+
+def evaluate_crowds(
+    frames: int = 200, seed: int = 0, *, progress: Progress = silent
+) -> dict[str, Any]:
+    """The time of a frame by how many things move in it.
+
+    Args:
+        frames: How many for each number of movers, `UNTIMED` of them before the clock runs.
+        seed: Of all that is drawn.
+        progress: Shows what is being done.
+
+    Returns:
+        `items` by number of movers: `ms`, median processor time of a frame; `ratio`, the same in runs of DIS
+        FAST; `regions`, how many are reported in the mean; `growth`, `ms` beside that of one mover.
+        `total`: the greatest `growth` and `ratio`.
+    """
+    items: dict[str, dict[str, Any]] = {}
+    for number in MOVERS:
+        progress(f"{number} movers")
+        items[str(number)] = _timed(crowd(number, frames, seed))
+    first = items[str(MOVERS[0])]["ms"]
+    for item in items.values():
+        item["growth"] = item["ms"] / first
+    most = {key: max(item[key] for item in items.values()) for key in ("growth", "ratio")}
+    return {"total": most, "items": items}
+
+
+def crowd(movers: int, frames: int, seed: int) -> Iterator[Frame]:
+    """Frames in which so many things move, later ones in front, (480, 854, 3)."""
+    rng = np.random.default_rng((seed, movers))
+    height, width = SIZE
+    ground = _texture(rng, (height + 80, width + 80))
+    things = [_mover(rng) for _ in range(movers)]
+    for n in range(frames):
+        image = _seen(ground, _there_and_back(np.array(PAN) * n, np.array([80.0, 80.0])), SIZE)
+        for thing in things:
+            _draw(image, thing, n)
+        noisy = image + rng.normal(0, 1.5, image.shape)
+        yield Frame(n, n / FPS, np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
+
+
+def _timed(shown: Iterator[Frame]) -> dict[str, Any]:
+    """What frames cost, and what is reported in them."""
+    segmenter = MotionSegmenter()
+    engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    ms: list[float] = []
+    dense: list[float] = []
+    regions: list[int] = []
+    before: Image | None = None
+    for frame in shown:
+        start = time.process_time()
+        found = segmenter.step(frame)
+        ms.append(1e3 * (time.process_time() - start))
+        grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        if before is not None:
+            start = time.process_time()
+            engine.calc(before, grey, None)  # type: ignore[call-overload]
+            dense.append(1e3 * (time.process_time() - start))
+        before = grey
+        regions.append(len(found))
+    cost = median(_later(ms))
+    told = sum(_later(regions)) / len(_later(regions))
+    return {"ms": cost, "ratio": cost / median(_later(dense)), "regions": told}
+
+
+def _later(values: Sequence[float]) -> Sequence[float]:
+    return values[UNTIMED:] or values
+
+
+def _mover(rng: np.random.Generator) -> Mover:
+    place = rng.uniform((0, 0), SIZE[::-1])
+    radius = float(rng.uniform(*RADIUS))
+    side = int(2 * radius) + 4
+    return Mover(place, rng.normal(0, SPEED, 2), radius, _texture(rng, (side, side)))
+
+
+def _texture(rng: np.random.Generator, shape: tuple[int, int]) -> Image:
+    """Smooth noise of random contrast in random colours, (h, w, 3)."""
+    fine = rng.uniform(-1, 1, (*shape, 3)).astype(np.float32)
+    rough = np.asarray(cv2.GaussianBlur(fine, (0, 0), 2.0), dtype=np.float32)
+    strength = float(rng.uniform(30, 70)) / max(float(rough.std()), 1e-6)
+    return np.asarray(np.clip(rng.uniform(60, 195, 3) + strength * rough, 0, 255), dtype=np.uint8)
+
+
+def _seen(image: Image, at: Doubles, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """What of an image is seen through a window at (x, y), (h, w, 3)."""
+    matrix = np.array([[1, 0, at[0]], [0, 1, at[1]]], dtype=np.float64)
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], flags=flags), dtype=np.float32)
+
+
+def _there_and_back(way: Doubles, room: Doubles) -> Doubles:
+    """A place between 0 and (2,) room for a way of any length: at either end it turns."""
+    return room - np.abs(way % (2 * room) - room)
+
+
+def _draw(image: NDArray[np.float32], thing: Mover, n: int) -> None:
+    """Draw a mover where it is in a frame, in place; at the border of the image it turns."""
+    at = _there_and_back(thing.start + thing.step * n, np.array(SIZE[::-1], dtype=np.float64))
+    side = len(thing.skin)
+    left, top = (np.floor(at).astype(int) - side // 2).tolist()
+    x0, y0 = max(left, 0), max(top, 0)
+    x1, y1 = min(left + side, SIZE[1]), min(top + side, SIZE[0])
+    if x1 <= x0 or y1 <= y0:
+        return
+    own = _seen(thing.skin, side // 2 + np.array([left, top]) - at, (side, side))
+    ys, xs = np.mgrid[y0:y1, x0:x1]
+    cover = np.clip(thing.radius + 0.5 - np.hypot(xs - at[0], ys - at[1]), 0, 1)[..., None]
+    part = image[y0:y1, x0:x1]
+    part += cover * (own[y0 - top : y1 - top, x0 - left : x1 - left] - part)
