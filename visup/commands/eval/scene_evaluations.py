@@ -209,7 +209,7 @@ SCENE_EVALUATIONS = (
         "segmenting",
         ("ms", "ratio", "regions", "growth"),
         (count("frames", 200, "Frames for each number of movers.", 12), _SEED),
-        failed=lambda figures: figures["total"]["growth"] > 1.5,
+        failed=lambda figures: figures["total"]["growth"] > figures["total"]["bar"],
     ),
     EvaluationCommand(
         "scale",

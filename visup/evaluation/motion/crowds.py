@@ -56,7 +56,7 @@ def evaluate_crowds(
     Returns:
         `items` by number of movers: `ms`, median processor time of a frame; `ratio`, the same in runs of DIS
         FAST; `regions`, how many are reported in the mean; `growth`, `ms` beside that of one mover.
-        `total`: the greatest `growth` and `ratio`.
+        `total`: the greatest `growth` and `ratio`, and the `bar` of the former.
     """
     items: dict[str, dict[str, Any]] = {}
     for number in MOVERS:
@@ -66,7 +66,7 @@ def evaluate_crowds(
     for item in items.values():
         item["growth"] = item["ms"] / first
     most = {key: max(item[key] for item in items.values()) for key in ("growth", "ratio")}
-    return {"total": most, "items": items}
+    return {"total": {**most, "bar": BAR}, "items": items}
 
 
 def crowd(movers: int, frames: int, seed: int) -> Iterator[Frame]:
