@@ -102,14 +102,21 @@ class BoxNumbering:
         ]
 
     def _assigned(self, frame: int, found: Sequence[Detection]) -> dict[int, _Thing]:
-        """Place of a box -> the thing that goes on as it; sure boxes first."""
+        """Place of a box -> the thing that goes on as it; sure boxes first, and things that were told."""
         ahead = [expected(t.state, frame - t.frame) for t in self._things]
         left = set(range(len(self._things)))
         sure = [p for p, d in enumerate(found) if d.score >= SURE]
         unsure = [p for p, d in enumerate(found) if d.score < SURE]
         owner: dict[int, _Thing] = {}
-        for places, least in ((sure, LEAST_OVERLAP), (unsure, LEAST_OVERLAP_UNSURE)):
-            rows = [i for i in sorted(left) if places is sure or self._is_fresh(i, frame)]
+        told = {i for i in left if self._things[i].told}
+        rounds = (
+            (sure, told, LEAST_OVERLAP),
+            (unsure, {i for i in told if self._is_fresh(i, frame)}, LEAST_OVERLAP_UNSURE),
+            (sure, left - told, LEAST_OVERLAP),
+            (unsure, left - told, LEAST_OVERLAP_UNSURE),
+        )
+        for all_, things, least in rounds:
+            rows, places = sorted(left & things), [p for p in all_ if p not in owner]
             for i, p in _pairs(
                 rows, places, lambda i, p: self._shared(i, ahead[i], found[p]), least
             ):

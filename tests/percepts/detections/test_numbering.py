@@ -99,6 +99,16 @@ def test_what_is_told_of_a_thing_follows_from_scores_and_from_its_coming_again(
     assert {d.track for boxes in numbered for d in boxes} == ({1} if told else set())
 
 
+def test_what_was_told_goes_before_what_was_not() -> None:
+    numbering = BoxNumbering()
+    first = Detection(0, (20.0, 10.0, 10.0, 24.0), 0.9)
+    assert [d.track for d in numbering.number(0, [first])] == [1]
+    unsure = Detection(0, (24.0, 10.0, 10.0, 24.0), 0.4)  # begins a thing that is not believed yet
+    assert [d.track for d in numbering.number(1, [first, unsure])] == [1]
+    nearer_the_second = Detection(0, (23.0, 10.0, 10.0, 24.0), 0.9)
+    assert [d.track for d in numbering.number(2, [nearer_the_second])] == [1]
+
+
 def test_a_sure_box_goes_before_a_nearer_one_that_is_unsure() -> None:
     numbering = BoxNumbering()
     numbering.number(0, [Detection(0, (20.0, 10.0, 10.0, 24.0), 0.9)])
