@@ -74,6 +74,15 @@ def test_who_is_let_in(headers: dict[str, str], role: str | None, kind: str) -> 
         assert first.get("status") == 403 or first["type"] == "websocket.close"
 
 
+def test_who_is_not_let_in_is_told_in_a_page_or_in_words() -> None:
+    page, _ = asked({**HOST, "accept": "text/html,*/*"})
+    words, _ = asked({**HOST, "accept": "*/*"})
+    assert b"<h1>This console is closed to you</h1>" in page[1]["body"]
+    assert words[1]["body"].startswith(b"Open it by the address")
+    for told in (page, words):
+        assert b"script" not in told[1]["body"]
+
+
 def test_the_token_goes_from_the_address_into_a_cookie_that_scripts_cannot_read() -> None:
     sent, reached = asked(HOST, f"token={ACCESS.operator}")
     headers = dict(sent[0]["headers"])

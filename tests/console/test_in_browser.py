@@ -158,7 +158,7 @@ def test_why_and_what_if_are_answered(browser: Browser, address: str) -> None:
     tab(browser, "Ask")
     press(browser, "identity 1")
     shows(browser, "[frame")
-    tab(browser, "Try")
+    tab(browser, "What if")
     browser.until("document.querySelector('input[aria-label=\"What is assumed\"]')")
     browser.value("document.querySelector('input[aria-label=\"What is assumed\"]').focus()")
     browser.type("object 99 arm")
@@ -366,7 +366,7 @@ def test_everybody_can_use_it(browser: Browser, address: str) -> None:
         ("Events", "in view"),
         ("Alerts", "only alerts open"),
         ("Ask", "Why?"),
-        ("Try", "from the cursor on"),
+        ("What if", "from the cursor on"),
     ):
         tab(browser, name)
         shows(browser, text)

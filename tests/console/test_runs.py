@@ -17,6 +17,7 @@ from visup.agent import Observation
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import JOURNAL
+from visup.agent.storage.wall_clock import WallClock
 from visup.console.library import RunLibrary, run_key
 from visup.console.pages.playhead import Playhead
 from visup.console.pages.wall_page import latest_by_camera
@@ -188,6 +189,29 @@ def test_the_playhead_stays_within_the_run_and_jumps_to_what_was_told(
     assert (head.number, head.playing) == (59, False)
     head.toggle()
     assert (head.number, head.playing) == (0, True)
+
+
+def test_a_run_of_a_camera_has_times_of_the_wall_and_begins_at_its_first_moment(
+    run: tuple[Path, Sequence[Step]],
+) -> None:
+    view = RunView(run[0])
+    assert view.now(view.seconds).startswith("0:")
+    view.times = [t + 1800.0 for t in view.times]
+    view.__dict__["clock"] = WallClock(((0.0, 1795455235.0), (view.start, 1795500000.0)))
+    assert (view.share(view.start), view.share(view.seconds)) == (0.0, 1.0)
+    assert view.when(view.start) == "06:00:00"
+    assert view.when(0.0) == "11-23 17:33:55"  # of an alert that was open before
+    assert view.now(view.start) == "2026-11-24 06:00:00 UTC"
+    head = Playhead(view)
+    head.go_to_share(0.5)
+    assert head.number == pytest.approx(len(view.frames) / 2, abs=1)
+    at = head.number
+    head.pull(view.share(view.times[at]) + 0.002)  # less than to the next moment
+    assert head.number == at + 1
+    head.pull(1.0)
+    assert head.number == len(view.frames) - 1
+    head.pull(0.0)
+    assert head.number == 0
 
 
 def test_a_moment_that_cannot_be_read_does_not_take_the_timeline_away(tmp_path: Path) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -125,3 +127,23 @@ def test_a_behaviour_that_did_not_always_run_has_a_row_that_says_what_it_did(
         for time, state in moments if spans else ():
             assert [s.state for s in spans if s.start <= time < s.end] == [state]
     ET.fromstring(timeline_svg(rows, seconds))
+
+
+@given(EVENTS, st.floats(0.0, 1e5))
+def test_a_run_that_follows_another_has_its_own_axis(events: list[Event], start: float) -> None:
+    """Whenever it began, the picture is the same."""
+    rows = [t for t in tracks_of(events, (), 60.0) if t.spans]
+    later = [
+        replace(
+            t,
+            spans=tuple(replace(s, start=s.start + start, end=s.end + start) for s in t.spans),
+        )
+        for t in rows
+    ]
+    shown = _places(timeline_svg(later, 60.0 + start, start))
+    assert shown == pytest.approx(_places(timeline_svg(rows, 60.0)), abs=0.02)
+
+
+def _places(picture: str) -> list[float]:
+    bars = [b for b in ET.fromstring(picture).iter() if b.tag == "rect"]
+    return [float(b.get(key) or 0.0) for b in bars for key in ("x", "width")]

@@ -17,6 +17,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
+from visup.console.plain_page import plain_page
+
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -86,7 +88,7 @@ class AccessGuard:
         given = query.get(PARAMETER, [""])[0]
         role = self._access.role(given or _cookie(headers.get("cookie", "")))
         if fault or role is None:
-            await _refuse(scope, send, fault or _UNKNOWN)
+            await _refuse(scope, send, fault or _UNKNOWN, headers.get("accept", ""))
         elif given and scope["type"] == "http":
             await _welcome(scope, send, given)
         else:
@@ -107,7 +109,10 @@ class AccessGuard:
         return ""
 
 
-_UNKNOWN = "Open the address that `visup console` printed: it holds the token that lets you in."
+_UNKNOWN = (
+    "Open it by the address that visup console printed when it started, which ends in ?token=... , "
+    "or by one with the token that stands in the site file."
+)
 
 
 def _headers(given: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
@@ -137,13 +142,16 @@ async def _welcome(scope: Scope, send: Send, token: str) -> None:
     await send({"type": "http.response.body", "body": b""})
 
 
-async def _refuse(scope: Scope, send: Send, why: str) -> None:
+async def _refuse(scope: Scope, send: Send, why: str, wanted: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 4403, "reason": why})
         return
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), *_SAFE]
+    page = "text/html" in wanted
+    kind = b"text/html" if page else b"text/plain"
+    headers = [(b"content-type", kind + b"; charset=utf-8"), *_SAFE]
+    body = plain_page("This console is closed to you", why) if page else why.encode()
     await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": why.encode()})
+    await send({"type": "http.response.body", "body": body})
 
 
 _SAFE = (

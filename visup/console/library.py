@@ -31,7 +31,7 @@ class RunEntry:
         tasks: Names of its tasks.
         verdict: As in the journal; None while it goes on, or where nothing was judged.
         alerts: How many were opened.
-        seconds: Of the last step, from the start of the source.
+        seconds: From its first step to its last one.
         written: When it was last written to, seconds since the epoch.
         ended: Whether it is over.
         problem: Why it cannot be read, or empty.
@@ -108,7 +108,7 @@ class RunLibrary:
             return self._known[key]
         except KeyError:
             raise OutputError(
-                "this run is not there (any more)", hint="open the list anew"
+                "this run is not there any more", hint="go back to the list of runs"
             ) from None
 
 
@@ -142,7 +142,7 @@ def entry_of(key: str, folder: Path) -> RunEntry:
     try:
         recording = Recording.open(folder)
         facts, ends = recording.facts(), recording.first_and_last()
-        seconds = recording.step_at(ends[1])[0]["time"] if ends else 0.0
+        first, last = (recording.summary_at(i)["time"] for i in ends) if ends else (0.0, 0.0)
         return RunEntry(
             key,
             folder,
@@ -151,7 +151,7 @@ def entry_of(key: str, folder: Path) -> RunEntry:
             tasks=_tasks(facts),
             verdict=_text(facts.get("verdict")) or None,
             alerts=len(recording.alerts()),
-            seconds=float(seconds),
+            seconds=float(last) - float(first),
             written=recording.written(),
             ended="ended" in facts,
         )

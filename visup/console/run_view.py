@@ -13,11 +13,14 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import Alert, Event, Hypothesis, Mind, Observation, Zone
 from visup.agent.model.errors import OutputError, VisupError
+from visup.agent.storage.wall_clock import WallClock
 from visup.api.recorded import open_run
 from visup.console.drawing.pictures import RunPictures, jpeg
+from visup.console.evidence import evidence_of, latest_snapshot
 from visup.console.recorded_mind import recorded_mind
 from visup.console.run_files import flows_of, zones_of
 from visup.console.tracks import TimelineTrack, behaviour_tracks, tracks_of
@@ -97,6 +100,40 @@ class RunView:
     def seconds(self) -> float:
         """Time of the last moment."""
         return self.times[-1] if self.times else 0.0
+
+    @property
+    def start(self) -> float:
+        """Time of the first moment: a run that follows another goes on with its time."""
+        return self.times[0] if self.times else 0.0
+
+    def share(self, time: float) -> float:
+        """How much of the run is over at a time, 0 to 1."""
+        return min(1.0, max(0.0, (time - self.start) / max(self.seconds - self.start, 1e-6)))
+
+    @property
+    def name(self) -> str:
+        """What pages call it."""
+        camera = self._run.facts.get("camera")
+        return f"{camera} · {self.folder.name}" if isinstance(camera, str) else self.folder.name
+
+    @cached_property
+    def clock(self) -> WallClock:
+        """When its moments were; one that knows nothing of a run that no camera made."""
+        return WallClock.read(self._run.facts.get("clock"))
+
+    def when(self, time: float) -> str:
+        """A time as pages show it: in UTC where it is known, with the day when that is not the last one's."""
+        told, last = self.clock.text(time), self.clock.text(self.seconds)
+        if told is None or last is None:
+            return clock_text(time)
+        return told[11:19] if told[:10] == last[:10] else f"{told[5:10]} {told[11:19]}"
+
+    def now(self, time: float) -> str:
+        """Where a cursor is, as pages show it."""
+        told = self.clock.text(time)
+        if told is None:
+            return f"{clock_text(time)} / {clock_text(self.seconds)}"
+        return f"{told[:10]} {told[11:19]} UTC"
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
@@ -214,11 +251,21 @@ class RunView:
         return self.pictures.drawn(self.mind(number), plain=plain)
 
     def thumbnail(self) -> bytes:
-        """A small picture of the middle of the run, as JPEG."""
-        image = annotate(self.pictures.frame(mind := self.mind(len(self.frames) // 2)), mind)
+        """A small picture of the middle of the run, as JPEG; of a camera, of its latest alert."""
+        image = self._kept_picture()
+        if image is None:
+            mind = self.mind(len(self.frames) // 2)
+            image = annotate(self.pictures.frame(mind), mind)
         height = round(image.shape[0] * THUMBNAIL / image.shape[1])
         size = (THUMBNAIL, max(1, height))
         return jpeg(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8))
+
+    def _kept_picture(self) -> NDArray[np.uint8] | None:
+        """What was kept of the latest alert, where frames cannot be had."""
+        number = latest_snapshot(self.folder) if self.pictures.problem else None
+        path = None if number is None else evidence_of(self.folder, number).snapshot
+        image = None if path is None else cv2.imread(str(path))
+        return None if image is None else np.asarray(image, np.uint8)
 
     def shares(self, object_id: int) -> Iterator[tuple[float, Mapping[str, float]]]:
         """How sure each identity of an object was over time: time, and name -> share of the votes."""
@@ -240,6 +287,15 @@ class RunView:
             except OutputError:
                 continue
             yield self.times[number], told
+
+
+def clock_text(seconds: float) -> str:
+    """A time of a run, such as '0:07.3' or '1:02:03.0'."""
+    tenths = round(max(0.0, seconds) * 10)
+    minutes, rest = divmod(tenths, 600)
+    hours, minutes = divmod(minutes, 60)
+    tail = f"{rest // 10:02d}.{rest % 10}"
+    return f"{hours}:{minutes:02d}:{tail}" if hours else f"{minutes}:{tail}"
 
 
 def _states(told: Mapping[str, Any]) -> Mapping[str, str]:

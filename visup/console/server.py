@@ -10,6 +10,7 @@ from typing import Literal
 import uvicorn
 from fastapi import FastAPI, HTTPException, Request, Response
 from fastapi.responses import FileResponse
+from nicegui import app as nicegui_app
 from nicegui import ui
 
 from visup.agent.model.errors import SettingsError, VisupError
@@ -18,6 +19,7 @@ from visup.console.evidence import evidence_of
 from visup.console.pages.library_page import library_page
 from visup.console.pages.run_page import run_page
 from visup.console.pages.wall_page import wall_page
+from visup.console.plain_page import plain_page
 from visup.console.reasoning.likeness import likeness_picture
 from visup.console.state import ConsoleState
 
@@ -34,6 +36,7 @@ def build_application(state: ConsoleState, access: Access) -> AccessGuard:
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
     _pictures(app, state)
     _pages(state)
+    nicegui_app.add_exception_handler(404, _no_such_page)
     ui.run_with(app, title="visup", favicon=FAVICON, dark=None, show_welcome_message=False)
     return AccessGuard(app, access)
 
@@ -84,6 +87,11 @@ def _pages(state: ConsoleState) -> None:
     @ui.page("/run/{key}")
     def one(request: Request, key: str, t: float = 0.0) -> None:
         run_page(state, key, _role(request), t)
+
+
+async def _no_such_page(request: Request, fault: Exception) -> Response:
+    page = plain_page("Page not found", "There is no such page.", back=True)
+    return Response(page, 404, media_type="text/html")
 
 
 def _role(request: Request) -> ConsoleRole:

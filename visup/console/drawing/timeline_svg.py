@@ -24,18 +24,20 @@ _STATUS = {s.value: css(STATUS_COLOURS[s]) for s in Status}
 _SEVERITY = {s.name.lower(): css(SEVERITY_COLOURS[s]) for s in Severity}
 
 
-def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float) -> str:
+def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float, start: float = 0.0) -> str:
     """All rows over one axis of time.
 
     Args:
         tracks: From top to bottom.
-        seconds: Length of the axis.
+        seconds: Where the axis ends.
+        start: Where it begins, seconds: a run that follows another goes on with its time.
 
     Returns:
         An SVG element of `ROW` pixels a track, as wide as its place.
     """
     height = ROW * max(1, len(tracks))
-    bars = "".join(_row(track, number, max(seconds, 1e-6)) for number, track in enumerate(tracks))
+    axis = start, max(seconds - start, 1e-6)
+    bars = "".join(_row(track, number, axis) for number, track in enumerate(tracks))
     return (
         f'<svg viewBox="0 0 {WIDTH} {height}" preserveAspectRatio="none" width="100%" '
         f'height="{height}" role="img" aria-label="{escape(in_words(tracks), quote=True)}">{bars}</svg>'
@@ -52,15 +54,16 @@ def _spans_in_words(spans: Sequence[TrackSpan]) -> str:
     return ", ".join(f"{s.state} {s.start:.1f} to {s.end:.1f} s" for s in spans[:12])
 
 
-def _row(track: TimelineTrack, number: int, seconds: float) -> str:
+def _row(track: TimelineTrack, number: int, axis: tuple[float, float]) -> str:
     top = number * ROW
     ground = f'<rect class="row" x="0" y="{top + 1}" width="{WIDTH}" height="{ROW - 2}"/>'
-    return ground + "".join(_bar(track, span, top, seconds) for span in track.spans)
+    return ground + "".join(_bar(track, span, top, axis) for span in track.spans)
 
 
-def _bar(track: TimelineTrack, span: TrackSpan, top: int, seconds: float) -> str:
-    left = WIDTH * min(1.0, max(0.0, span.start / seconds))
-    wide = max(LEAST_WIDTH, WIDTH * min(1.0, span.end / seconds) - left)
+def _bar(track: TimelineTrack, span: TrackSpan, top: int, axis: tuple[float, float]) -> str:
+    start, length = axis
+    left = WIDTH * min(1.0, max(0.0, (span.start - start) / length))
+    wide = max(LEAST_WIDTH, WIDTH * min(1.0, (span.end - start) / length) - left)
     told = f"{track.label}: {span.state}, {span.start:.1f} to {span.end:.1f} s. {span.text}"
     return (
         f'<rect x="{left:.2f}" y="{top + (ROW - BAR) // 2}" width="{wide:.2f}" height="{BAR}" '

@@ -13,7 +13,7 @@ from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.evidence import evidence_of
 from visup.console.feedback import AlertFeedback, Opinion, say
-from visup.console.pages.frame import clock, shown_text, worded_button
+from visup.console.pages.frame import shown_text, worded_button
 from visup.console.run_view import RunView
 from visup.wording import prose
 
@@ -52,7 +52,7 @@ def show_alert(
         _thumbnail(row)
         with ui.element("div").classes("alert-words"):
             with ui.element("div").classes(f"line {row.alert.severity.name.lower()}"):
-                ui.label(clock(row.alert.opened)).classes("when")
+                ui.label(row.run.when(row.alert.opened)).classes("when")
                 with ui.element("button").classes("plain said") as button:
                     ui.label(shown_text(prose(row.alert.cause)))
                 button.on("click", go)
@@ -62,7 +62,7 @@ def show_alert(
 def _below(row: AlertRow, role: ConsoleRole, again: Callable[[], object]) -> None:
     """Objects, duration, feedback so far, and buttons for feedback."""
     alert = row.alert
-    until = "still open" if alert.closed is None else f"until {clock(alert.closed)}"
+    until = "still open" if alert.closed is None else f"until {row.run.when(alert.closed)}"
     told = [row.camera, alert.kind.replace("_", " "), until]
     with ui.row().classes("items-center gap-2 under-line"):
         ui.label(shown_text(", ".join(filter(None, told)))).classes("dim")
@@ -89,7 +89,7 @@ def _show_evidence(row: AlertRow) -> None:
     kept = evidence_of(row.run.folder, row.alert.id)
     place = f"/evidence/{row.key}/{row.alert.id}"
     with ui.dialog() as dialog, ui.card().classes("card evidence-large"):
-        ui.label(shown_text(f"{clock(row.alert.opened)}  {prose(row.alert.cause)}"))
+        ui.label(shown_text(f"{row.run.when(row.alert.opened)}  {prose(row.alert.cause)}"))
         if kept.clip:
             video = ui.element("video").props(
                 "controls autoplay muted playsinline preload=metadata"
@@ -119,7 +119,7 @@ def _opinions(row: AlertRow, again: Callable[[], object]) -> None:
 
     for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
         worded_button(opinion.value, partial(keep, opinion))
-    worded_button("mute ...", lambda: _mute(keep)).tooltip("needs a reason")
+    worded_button("mute…", lambda: _mute(keep)).tooltip("needs a reason")
 
 
 def _mute(keep: Callable[[Opinion, str], None]) -> None:

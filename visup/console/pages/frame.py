@@ -76,12 +76,3 @@ def verdict_badge(verdict: str | None, *, ended: bool) -> ui.label:
 def shown_text(text: str) -> str:
     """A text as a page may show it: without marks that turn the reading order."""
     return printable(text)
-
-
-def clock(seconds: float) -> str:
-    """A time of a run, such as '0:07.3' or '1:02:03.0'."""
-    tenths = round(max(0.0, seconds) * 10)
-    minutes, rest = divmod(tenths, 600)
-    hours, minutes = divmod(minutes, 60)
-    tail = f"{rest // 10:02d}.{rest % 10}"
-    return f"{hours}:{minutes:02d}:{tail}" if hours else f"{minutes}:{tail}"

@@ -7,7 +7,8 @@ from datetime import UTC, datetime
 from nicegui import ui
 
 from visup.console.library import RunEntry
-from visup.console.pages.frame import clock, page_frame, shown_text, verdict_badge
+from visup.console.pages.frame import page_frame, shown_text, verdict_badge
+from visup.console.run_view import clock_text
 from visup.console.state import ConsoleState
 
 MOST_SHOWN = 200
@@ -27,7 +28,7 @@ def library_page(state: ConsoleState) -> None:
         found = [e for e in entries if _matches(e, wanted)]
         _table(found[:MOST_SHOWN])
         if len(found) > MOST_SHOWN:
-            ui.label(f"{len(found) - MOST_SHOWN} more: search for what you want").classes("dim")
+            ui.label(f"{len(found) - MOST_SHOWN} more: narrow the search").classes("dim")
         if not found:
             ui.label("No run matches." if wanted else "There are no runs yet.").classes("dim")
 
@@ -76,11 +77,11 @@ def _row(entry: RunEntry) -> None:
             with ui.element("td").props(f"colspan={len(HEADINGS) - 2}"):
                 ui.label(shown_text(entry.problem)).classes("dim")
             return
-        _cell(", ".join(entry.tasks) or "none", wide=True)
+        _cell(", ".join(entry.tasks) or "–", wide=True)
         with ui.element("td"):
             verdict_badge(entry.verdict, ended=entry.ended)
         _cell(str(entry.alerts))
-        _cell(clock(entry.seconds), wide=True)
+        _cell(clock_text(entry.seconds), wide=True)
         written = datetime.fromtimestamp(entry.written, UTC)
         _cell(f"{written:%Y-%m-%d %H:%M} UTC", wide=True)
 

@@ -12,6 +12,9 @@ Listener = Callable[[], object]
 TICK_S = 0.125
 """How often a page moves on while it plays, seconds."""
 
+SLIDER_STEP = 1e-3
+"""Between two places of a slider, share of the run."""
+
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
@@ -87,6 +90,17 @@ class Playhead:
     def go_to_time(self, seconds: float) -> None:
         """Be at the last moment that is not after a time."""
         self.go(self.run.at(seconds))
+
+    def go_to_share(self, share: float) -> None:
+        """Be where so much of the run is over, 0 to 1."""
+        self.go_to_time(self.run.start + share * (self.run.seconds - self.run.start))
+
+    def pull(self, share: float) -> None:
+        """Follow a slider: as `go_to_share`, but by one moment at least, since it has fewer places."""
+        before, number = self.run.share(self.time), self.number
+        self.go_to_share(share)
+        if self.number == number and abs(share - before) > SLIDER_STEP / 2:
+            self.step(1 if share > before else -1)
 
     def step(self, by: int) -> None:
         """Go some moments forth or back."""

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from nicegui import events, ui
 
-from visup.agent.model.errors import VisupError
+from visup.agent.model.errors import OutputError, VisupError
 from visup.console.access import ConsoleRole
 from visup.console.drawing.timeline_svg import timeline_svg
-from visup.console.pages.frame import button, clock, page_frame, shown_text, verdict_badge
+from visup.console.pages.frame import button, page_frame, shown_text, verdict_badge
+from visup.console.pages.keys import show_keys
 from visup.console.pages.panels.ask_panel import ask_panel
 from visup.console.pages.panels.belief_panel import belief_panel
 from visup.console.pages.panels.events_panel import alerts_panel, events_panel
@@ -17,19 +18,12 @@ from visup.console.pages.panels.steps_panel import steps_panel
 from visup.console.pages.panels.try_panel import try_panel
 from visup.console.pages.panels.write_panel import write_panel
 from visup.console.pages.picture import RunPicture
-from visup.console.pages.playhead import SPEEDS, TICK_S, Playhead
+from visup.console.pages.playhead import SLIDER_STEP, SPEEDS, TICK_S, Playhead
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
 
 REFRESH_S = 2.0
 """How often a page asks whether a run that goes on has grown, seconds."""
-
-KEYS = (
-    ("space", "play or pause"),
-    ("← →", "one frame back or forward; ten with Shift"),
-    ("p n", "previous event, next event"),
-    ("Home End", "to the start, to the end"),
-)
 
 
 def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> None:
@@ -46,11 +40,14 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
     except VisupError as fault:
         with page_frame("Run"):
             pass
-        ui.label(shown_text(str(fault))).classes("card w-full")
+        with ui.element("div").classes("card w-full"):
+            ui.label(shown_text(fault.what if isinstance(fault, OutputError) else str(fault)))
+            ui.link("All runs", "/").classes("brand")
         return
     head = Playhead(run)
-    with page_frame(run.folder.name):
+    with page_frame(run.name):
         verdict_badge(run.verdict, ended=run.ended)
+        button("keyboard", "Keys (?)", show_keys)
     if not run.frames:
         ui.label("Nothing has been processed in this run yet.").classes("card w-full")
         return
@@ -87,7 +84,7 @@ def _controls(head: Playhead) -> None:
     def show() -> None:
         play.props(f"icon={'pause' if head.playing else 'play_arrow'}")
         run = head.run
-        where.set_text(f"{clock(run.times[head.number])} / {clock(run.seconds)}")
+        where.set_text(run.now(run.times[head.number]))
         frame.set_text(f"frame {run.frames[head.number]}")
 
     head.listen(show)
@@ -98,34 +95,34 @@ def _timeline(head: Playhead) -> None:
     """Rows over time with one cursor; a click goes there."""
     with ui.element("div").classes("timeline"):
         ui.element("div")
-        slider = ui.slider(min=0, max=max(1, len(head.run.frames) - 1), value=0)
+        slider = ui.slider(min=0, max=1.0, step=SLIDER_STEP, value=0.0)
         slider.props('dense aria-label="Moment"').on(
-            "update:model-value", lambda e: head.go(int(e.args)), throttle=0.05
+            "update:model-value", lambda e: head.pull(float(e.args)), throttle=0.05
         )
         with ui.element("div").classes("labels").props("aria-hidden=true"):
             for track in head.run.tracks:
                 ui.label(shown_text(track.label)).props(f'title="{track.group}"')
         with ui.element("div").classes("bars") as bars:
-            ui.html(timeline_svg(head.run.tracks, head.run.seconds), sanitize=False)
+            ui.html(timeline_svg(head.run.tracks, head.run.seconds, head.run.start), sanitize=False)
             cursor = ui.element("div").classes("cursor")
     bars.on(
         "click",
-        lambda e: head.go_to_time(float(e.args) * head.run.seconds),
+        lambda e: head.go_to_share(float(e.args)),
         js_handler="(e) => { const r = e.currentTarget.getBoundingClientRect();"
         " emit((e.clientX - r.left) / Math.max(1, r.width)); }",
     )
 
     def show() -> None:
-        share = head.run.times[head.number] / max(head.run.seconds, 1e-6)
+        share = head.run.share(head.run.times[head.number])
         cursor.style(f"left:{100 * share:.3f}%")
-        slider.set_value(head.number)
+        slider.set_value(round(share, 3))
 
     head.listen(show)
     show()
 
 
 def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
-    names = ("Now", "Events", "Alerts", "Ask", "Steps", "Try", "Write")
+    names = ("Now", "Events", "Alerts", "Ask", "Steps", "What if", "Write")
     head.panel = names[0]
     with ui.tabs().props("dense align=left no-caps") as tabs:
         made = {name: ui.tab(name) for name in names}
@@ -140,7 +137,7 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
             ask_panel(state, head, key)
         with ui.tab_panel(made["Steps"]):
             steps_panel(state, head, key)
-        with ui.tab_panel(made["Try"]):
+        with ui.tab_panel(made["What if"]):
             try_panel(state, head, key, role)
         with ui.tab_panel(made["Write"]):
             write_panel(state, head, key, role)
@@ -162,9 +159,7 @@ def _keys(head: Playhead) -> None:
             "End": lambda: head.go(len(head.run.frames) - 1),
             "n": head.next_event,
             "p": lambda: head.next_event(forth=False),
-            "?": lambda: ui.notify(
-                "; ".join(f"{key}: {does}" for key, does in KEYS), multi_line=True
-            ),
+            "?": show_keys,
         }
         if act := acts.get(str(e.key)):
             act()

@@ -12,7 +12,7 @@ from visup.console.library import RunEntry
 from visup.console.pages.alert_row import AlertRow
 from visup.console.state import ConsoleState
 
-STATES = {"open": "open", "unseen": "nobody has seen", "all": "all"}
+STATES = {"open": "open", "unseen": "not seen yet", "all": "all"}
 
 
 @dataclass(slots=True)
@@ -55,4 +55,10 @@ def alert_rows(
         except (VisupError, OSError):
             continue
     rows = [row for row in found if wanted.wants(row)]
-    return sorted(rows, key=lambda r: (-r.alert.severity, -r.alert.opened, r.key))
+    return sorted(rows, key=lambda r: (-r.alert.severity, -_opened(r), r.key))
+
+
+def _opened(row: AlertRow) -> float:
+    """When an alert opened, by the clock of the wall where that is known."""
+    wall = row.run.clock.seconds(row.alert.opened)
+    return row.alert.opened if wall is None else wall

@@ -13,7 +13,7 @@ from visup.console.access import ConsoleRole
 from visup.console.evidence import latest_snapshot
 from visup.console.library import RunEntry
 from visup.console.pages.alert_row import AlertRow, show_alert
-from visup.console.pages.frame import clock, page_frame, part_heading, shown_text, verdict_badge
+from visup.console.pages.frame import page_frame, part_heading, shown_text, verdict_badge
 from visup.console.pages.wall_alerts import STATES, AlertFilter, alert_rows
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
@@ -41,7 +41,7 @@ def wall_page(state: ConsoleState, role: ConsoleRole) -> None:
     wall = _Wall(state, role)
     wall.tiles()
     with ui.element("section").classes("card w-full").props('aria-label="Alerts of all cameras"'):
-        part_heading("Alerts")
+        part_heading("Alerts (times of cameras in UTC)")
         _filter(wall.wanted, wall.look)
         with (
             ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"')
@@ -89,7 +89,7 @@ class _Wall:
             moment = f"/run/{row.key}?t={row.alert.opened:.2f}"
             show_alert(row, self._role, partial(ui.navigate.to, moment), self.look)
         if not rows:
-            ui.label("No such alert.").classes("dim")
+            ui.label("No such alerts.").classes("dim")
 
 
 def _filter(wanted: AlertFilter, look: Callable[[], None]) -> None:
@@ -134,8 +134,8 @@ def _latest_picture(run: RunView, entry: RunEntry) -> None:
         return
     picture.props["src"] = f"/evidence/{entry.key}/{number}.jpg"
     opened = next((a.opened for a in run.alerts if a.id == number), None)
-    when = "" if opened is None else f", {clock(opened)}"
-    ui.label(f"the picture of alert {number}{when}").classes("dim")
+    when = "" if opened is None else f", {run.when(opened)}"
+    ui.label(f"picture of alert {number}{when}").classes("dim")
 
 
 def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
@@ -144,7 +144,7 @@ def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
         ui.link(
             shown_text(entry.camera or entry.name), f"/run/{entry.key}?t={mind.time:.2f}"
         ).classes("said brand")
-        ui.label(clock(mind.time)).classes("dim")
+        ui.label(run.when(mind.time)).classes("dim")
         verdict_badge(run.verdict, ended=run.ended)
     for task in mind.tasks:
         status = next((s.status.value for s in task.stages if s.stage == task.current), "")

@@ -8,7 +8,7 @@ from nicegui import run, ui
 
 from visup.agent import Severity
 from visup.agent.model.errors import VisupError
-from visup.console.pages.frame import clock, shown_text, worded_button
+from visup.console.pages.frame import shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.console.recorded_mind import open_at
 from visup.console.state import ConsoleState
@@ -25,7 +25,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
     async def ask(what: str) -> None:
         answer.clear()
         with answer:
-            ui.label("The run is reasoned again up to here ...").classes("dim")
+            ui.label("Reasoning the run again up to the cursor…").classes("dim")
             ui.spinner(size="md")
         try:
             asked = head.number
@@ -37,7 +37,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
         if why is None:  # the console is being stopped
             return
         with answer:
-            ui.label(f"{what}, at {clock(head.run.times[asked])}").classes("dim")
+            ui.label(f"{what}, at {head.run.when(head.run.times[asked])}").classes("dim")
             _tree(why, head)
 
     def _say(text: str) -> None:

@@ -11,7 +11,7 @@ from visup.agent import Event, Severity
 from visup.console.access import ConsoleRole
 from visup.console.feedback import read_feedback
 from visup.console.pages.alert_row import AlertRow, show_alert
-from visup.console.pages.frame import clock, shown_text
+from visup.console.pages.frame import shown_text
 from visup.console.pages.playhead import Playhead
 from visup.console.recorded_mind import open_at
 from visup.wording import prose, worded_once
@@ -52,7 +52,7 @@ def _line(
 ) -> None:
     kind = severity.name.lower() + (" now" if marked else "")
     with ui.element("div").classes(f"line {kind}"):
-        ui.label(clock(time)).classes("when")
+        ui.label(head.run.when(time)).classes("when")
         with ui.element("button").classes("plain said") as button:
             ui.label(shown_text(prose(text)))
         button.on("click", lambda: head.go_to_time(time))
@@ -73,7 +73,7 @@ def alerts_panel(head: Playhead, key: str, role: ConsoleRole) -> None:
             row = AlertRow(key, head.run, alert, said.get(alert.id))
             show_alert(row, role, partial(head.go_to_time, alert.opened), listed.refresh)
         if not found:
-            ui.label("No alerts are open here." if wanted["open"] else "No alert.").classes("dim")
+            ui.label("No alerts are open here." if wanted["open"] else "No alerts.").classes("dim")
 
     def only_open(yes: bool) -> None:
         wanted["open"] = yes

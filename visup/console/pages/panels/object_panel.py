@@ -43,8 +43,12 @@ def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None
     names = [*best, *(n for n in dict.fromkeys(h.name for h in looks) if n not in best)]
     _table(names[: len(CANDIDATE_COLOURS)], now, looks)
     if best:
-        place = head.run.times[head.number] / max(head.run.seconds, 1e-6)
-        ui.html(_curves(samples, best, head.run.seconds, place), sanitize=False).classes("w-full")
+        begin = head.run.start
+        since = [(time - begin, shares) for time, shares in samples]
+        place = head.run.share(head.run.times[head.number])
+        ui.html(_curves(since, best, head.run.seconds - begin, place), sanitize=False).classes(
+            "w-full"
+        )
     if looks and head.run.settings and head.run.settings.models:
         address = f"/likeness/{key}/{head.number}/{number}.jpg"
         worded_button("Compare views", partial(_show_likeness, address, number))

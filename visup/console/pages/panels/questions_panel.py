@@ -14,7 +14,7 @@ from visup.agent import Question
 from visup.agent.cycle.answers import NOBODY
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
-from visup.console.pages.frame import clock, part_heading, shown_text, worded_button
+from visup.console.pages.frame import part_heading, shown_text, worded_button
 from visup.console.pages.panels.try_panel import show_tried
 from visup.console.pages.playhead import Playhead
 from visup.console.questions import questions_at
@@ -50,7 +50,7 @@ class QuestionsPart:
             part_heading("Asked")
         for question in waiting:
             with ui.element("div").classes("line warning"):
-                ui.label(clock(question.asked)).classes("when")
+                ui.label(self._head.run.when(question.asked)).classes("when")
                 ui.label(shown_text(question.text)).classes("said")
             if self._operator:
                 self._buttons(question)

@@ -9,7 +9,7 @@ from nicegui.events import ValueChangeEventArguments
 
 from visup.agent.contract.phases import Phase
 from visup.agent.model.errors import VisupError
-from visup.console.pages.frame import button, clock, part_heading, shown_text, worded_button
+from visup.console.pages.frame import button, part_heading, shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.console.reasoning.debugging import FoundStop, PhaseRecord
 from visup.console.state import ConsoleState
@@ -101,7 +101,7 @@ class _Breakpoints:
     def _arrive(self, found: FoundStop) -> None:
         if found.reasons:
             self._head.go(found.number - 1)
-            when = clock(self._head.run.times[self._head.number])
+            when = self._head.run.when(self._head.run.times[self._head.number])
             self._said.set_text(shown_text(f"{when}  {'; '.join(map(prose, found.reasons))}"))
         elif found.ended:
             self._said.set_text("It does not happen before the end.")

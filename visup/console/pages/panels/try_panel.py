@@ -8,7 +8,7 @@ from nicegui import run, ui
 
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
-from visup.console.pages.frame import clock, shown_text, worded_button
+from visup.console.pages.frame import shown_text, worded_button
 from visup.console.pages.playhead import Playhead
 from visup.console.reasoning.inquiry import AlternativeCourse
 from visup.console.state import ConsoleState
@@ -86,14 +86,14 @@ def _show_course(course: AlternativeCourse, head: Playhead) -> None:
     verdicts = f"verdict: {was}" if was == would else f"verdict: {was} → {would}"
     ui.label(verdicts.replace("_", " ")).style("font-weight:600")
     if not course.differs:
-        ui.label(f"No other events, up to {clock(course.until)}.").classes("dim")
+        ui.label(f"No other events, up to {head.run.when(course.until)}.").classes("dim")
     marked = [("−", e) for e in course.differs.gone] + [("+", e) for e in course.differs.new]
     marked.sort(key=lambda m: float(m[1].get("time", 0.0)))
     for mark, event in marked[:MOST_LINES]:
         time = float(event.get("time", 0.0))
         with ui.element("div").classes("line"):
             ui.label(mark).classes("when")
-            ui.label(clock(time)).classes("when")
+            ui.label(head.run.when(time)).classes("when")
             with ui.element("button").classes("plain said") as button:
                 ui.label(shown_text(prose(str(event.get("text", "")))))
             button.on("click", lambda t=time: head.go_to_time(t))

@@ -1,0 +1,34 @@
+"""The keys of a run's page, as a table."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from visup.console.pages.frame import part_heading, worded_button
+
+KEYS = (
+    (("Space",), "play or pause"),
+    (("←", "→"), "one frame back or forward"),
+    (("Shift", "←  →"), "ten frames"),
+    (("p", "n"), "previous or next event"),
+    (("Home", "End"), "to the start or the end"),
+    (("?",), "this table"),
+)
+
+
+def show_keys() -> None:
+    """Show the table over the page."""
+    with ui.dialog(value=True) as dialog, ui.card().classes("card"):
+        dialog.props('aria-label="Keys"')
+        part_heading("Keys")
+        with ui.element("table").classes("keys"):
+            for keys, does in KEYS:
+                with ui.element("tr"):
+                    with ui.element("td"):
+                        for key in keys:
+                            with ui.element("kbd"):
+                                ui.label(key)
+                    with ui.element("td"):
+                        ui.label(does)
+        worded_button("Close", dialog.close, main=True)
+    dialog.on("hide", dialog.delete)
