@@ -11,11 +11,13 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 import cv2
 import numpy as np
 
 from visup.percepts.health.image_quality import ImageQuality
+from visup.percepts.health.quantiles import quantiles
 from visup.percepts.health.standstill import AFTER_S, FEWEST, KEPT_S, MOST, per_cell
 
 WHITE = (0.8, 1.25)  # median over the cells of what white noise shows; 1 but for rounding
@@ -93,7 +95,7 @@ class NoiseOnlyDetector:
         self._last = picture
         live = [middle for time, middle in self._before if self._since - time < KEPT_S]
         long = now - self._since >= AFTER_S
-        return stands and long and len(live) >= FEWEST and float(np.median(live)) > LIVE
+        return stands and long and len(live) >= FEWEST and median(live) > LIVE
 
 
 def change_statistics(before: ImageQuality | None, now: ImageQuality) -> ChangeStatistics:
@@ -109,5 +111,5 @@ def change_statistics(before: ImageQuality | None, now: ImageQuality) -> ChangeS
     if not stirred.any():
         return NOTHING
     share = now.factor**2 * coarse[stirred] / fine[stirred]
-    middle, most = np.quantile(share, [0.5, 0.95]).tolist()
+    middle, most = quantiles(share, 0.5, 0.95)
     return ChangeStatistics(middle, most, float(np.sqrt(fine.mean())), float(stirred.mean()))

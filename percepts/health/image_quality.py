@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -63,11 +64,7 @@ def measure_quality(image: NDArray[np.uint8]) -> ImageQuality:
     grey = grey.reshape(image.shape[:2]).astype(np.uint8, copy=False)
     factor = max(1, -(-max(grey.shape) // SMALL))
     small = shrunk(grey, factor)
-    levels = np.sort(small, axis=None)
-    low, high, darkest, brightest = (
-        float(levels[min(len(levels) - 1, int(q * len(levels)))])
-        for q in (0.03, 0.999, 0.005, 0.995)
-    )
+    low, high, darkest, brightest = _levels(small, (0.03, 0.999, 0.005, 0.995))
     # Grey averages the noise of three channels; one of them shows it whole.
     strips = _strips(image[..., 1] if colour else grey)
     steps, edges = _steps(grey)
@@ -85,14 +82,21 @@ def measure_quality(image: NDArray[np.uint8]) -> ImageQuality:
     )
 
 
+def _levels(small: Floats, shares: Sequence[float]) -> list[float]:
+    """Grey levels that shares of the small image do not exceed."""
+    at = [min(small.size - 1, int(share * small.size)) for share in shares]
+    levels = np.partition(small, sorted(set(at)), axis=None)
+    return [float(levels[index]) for index in at]
+
+
 def shrunk(grey: Grey, factor: int) -> Floats:
     """Means of squares of pixels; what does not fill a square at the border is left out."""
     rows, columns = (max(1, n // factor) for n in grey.shape)
-    part = grey[: rows * factor, : columns * factor]
+    # Means are kept finer than whole grey levels: slow change is less than one.
+    part = grey[: rows * factor, : columns * factor].astype(np.float32)
+    if factor == 1:
+        return part
     small = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
-    if factor > 1:
-        # Means are kept finer than whole grey levels: slow change is less than one.
-        small = cv2.resize(part.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.float32)
 
 
@@ -122,7 +126,7 @@ def _impulses(strips: Grey) -> float:
 def _steps(grey: Grey) -> tuple[float, float]:
     """Shares of pixels on straight steps, and on steps of any kind."""
     straight = edges = 0
-    for image in (grey, np.ascontiguousarray(grey.T)):
+    for image in (grey, cv2.transpose(grey)):
         if image.shape[1] < 4 or image.shape[0] < RUN:
             continue
         step = cv2.absdiff(image[:, 1:], image[:, :-1])

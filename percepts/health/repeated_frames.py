@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.health.quantiles import quantiles
 from visup.percepts.health.standstill import Floats, per_cell
 
 MOST = 25
@@ -89,7 +91,7 @@ class RepeatDetector:
             return Repeat(same and self.was_lively, self.was_lively)
         new = self._resumed(small)
         self._run, self._held, self._exact = 0, None, True
-        calmest, peak = np.quantile(change, [CALM, 0.95]).tolist()
+        calmest, peak = quantiles(change, CALM, 0.95)
         self._calmest.append(calmest)
         self._peaks.append(peak)
         self._motions.append(_motion(change))
@@ -98,14 +100,14 @@ class RepeatDetector:
     def _is_coded_repeat(self, change: Floats) -> bool:
         if len(self._peaks) < ENOUGH:
             return False
-        usual = float(np.median(self._peaks))
+        usual = median(self._peaks)
         return usual > LIVELY and float(change.max()) < min(CODED, NEARLY * usual)
 
     def _resumed(self, small: Floats) -> Repeat:
         """A new image, held against the one that was repeated before it."""
         if self._held is None or len(self._motions) < ENOUGH:
             return Repeat()
-        usual = float(np.median(self._motions))
+        usual = median(self._motions)
         if self._exact and min(self._calmest) > RESTLESS:
             return Repeat(resumes=True, catches_up=True)
         if usual <= 0.0:
@@ -119,5 +121,5 @@ class RepeatDetector:
 
 def _motion(change: Floats) -> float:
     """Change summed over all that moves: it grows with the way, though that of a cell does not."""
-    floor = FLOOR + min(float(np.median(change)), FLOOR_MOST)
+    floor = FLOOR + min(quantiles(change, 0.5)[0], FLOOR_MOST)
     return float(np.maximum(change - floor, 0.0).sum())

@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.health.quantiles import quantiles
+
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
@@ -129,7 +131,7 @@ class StandstillDetector:
         most = np.max([k.change for k in before], axis=0)
         texture = np.min([k.texture for k in before], axis=0)
         stands = (calm < still) & ~passed
-        noise = min(still, float(np.quantile(least, 0.1)))
+        noise = min(still, quantiles(least, 0.1)[0])
         lively = least > 0.4 + 2.0 * noise
         stopped = lively & stands & (now.slow < 0.25 * least)
         then = before[-1].small

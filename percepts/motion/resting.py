@@ -56,7 +56,7 @@ class RestingMotion(MotionBehaviour):
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report the regions of one frame; none, without a look, while nothing changes."""
-        small = _reduced(frame.image)
+        small = means_of_cells(frame.image)
         if self._last is None or _differ(self._last, small):
             self._moved = frame.time
         calm = frame.time - self._moved > CALM_S
@@ -69,7 +69,12 @@ class RestingMotion(MotionBehaviour):
         return found
 
 
-def _reduced(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def means_of_cells(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A small picture: means over cells of `CELL` x `CELL` pixels.
+
+    Args:
+        image: (H, W, 3) uint8.
+    """
     height, width = image.shape[:2]
     size = max(1, width // CELL), max(1, height // CELL)
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
-from visup.agent.storage.picture_size import check_picture_size
 from visup.agent.storage.text_file import read_bounded, read_text_file
+from visup.percepts.picture_size import check_picture_size
 from visup.percepts.video.quiet_decoder import quiet
 from visup.percepts.video.source import DEFAULT_FPS, Ending, VideoSource, to_bgr
 

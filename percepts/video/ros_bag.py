@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import ExtraMissingError, SourceError
-from visup.agent.storage.picture_size import check_pixels
+from visup.percepts.picture_size import check_pixels
 from visup.percepts.video.image_folder import UnreadableImageError, decode_image
 from visup.percepts.video.source import DEFAULT_FPS, Ending, VideoSource, to_bgr
 from visup.percepts.video.video_file import ContainerClock

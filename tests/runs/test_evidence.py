@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +16,7 @@ from tests.clips import moving_disc, write_clip
 from visup.agent import Alert, Frame, Mind, Observation, Severity
 from visup.agent.model.step import Step
 from visup.runs.evidence.clip_spool import SUFFIX, ClipSpool, evenly, spooled
-from visup.runs.evidence.frame_ring import EncodedFrame, FrameRing
+from visup.runs.evidence.frame_ring import SAME_S, EncodedFrame, FrameEncoder, FrameRing
 from visup.runs.evidence.keeper import EVIDENCE, EvidenceKeeper
 from visup.runs.runner import fresh_folder, supervise
 from visup.runs.settings import EvidenceOptions, RunOptions, WatchSettings
@@ -37,6 +38,27 @@ def test_a_ring_holds_the_last_frames_within_its_bounds(
         assert all(time - f.time <= span for f in held)
         missed = added[: len(added) - len(held)][-1:]
         assert all(time - f.time > span or ring.size + len(f.jpeg) > 100 for f in missed)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=40), st.integers(0, 2**16))
+def test_what_is_kept_shows_all_that_can_be_seen_and_is_never_older_than_a_second(
+    moves: list[bool], seed: int
+) -> None:
+    """Noise of a camera is nothing to be seen; a change of ten levels on one cell is."""
+    rng, encode = np.random.default_rng(seed), FrameEncoder()
+    ground, shown_at = np.full((48, 64, 3), 100, np.uint8), 0.0
+    kept: bytes | None = None
+    for number, moved in enumerate(moves):
+        time = number / 5.0
+        if moved:
+            ground[8:16, 8:16] = 100 + 10 * (ground[8, 8] == 100)
+        noisy = np.clip(ground + rng.normal(0.0, 2.0, ground.shape), 0, 255).astype(np.uint8)
+        frame = encode(noisy, time)
+        assert frame.time == time
+        if frame.jpeg != kept:
+            kept, shown_at = frame.jpeg, time
+        assert time - shown_at < SAME_S
+        assert not moved or shown_at == time
 
 
 @given(TIMES, st.floats(1.0, 30.0))

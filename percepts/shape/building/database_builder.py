@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.agent.storage.picture_size import check_picture_size
 from visup.agent.storage.text_file import read_bounded
+from visup.percepts.picture_size import check_picture_size
 from visup.percepts.shape.building.build_parts import BuildPart, is_made, parts_of, read_part
 from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
 from visup.percepts.shape.database.model_database import ModelDatabase

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from visup.agent.model.errors import DatabaseError, SourceError
-from visup.agent.storage.picture_size import picture_size
+from visup.percepts.picture_size import picture_size
 from visup.percepts.shape.building.database_builder import read_silhouette
 from visup.percepts.video import open_source
 from visup.percepts.video.video_file import check_frame_size

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame
 from visup.evaluation.serving.scene import CROSSING, PACE, scene
-from visup.runs.evidence.frame_ring import FrameRing, encoded
+from visup.runs.evidence.frame_ring import FrameEncoder, FrameRing
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
 from visup.serving.site.form import CameraTable
@@ -53,7 +53,7 @@ def _share(
 ) -> float:
     """Seconds of a processor for a second of the source."""
     agent = build_agent(WatchSettings(source="scene", rest_s=rest_s), live=True)
-    ring = FrameRing(8.0, 2**25)
+    ring, encoded = FrameRing(8.0, 2**25), FrameEncoder()
     noise = _noise(pictures[0].shape, seed)
     used = 0.0
     for number, picture in enumerate(cycle(pictures)):

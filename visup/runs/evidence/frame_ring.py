@@ -10,9 +10,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.motion.resting import means_of_cells
 from visup.report.video import playable_size
 
 QUALITY = 80
+SAME_S = 0.95
+"""So long a frame stands for those after it that show nothing new, seconds."""
+
+VISIBLE = 3
+"""Levels of a colour on a cell of 8 x 8 pixels; noise of a camera leaves one or two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +56,38 @@ def jpeg_of(image: NDArray[np.uint8], quality: int = QUALITY) -> bytes:
     """
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return data.tobytes()
+
+
+class FrameEncoder:
+    """Encodes the frames of a camera; one that shows nothing new is kept as the one before it.
+
+    Most cameras see nothing for most of the day. What differs by so little that noise hides it is taken up
+    once a second.
+    """
+
+    def __init__(self) -> None:
+        self._last: EncodedFrame | None = None
+        self._since = 0.0
+        self._small: NDArray[np.uint8] | None = None
+
+    def __call__(self, image: NDArray[np.uint8], time: float) -> EncodedFrame:
+        """A frame as it is kept.
+
+        Args:
+            image: (H, W, 3) uint8 BGR.
+            time: Seconds of the source.
+        """
+        small = means_of_cells(image)
+        fresh = 0.0 <= time - self._since < SAME_S
+        if self._last and fresh and self._small is not None and _alike(self._small, small):
+            self._last = EncodedFrame(time, self._last.jpeg)
+        else:
+            self._last, self._since, self._small = encoded(image, time), time, small
+        return self._last
+
+
+def _alike(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
+    return a.shape == b.shape and int(cv2.absdiff(a, b).max()) < VISIBLE
 
 
 class FrameRing:

@@ -27,7 +27,7 @@ from visup.agent.storage.text_file import read_text_file
 from visup.agent.storage.wall_clock import RecordStamp
 from visup.report.annotate import annotate
 from visup.runs.evidence.clip_spool import SUFFIX, ClipSpool, write_clip_of
-from visup.runs.evidence.frame_ring import EncodedFrame, FrameRing, encoded, jpeg_of
+from visup.runs.evidence.frame_ring import EncodedFrame, FrameEncoder, FrameRing, jpeg_of
 from visup.runs.settings import EvidenceOptions
 
 EVIDENCE = "evidence"
@@ -80,6 +80,7 @@ class EvidenceKeeper:
         self._folder = folder / EVIDENCE
         self._options, self._fps, self._stamp = options, fps, stamp or RecordStamp()
         self._ring = FrameRing(options.before_s, int(options.memory_mb * 2**20))
+        self._encoded = FrameEncoder()
         self._clip: ClipSpool | None = None
         self._begun = self._until = 0.0
         self._links: dict[int, Mapping[str, str]] = {}
@@ -93,7 +94,7 @@ class EvidenceKeeper:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Keep the frame for a while, and evidence of the alerts that open."""
-        seen = encoded(frame.image, step.time)
+        seen = self._encoded(frame.image, step.time)
         self._guarded(lambda: self._go_on(seen))
         opened = [a for a in step.alerts if a.closed is None]
         if opened:
