@@ -14,7 +14,7 @@ import json
 import re
 import sqlite3
 import zlib
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +29,7 @@ from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import TaskBelief
 from visup.agent.storage.atomic import sync
 from visup.agent.storage.codec import pack_observation
+from visup.agent.storage.disk_reserve import PageReserve
 from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.jsonable import event_record, object_summary, to_jsonable
 
@@ -49,6 +50,10 @@ CREATE TABLE alerts (
 CREATE INDEX events_by_time ON events (time);
 """
 
+PAGE_BYTES = 16384
+_FILL = "INSERT INTO run VALUES ('reserve', zeroblob(?))"
+_CLEAR = "DELETE FROM run WHERE key = 'reserve'"
+
 Statement = tuple[str, tuple[Any, ...]]
 
 
@@ -61,11 +66,13 @@ class JournalLimits:
         segment_s: So is one that spans more than this, seconds of the source.
         keep_bytes: When steps of all segments take more, those of the oldest are dropped; their events
             and alerts stay. None keeps everything.
+        reserve_bytes: Set aside for a full disk, in the file and in its log, until the journal is closed.
     """
 
     segment_bytes: int = 256 * 2**20
     segment_s: float = 6 * 3600.0
     keep_bytes: int | None = None
+    reserve_bytes: int = 0
 
 
 class Journal:
@@ -94,12 +101,11 @@ class Journal:
         self._begun: float | None = None
         self._last_event = 0
         self._sizes: list[int] = []
+        self._reserve = PageReserve(self._limits.reserve_bytes, _FILL, _CLEAR)
         self._lock = acquire_lock(path, "this run")
         try:
             if resume:
-                begun = [one for one in segments(path) if self._take_over(one)]
-                self._db = _connected(begun[-1])
-                self._durable = False
+                self._go_on()
             else:
                 self._begin()
         except BaseException:
@@ -142,10 +148,15 @@ class Journal:
         self.last_frame = step.frame_index
         self._begun = step.time if self._begun is None else self._begun
         self._sizes[-1] += len(seen) + len(text)
+        self._reserve.keep(self._db)
 
     def close(self) -> None:
         """Fold the log into the file and close it."""
         try:
+            with suppress(
+                sqlite3.Error
+            ):  # what cannot be given back now stays free for what follows
+                self._db.executescript("PRAGMA incremental_vacuum")
             self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             self._db.close()
         except sqlite3.Error as fault:
@@ -166,11 +177,12 @@ class Journal:
         if path.is_symlink():  # one that leads nowhere: the file would be made elsewhere
             raise OutputError("the journal would be written elsewhere", where=str(path))
         try:
-            self._db = _connected(path)
+            self._db = _connected(path, self._limits.reserve_bytes)
             self._durable = False
             # One transaction: a run killed meanwhile leaves an empty file or a whole journal.
             marks = f"PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};"
             self._db.executescript(f"BEGIN;{SCHEMA}{marks}COMMIT;")
+            self._reserve.keep(self._db)
             sync(path.parent)
         except (sqlite3.Error, OSError) as fault:
             raise _unwritable(path, fault) from fault
@@ -179,27 +191,34 @@ class Journal:
         if number > 1:
             self.note(segment=number)
 
-    def _take_over(self, path: Path) -> bool:
-        """Count what a segment holds; False when the run was killed before it was begun."""
+    def _go_on(self) -> None:
+        # The last one stays open: who closes it takes away the log, and with it the reserve.
+        *earlier, self._db = filter(None, map(self._take_over, segments(self.path)))
+        for db in earlier:
+            db.close()
+        self._durable = False
+        self._reserve.keep(self._db)
+
+    def _take_over(self, path: Path) -> sqlite3.Connection | None:
+        """Count what a segment holds; None when the run was killed before it was begun."""
         try:
-            db = _connected(path)
+            db = _connected(path, self._limits.reserve_bytes)
             if path != self.path and is_empty(db):
                 db.close()
-                return False
+                return None
             check_version(db, path)
             last, begun, size = db.execute(
                 "SELECT max(frame_index), min(time), coalesce(sum(length(seen) + length(summary)), 0)"
                 " FROM steps"
             ).fetchone()
             (event,) = db.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()
-            db.close()
         except sqlite3.Error as fault:
             raise _unwritable(path, fault) from fault
         self.last_frame = last if last is not None else self.last_frame
         self._last_event = max(self._last_event, event)
         self._begun = begun
         self._sizes.append(size)
-        return True
+        return db
 
     def _is_full(self, time: float) -> bool:
         if self._begun is None:
@@ -338,11 +357,14 @@ def _task_line(task: TaskBelief) -> dict[str, Any]:
     }
 
 
-def _connected(path: Path) -> sqlite3.Connection:
+def _connected(path: Path, reserve_bytes: int = 0) -> sqlite3.Connection:
     # Written by one thread at a time; which one is the caller's business.
     db = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
     # Steps of a few kilobytes fill large pages better; of a file that there is the size stays.
-    db.execute("PRAGMA page_size=16384")
+    db.execute(f"PRAGMA page_size={PAGE_BYTES}")
+    if reserve_bytes:  # free pages can be given back, and the log is as long as they are
+        db.execute("PRAGMA auto_vacuum=INCREMENTAL")
+        db.execute(f"PRAGMA wal_autocheckpoint={reserve_bytes // PAGE_BYTES}")
     db.execute("PRAGMA journal_mode=WAL")
     db.execute("PRAGMA synchronous=NORMAL")
     return db

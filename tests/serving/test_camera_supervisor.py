@@ -71,7 +71,7 @@ def test_a_process_that_dies_goes_on_with_its_run(cell: Cell) -> None:
     cell.bench.last.code = -9
     cell.turn(5.0)
     assert cell.state is CameraState.WAITING
-    assert "its process died (signal 9); it is begun again in 1 s" in cell.bench.lines[-1]
+    assert "its process died (signal 9); restarting in 1 s" in cell.bench.lines[-1]
     cell.turn(0.9)
     assert len(cell.bench.children) == 1
     cell.turn(0.2)
@@ -199,7 +199,7 @@ def test_a_store_that_cannot_be_written_is_tried_again(tmp_path: Path) -> None:
     cell = Cell(tmp_path / "store")
     cell.turn()
     assert not cell.bench.children
-    assert "it is tried again in 1 s" in cell.bench.lines[-1]
+    assert "next try in 1 s" in cell.bench.lines[-1]
     (tmp_path / "store").unlink()
     cell.turn(1.0)
     assert cell.bench.running

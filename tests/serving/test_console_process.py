@@ -67,7 +67,7 @@ def test_it_is_begun_again_ever_more_seldom_and_no_camera_notices(scene: Scene) 
         scene.kill()
         scene.turn()
         assert scene.bench.lines[-1].endswith(
-            f"the console ended (signal 9); it is begun again in {wait:g} s"
+            f"the console ended (signal 9); restarting in {wait:g} s"
         )
         scene.turn(wait - 0.2)
         count = len(scene.begun)
@@ -102,7 +102,7 @@ def test_one_that_cannot_be_begun_stops_nothing(tmp_path: Path) -> None:
 
     scene.console = ConsoleProcess(tmp_path, scene.bench.tell, fail)
     scene.turn()
-    assert "cannot be begun (Cannot allocate memory)" in scene.bench.lines[-1]
+    assert "cannot be started (Cannot allocate memory)" in scene.bench.lines[-1]
 
 
 def test_tokens_are_no_part_of_the_command_or_of_what_is_told(scene: Scene) -> None:

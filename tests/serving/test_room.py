@@ -142,7 +142,7 @@ def test_on_a_full_disk_the_oldest_evidence_goes_and_it_is_told(
     house.look([first])
     assert not second.exists()
     assert (first / "journal.sqlite").exists()
-    assert [line for line in bench.lines if "nothing that can be deleted" in line] == bench.lines[
+    assert [line for line in bench.lines if "nothing more can be deleted" in line] == bench.lines[
         -1:
     ]
 

@@ -124,7 +124,7 @@ def test_who_is_killed_comes_back_and_the_others_never_notice(visup: Call, site:
         assert visup("serve", site).code == 2  # a store has one service
         exchange(site, "one", "three")
         os.kill(service.process.pid, signal.SIGHUP)
-        service.wait_for(lambda: "three: begins run" in service.log)
+        service.wait_for(lambda: "three: starts run" in service.log)
         service.wait_for(lambda: "one: verdict" in service.log)
         assert service.pid_of("two") == other
 
@@ -137,7 +137,7 @@ def test_who_is_killed_comes_back_and_the_others_never_notice(visup: Call, site:
     assert frames == sorted(set(frames))
     assert frames[: len(before)] == before
     assert "one: its process died (signal 9)" in service.log
-    assert f"one: goes on with run {run.name}" in service.log
+    assert f"one: resumes run {run.name}" in service.log
     assert Recording.open(service.run("two")).facts()["ended"] == "stopped"
     assert (service.run("two") / "events.jsonl").stat().st_size > 0
     alerts_are_told_once(site.parent / "alerts.jsonl")

@@ -74,13 +74,13 @@ class CheckpointWriter:
         self._left = BYTES_AT_ONCE
         self._size = 0.0
 
-    def offer(self, agent: Agent, step: Step, kept: Callable[[], Mapping[str, Any]]) -> None:
+    def offer(self, agent: Agent, step: Step, kept: Callable[[], Mapping[str, Any] | None]) -> None:
         """Keep the state after a step when it is time to.
 
         Args:
             agent: After the step.
             step: The step, which the journal holds already.
-            kept: Tells what the recorder remembers.
+            kept: Tells what the recorder remembers; None when no state can be kept now.
         """
         self._last = step.time if self._last is None else self._last
         if self._seen is not None:
@@ -94,20 +94,21 @@ class CheckpointWriter:
         if not self._every_s or self.note or busy or early:
             return
         self._last = step.time
-        data = self._data(agent, step, kept())
+        remembered = kept()
+        data = None if remembered is None else self._data(agent, step, remembered)
         if data is not None:
             with suppress(RuntimeError):  # no room for a thread
                 self._writing = self._disk.submit(self._write, data)
 
-    def keep(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> None:
+    def keep(self, agent: Agent, step: Step, kept: Mapping[str, Any] | None) -> None:
         """Keep the state after a step at once, and wait until it is on the disk.
 
         Args:
             agent: After the step.
             step: The step, which the journal holds already.
-            kept: What the recorder remembers.
+            kept: What the recorder remembers; None when no state can be kept now.
         """
-        if not self._every_s or self.note:
+        if not self._every_s or self.note or kept is None:
             return
         self._last = step.time
         data = self._data(agent, step, kept)

@@ -75,7 +75,8 @@ class Recorder:
 
         self.folder = folder
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
-        self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
+        limits = JournalLimits(keep_bytes=keep, reserve_bytes=options.reserve_bytes)
+        self.journal = Journal(folder / JOURNAL, limits, resume=resume)
         self.facts = {**_facts(settings, source), **RecordStamp(options.camera).named}
         if not resume:
             self.journal.note(**self.facts)
@@ -104,6 +105,11 @@ class Recorder:
         if self._patience <= 0:
             self._write()
         self._derive(step, frame, list(self._derived))
+
+    @property
+    def behind(self) -> bool:
+        """Whether steps wait to be written."""
+        return bool(self._waiting)
 
     def keep_clock(self, clock: WallClock) -> None:
         """Note when it was by the clock of the wall, with the next step."""
@@ -246,9 +252,15 @@ def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
     }
 
 
-def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:
-    """What a recorder remembers besides the journal, for the state of a run."""
-    return recorder.collector.save() if recorder else {}
+def recorder_state(recorder: Recorder | None) -> Mapping[str, Any] | None:
+    """What a recorder remembers besides the journal, for the state of a run.
+
+    Returns:
+        None as long as steps wait: a state of a step that the journal has not is of no use.
+    """
+    if recorder is None:
+        return {}
+    return None if recorder.behind else recorder.collector.save()
 
 
 def free_path(path: Path) -> Path:

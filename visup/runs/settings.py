@@ -319,6 +319,8 @@ class RunOptions:
     """Start a new run after this many seconds of the source."""
     run_bytes: int | None = None
     """Start a new run when the journal exceeds this size."""
+    reserve_bytes: int = 0
+    """Disk space that a journal reserves, so that steps are recorded for a while on a full disk."""
     deliveries: Path | None = None
     """Queue file in which alerts wait until sinks accept them, which survives a kill; None to drop alerts."""
     quiet: tuple[str, ...] = ()

@@ -199,14 +199,14 @@ class CameraSupervisor:
             self._backoff = self._backoff.after(0.0)
             self._due = now + self._backoff.wait_s
             self._tell(
-                f"it cannot be begun: {fault}; it is tried again in {self._backoff.wait_s:g} s",
+                f"it cannot be started: {fault}; next try in {self._backoff.wait_s:g} s",
                 SiteEvent.NOT_BEGUN,
             )
             return
         self.run = folder
         self._life = _Life(child, run is not None, now, now)
         self.state = CameraState.STARTING
-        verb, kind = ("goes on with", SiteEvent.RESUMED) if run else ("begins", SiteEvent.BEGUN)
+        verb, kind = ("resumes", SiteEvent.RESUMED) if run else ("starts", SiteEvent.BEGUN)
         self._tell(f"{verb} run {folder.name}", kind, run=folder.name)
 
     def _listen(self, life: _Life, now: float) -> None:
@@ -225,7 +225,7 @@ class CameraSupervisor:
             elif report.kind is ReportKind.ROLLED:
                 run = Path(_text(report.data.get("run"))).name
                 self.run = self._folder / run
-                self._tell(f"goes on in run {run}", SiteEvent.ROLLED, run=run)
+                self._tell(f"continues in run {run}", SiteEvent.ROLLED, run=run)
             elif report.kind in (ReportKind.ENDED, ReportKind.REFUSED):
                 life.end = report
 
@@ -240,14 +240,14 @@ class CameraSupervisor:
         memory = life.child.memory_mb()
         if now - life.heard > most:
             self._tell(
-                f"no sign of life for {now - life.heard:.0f} s: its process is ended",
+                f"no sign of life for {now - life.heard:.0f} s: its process is killed",
                 SiteEvent.HUNG,
             )
             life.child.kill()
             life.heard, life.killed = now, True
         elif memory is not None and memory > limits.memory_mb:
             self._tell(
-                f"{memory:.0f} MB in use, {limits.memory_mb:.0f} allowed: its process is begun anew",
+                f"{memory:.0f} MB in use, {limits.memory_mb:.0f} allowed: its process is restarted",
                 SiteEvent.TOO_LARGE,
                 memory_mb=round(memory),
             )
@@ -257,7 +257,8 @@ class CameraSupervisor:
         if waited > CLOSE_S and not life.killed:
             life.killed = self.killed_at_close = True
             self._tell(
-                f"its process did not close in {CLOSE_S:g} s and is ended", SiteEvent.NOT_CLOSED
+                f"its process did not close within {CLOSE_S:g} s and is killed",
+                SiteEvent.NOT_CLOSED,
             )
             life.child.kill()
         elif waited > ASK_AGAIN_S and not life.asked_again:
@@ -278,18 +279,18 @@ class CameraSupervisor:
         asked = life.asked is not None
         if self._then is None or (not asked and self._seen_whole(life)):
             self.state = CameraState.OVER
-            words = _last_words(life, "it is watched no more" if self._then is None else "")
+            words = _last_words(life, "it is no longer watched" if self._then is None else "")
             self._tell(words, SiteEvent.ENDED)
             return
         self.state = CameraState.WAITING
         if asked:
-            self._tell(_last_words(life, "it is begun again"), SiteEvent.ENDED)
+            self._tell(_last_words(life, "it is restarted"), SiteEvent.ENDED)
             return
         self._count(life, now)
         self._due = now + self._backoff.wait_s
         self.restarts += 1
         why = _last_words(life, "") if life.end else _how(code, killed=life.killed)
-        again = f"{why}; it is begun again in {self._backoff.wait_s:g} s"
+        again = f"{why}; restarting in {self._backoff.wait_s:g} s"
         self._tell(again, SiteEvent.DIED, exit_code=code, wait_s=self._backoff.wait_s)
 
     def _count(self, life: _Life, now: float) -> None:
@@ -325,7 +326,7 @@ def _last_words(life: _Life, then: str) -> str:
 
 def _how(code: int, *, killed: bool) -> str:
     if killed:
-        return "its process was ended"
+        return "its process was killed"
     return (
         f"its process died (signal {-code})" if code < 0 else f"its process died (exit code {code})"
     )

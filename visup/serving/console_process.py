@@ -104,7 +104,7 @@ class ConsoleProcess:
                 console_command(console, self._store), console_environment(console)
             )
         except OSError as fault:
-            self._again(f"the console cannot be begun ({fault.strerror or fault})", 0.0, now)
+            self._again(f"the console cannot be started ({fault.strerror or fault})", 0.0, now)
             return
         self._begun_at = now
         self._tell(SITE, f"the console is at {address}", SiteEvent.CONSOLE, address=address)
@@ -120,7 +120,7 @@ class ConsoleProcess:
         self._backoff = self._backoff.after(ran_s)
         wait = self._backoff.wait_s
         self._due = now + wait
-        told = f"{what}; it is begun again in {wait:g} s"
+        told = f"{what}; restarting in {wait:g} s"
         self._tell(SITE, told, SiteEvent.CONSOLE_ENDED, wait_s=wait)
 
 

@@ -70,7 +70,7 @@ class MonitoringFeed:
             tell(SITE, str(fault), SiteEvent.NOT_MONITORED)
             return
         at = f"http://{self._server.address}/metrics"
-        tell(SITE, f"how it does is told at {at}", SiteEvent.MONITORED, address=at)
+        tell(SITE, f"health and metrics are at {at}", SiteEvent.MONITORED, address=at)
 
     def turn(self, supervisor: SiteSupervisor, now: float, keeper: Housekeeper) -> None:
         """Look at how the service does, once in a while."""

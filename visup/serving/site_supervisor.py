@@ -59,7 +59,7 @@ class SiteSupervisor:
         A camera whose name was given to other settings ends in good order and begins with these.
         """
         if site.store != self._site.store:
-            told = "another store is used once the service is begun anew"
+            told = "another store is used after a restart of the service"
             self._tell(SITE, told, SiteEvent.NOT_RELOADED)
         wanted = {c.name: c for c in site.cameras}
         for name in [n for n in self.cameras if n not in wanted]:
@@ -182,10 +182,10 @@ def _reload(supervisor: SiteSupervisor, path: Path, tell: Tell, now: float) -> N
     try:
         site = read_site(path)
     except VisupError as fault:
-        told = f"the file has mistakes, so that all stays as it was: {fault}"
+        told = f"the site file has mistakes, nothing was changed: {fault}"
         tell(SITE, told, SiteEvent.NOT_RELOADED)
         return
-    tell(SITE, "the file was read again", SiteEvent.RELOADED)
+    tell(SITE, "the site file was reloaded", SiteEvent.RELOADED)
     supervisor.reload(site, now)
 
 

@@ -45,6 +45,7 @@ class InsistentOutbox:
         self._unwritten: deque[Any] = deque(maxlen=1000)
         self._new, self._closing = threading.Event(), threading.Event()
         self._over = False
+        self._sent: int | None = None
         self._thread = threading.Thread(target=self._run, name=f"sink {sink.name}", daemon=True)
         self._thread.start()
 
@@ -107,10 +108,12 @@ class InsistentOutbox:
         if found is None and not self._unwritten:
             return None
         number, record = found or (None, self._unwritten[0])
-        dealt_with = self._delivered(record)
+        # One that was sent and could not be crossed off is not sent again.
+        dealt_with = (number is not None and number == self._sent) or self._delivered(record)
         if dealt_with and number is None:
             self._unwritten.popleft()
         elif dealt_with and number is not None:
+            self._sent = number
             try:
                 self._log.done(number)
             except sqlite3.Error as fault:

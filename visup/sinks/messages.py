@@ -96,8 +96,10 @@ class AlertSender:
         return {**told, **self._stamp.of(when)}
 
     def _send(self, records: Sequence[dict[str, Any]], frame_index: int | None = None) -> None:
-        if self._log and self._noted(self._log, records, frame_index):
-            return
+        if self._log:
+            records = [self._log.labelled(record) for record in records]
+            if self._noted(self._log, records, frame_index):
+                return
         for outbox in self._outboxes:
             for record in records:
                 outbox.offer(record)

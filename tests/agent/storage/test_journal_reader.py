@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.full_disk import no_room
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.codec import pack_observation
@@ -208,3 +211,30 @@ def test_a_copy_made_while_the_run_goes_on_can_be_read(tmp_path: Path) -> None:
         shutil.copy(part, copy / part.name)
     assert Recording.open(copy).count() == 20
     journal.close()
+
+
+def test_without_room_steps_are_recorded_in_a_reserve_that_is_given_back(tmp_path: Path) -> None:
+    """Also by who goes on with a run that was killed."""
+    path = tmp_path / "journal.sqlite"
+    reserve = JournalLimits(reserve_bytes=2**21)
+    if (child := os.fork()) == 0:
+        agent(Journal(path, reserve).record).run(islice(frames(150), 50))
+        os._exit(9)
+    os.waitpid(child, 0)
+    with no_room(tmp_path):
+        past = list(Recording.open(path).observations())
+        journal = Journal(path, reserve, resume=True)
+        told = agent(journal.record)
+        for seen in past:
+            told.reason(seen)
+        for frame in islice(frames(150), 50, 150):
+            told.step(frame)
+        kept = [s["frame_index"] for s in Recording.open(path).summaries()]
+    assert kept == list(range(150))
+    reserved = path.stat().st_size
+    journal.close()
+    assert path.stat().st_size < reserved - 2**20
+    plain = tmp_path / "plain" / "journal.sqlite"
+    plain.parent.mkdir()
+    write(plain, 150)
+    assert list(Recording.open(path).events()) == list(Recording.open(plain).events())

@@ -15,7 +15,7 @@ from visup.agent import Alert, Mind, Observation, Severity
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
-from visup.evaluation.serving.account import account_of
+from visup.evaluation.serving.account import Ledger
 from visup.evaluation.serving.night import Kill, Killer, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
 from visup.evaluation.serving.rehearsal import evaluate_serving, failed
@@ -64,7 +64,7 @@ def record(number: int, state: str, delivery: str, camera: str = "cell") -> dict
 def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) -> None:
     run = tmp_path / "cell" / "20260101T000000Z"
     (run / "evidence").mkdir(parents=True)
-    (run / "evidence" / "alert-1.json").write_text("{}")
+    (run / "evidence" / "alert-1.json").write_text('{"id": 1, "opened": 1.0}')
     journal = Journal(run / "journal.sqlite")
     alerts = [
         Alert(n, "seen", Severity.WARNING, float(n), float(n), (), "Seen.", closed=end)
@@ -83,10 +83,15 @@ def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) 
         record(2, "opened", "c"),
         record(2, "opened", "d"),
         record(3, "opened", "e", camera="yard"),
+        record(9, "opened", "f"),  # its step was lost
     ]
-    account = account_of(tmp_path / "cell", taken)
+    ledger = Ledger(tmp_path / "cell")
+    ledger.look()
+    (run / "journal.sqlite").unlink()  # for lack of room
+    ledger.look()
+    account = ledger.account(taken)
     assert (account.alerts, account.lost, account.twice, account.resent) == (3, 1, 2, 1)
-    assert account.without_evidence == 2
+    assert (account.unrecorded, account.without_evidence) == (1, 2)
 
 
 def test_a_rehearsal_fails_for_what_was_lost_or_late() -> None:

@@ -79,15 +79,15 @@ class EvaluationCommand:
         module, _, function = self.function.partition(":")
         with _progress_line(self.verb) as progress:
             figures = getattr(evaluation_module(module), function)(**given, progress=progress)
+        if json_file:  # first of all: hours of work must not end in a table that cannot be drawn
+            settings = {k: v for k, v in given.items() if k != "folder"}
+            write_record(json_file, figures, self.recorded(settings))
         console = make_console()
         if self.keys:
             title = f"{self.name}: {folder}" if folder else self.name
             console.print(*figures_tables(title, figures, self.keys))
         for text in self.closing(figures):
             console.print(text, soft_wrap=isinstance(text, str), markup=False)
-        if json_file:
-            settings = {k: v for k, v in given.items() if k != "folder"}
-            write_record(json_file, figures, self.recorded(settings))
         if self.failed(figures):
             raise typer.Exit(1)
 

@@ -218,7 +218,8 @@ MACHINERY_EVALUATIONS = (
         "visup.evaluation.serving.rehearsal:evaluate_serving",
         "rehearsing",
         (
-            *("alerts", "lost", "twice", "resent", "without_evidence", "kills", "slowest_s"),
+            *("alerts", "lost", "twice", "resent", "unrecorded", "without_evidence", "kills"),
+            "slowest_s",
             *("median_s", "memory_growth", "frames", "dropped", "cpu"),
         ),
         (
@@ -231,6 +232,9 @@ MACHINERY_EVALUATIONS = (
                 Option(
                     "An empty folder; if on a disk of at most 4 GB, the disk is filled from time to time."
                 ),
+            ),
+            Setting(
+                "so_far", Path | None, None, Option("A file for the figures so far, each minute.")
             ),
             _SEED,
         ),

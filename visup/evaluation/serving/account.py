@@ -1,19 +1,31 @@
-"""Every alert of all journals against every record that a sink took: what was lost, what came twice."""
+"""Every alert of all journals against every record that a sink took: what was lost, what came twice.
+
+A store on a small disk does not keep its runs for long, so that the account looks again and again: what a
+journal said once counts, though the journal be deleted meanwhile.
+"""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from visup.agent.storage.journal_reader import Recording
+from visup.agent.model.errors import VisupError
+from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.runs.evidence.keeper import EVIDENCE
 from visup.sinks.delivery_log import DELIVERY
 
-Told = tuple[str, int, float, str]
-"""Camera, number of the alert, seconds when it opened, 'opened' or 'closed'."""
+MOST_SHOWN = 50
+
+Opening = tuple[int, float]
+"""Number of the alert, seconds when it opened."""
+
+Told = tuple[int, float, str]
+"""The same with 'opened' or 'closed'."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,64 +33,93 @@ class Account:
     """What became of the alerts of one camera.
 
     Attributes:
-        alerts: That are in its journals.
+        alerts: That were in its journals.
         lost: Openings and closings of which no record came.
         twice: Records that came more than once.
         resent: Of these, those that were sent again as nobody knew whether they had arrived.
-        without_evidence: Alerts without a picture or without a clip.
+        unrecorded: Openings and closings that were told and are in no journal.
+        without_evidence: Alerts that never had a picture and a clip.
+        wrong: Some of what was lost, told twice or is in no journal.
     """
 
     alerts: int
     lost: int
     twice: int
     resent: int
+    unrecorded: int
     without_evidence: int
+    wrong: tuple[str, ...] = ()
 
 
-def account_of(camera: Path, taken: Iterable[Mapping[str, Any]]) -> Account:
-    """What became of the alerts of a camera.
+class Ledger:
+    """What the journals of a camera have said so far.
 
     Args:
         camera: Folder of its runs.
-        taken: Records that a sink took, of any camera.
     """
-    expected = set(_recorded(camera))
-    own = [r for r in taken if r.get("record") == "alert" and r.get("camera") == camera.name]
-    counts = Counter(_key(r) for r in own)
-    extra = sum(n - 1 for n in counts.values())
-    deliveries = Counter(str(r[DELIVERY]) for r in own if DELIVERY in r)
-    return Account(
-        alerts=sum(told[3] == "opened" for told in expected),
-        lost=len(expected - set(counts)),
-        twice=extra,
-        resent=sum(n - 1 for n in deliveries.values()),
-        without_evidence=len(list(_without_evidence(camera))),
-    )
+
+    def __init__(self, camera: Path) -> None:
+        self._camera = camera
+        self._recorded: set[Told] = set()
+        self._with_evidence: set[Opening] = set()
+        self._seen: dict[Path, float] = {}
+
+    def look(self) -> None:
+        """Take note of what is in the store now."""
+        for journal in sorted(self._camera.glob(f"*/{JOURNAL}")):
+            with suppress(OSError, VisupError):  # it is deleted at this moment, or just begun
+                if journal.stat().st_size and self._is_new(journal, f"{journal}-wal"):
+                    self._recorded.update(_recorded(journal.parent))
+        for note in self._camera.glob(f"*/{EVIDENCE}/alert-*.json"):
+            with suppress(OSError, ValueError, KeyError):
+                if self._is_new(note):
+                    told = json.loads(note.read_text())
+                    self._with_evidence.add(_opening(told))
+
+    def account(self, taken: Iterable[Mapping[str, Any]]) -> Account:
+        """What became of the alerts of the camera.
+
+        Args:
+            taken: Records that a sink took, of any camera.
+        """
+        own = [
+            r for r in taken if r.get("record") == "alert" and r.get("camera") == self._camera.name
+        ]
+        counts = Counter((*_opening(r), str(r["state"])) for r in own)
+        deliveries = Counter(str(r[DELIVERY]) for r in own if DELIVERY in r)
+        opened = {told[:2] for told in self._recorded}
+        wrong = {
+            "lost": self._recorded - set(counts),
+            "twice": {told for told, n in counts.items() if n > 1},
+            "unrecorded": set(counts) - self._recorded,
+        }
+        return Account(
+            alerts=len(opened),
+            lost=len(wrong["lost"]),
+            twice=sum(n - 1 for n in counts.values()),
+            resent=sum(n - 1 for n in deliveries.values()),
+            unrecorded=len(wrong["unrecorded"]),
+            without_evidence=len(opened - self._with_evidence),
+            wrong=tuple(f"{how}: {told}" for how, each in wrong.items() for told in sorted(each))[
+                :MOST_SHOWN
+            ],
+        )
+
+    def _is_new(self, path: Path, *others: str) -> bool:
+        """Whether a file was written to since it was last looked at."""
+        when = max(p.stat().st_mtime for p in (path, *map(Path, others)) if p.exists())
+        before = self._seen.get(path)
+        self._seen[path] = when
+        return when != before
 
 
-def _key(record: Mapping[str, Any]) -> Told:
-    return (
-        str(record["camera"]),
-        int(record["id"]),
-        round(float(record["opened"]), 3),
-        str(record["state"]),
-    )
+def _opening(record: Mapping[str, Any]) -> Opening:
+    return int(record["id"]), round(float(record["opened"]), 3)
 
 
-def _recorded(camera: Path) -> Iterator[Told]:
-    """What the journals of all runs say; an alert that was open when a run was followed is in two."""
-    for journal in sorted(camera.glob("*/journal.sqlite")):
-        if not journal.stat().st_size:
-            continue  # killed before its first line, or on a full disk: nothing was told of it
-        for alert in Recording.open(journal.parent).alerts().values():
-            known = camera.name, int(alert["id"]), round(float(alert["opened"]), 3)
-            yield (*known, "opened")
-            if alert["closed"] is not None:
-                yield (*known, "closed")
-
-
-def _without_evidence(camera: Path) -> Iterator[Told]:
-    kept = {p.stem for p in camera.glob(f"*/{EVIDENCE}/alert-*.json")}
-    for told in {t[:3] for t in _recorded(camera)}:
-        if f"alert-{told[1]}" not in kept:
-            yield (*told, "opened")
+def _recorded(run: Path) -> Iterator[Told]:
+    """What a journal says; an alert that was open when a run was followed is in two."""
+    for alert in Recording.open(run).alerts().values():
+        yield (*_opening(alert), "opened")
+        if alert["closed"] is not None:
+            yield (*_opening(alert), "closed")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -21,8 +22,9 @@ import urllib3
 from urllib3.exceptions import HTTPError
 
 from visup.agent.model.errors import SettingsError
+from visup.agent.storage.atomic import write_whole
 from visup.evaluation.figures import Progress, silent, sums_of
-from visup.evaluation.serving.account import account_of
+from visup.evaluation.serving.account import Ledger
 from visup.evaluation.serving.costs import camera_costs
 from visup.evaluation.serving.night import Balloon, Killer, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
@@ -39,6 +41,10 @@ from visup.evaluation.serving.streams import TroubledStream
 
 NAMES = ("file-1", "file-2", "stream-1", "stream-2")
 START_S = 300.0
+LEDGER_S, SO_FAR_S = 20.0, 60.0
+"""Seconds between two looks at the journals, and between two writings of the figures so far. What is deleted
+for lack of room is two minutes old at least."""
+
 CALM_S = 30.0
 """At the end nothing goes wrong any more, so that what waits can be told."""
 
@@ -52,6 +58,7 @@ def evaluate_serving(
     kill_every: float = 60.0,
     store: Path | None = None,
     seed: int = 0,
+    so_far: Path | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Rehearse a service for some time.
@@ -61,19 +68,20 @@ def evaluate_serving(
         kill_every: Seconds between two kills.
         store: An empty folder for its runs; on a small disk (at most 4 GB) that is filled now and then.
         seed: Of all that goes wrong.
+        so_far: A file that has the figures so far, written each minute.
         progress: Shows what is being done.
 
     Returns:
-        `items` by camera: `alerts`, `lost`, `twice`, `resent`, `without_evidence`, `kills`, `slowest_s`,
-        `frames`, `dropped`, `restarts`, `cpu` (share of a processor); `total`: sums, `median_s` of a return,
-        `memory_growth` (share, from the second quarter to the last), `closing_s`, `exit_code`, what went
-        wrong how often, and `camera_costs`.
+        `items` by camera: `alerts`, `lost`, `twice`, `resent`, `unrecorded`, `without_evidence`, `wrong`,
+        `kills`, `slowest_s`, `frames`, `dropped`, `restarts`, `cpu` (share of a processor);
+        `total`: sums, `median_s` of a return, `memory_growth` (share, from the second quarter to the last),
+        `memory_mb` by the minute, `closing_s`, `exit_code`, what went wrong how often, and `camera_costs`.
     """
     if store is not None and (not store.is_dir() or any(store.iterdir())):
         raise SettingsError("the store is not an empty folder", where=str(store))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        stage = Rehearsal(folder, store or folder / "store", seed, stack)
+        stage = Rehearsal(folder, store or folder / "store", seed, stack, so_far)
         told = stage.rehearse(minutes, kill_every, progress)
     progress("what a camera takes")
     return {**told, "total": {**told["total"], **camera_costs(seed)}}
@@ -87,10 +95,13 @@ class Rehearsal:
         store: For the runs.
         seed: Of all that goes wrong.
         stack: Ends what was begun.
+        so_far: A file for the figures so far.
     """
 
-    def __init__(self, folder: Path, store: Path, seed: int, stack: ExitStack) -> None:
-        self._folder, self._store = folder, store
+    def __init__(
+        self, folder: Path, store: Path, seed: int, stack: ExitStack, so_far: Path | None = None
+    ) -> None:
+        self._folder, self._store, self._so_far = folder, store, so_far
         store.mkdir(exist_ok=True)
         self._receiver = AlertReceiver()
         stack.callback(self._receiver.close)
@@ -103,10 +114,11 @@ class Rehearsal:
         self._balloon = Balloon(store)
         stack.callback(self._balloon.empty)
         self._killer = Killer(store, NAMES, seed)
+        self._ledgers = {name: Ledger(store / name) for name in NAMES}
         self._monitoring = _free_port()
         self._write_site()
         self._figures: dict[str, dict[str, float]] = {}
-        self._memory: list[float] = []
+        self._memory: list[tuple[float, float]] = []
         self._watched_s = 1.0
         self._wrongs = {"reloads": 0, "sink_down": 0}
         self._ends: list[tuple[float, Any]] = []
@@ -117,12 +129,13 @@ class Rehearsal:
             self._wait_until_ready(process)
             begin = time.monotonic()
             end = begin + 60.0 * minutes
-            table = self._timetable(process, kill_every)
+            table, books = self._timetable(process, kill_every), self._books(begin)
             while (now := time.monotonic()) < end and process.poll() is None:
                 self._look(process.pid)
                 if now < end - CALM_S:
                     table.turn(now)
                 self._end_what_is_due(now)
+                books.turn(now)
                 left = (end - now) / 60.0
                 progress(f"{left:.1f} minutes left, {len(self._killer.kills)} kills")
                 time.sleep(LOOK_S)
@@ -130,7 +143,9 @@ class Rehearsal:
             self._watched_s = asked - begin
             process.send_signal(signal.SIGTERM)
             code = process.wait(60)
-            return self._told(time.monotonic() - asked, code)
+            closing_s = time.monotonic() - asked
+            self._look_into_journals()
+            return self._keep(self._told(closing_s, code))
 
     def _write_site(self) -> None:
         loops = [f"loop:{self._folder / f'{n}.webm'}" for n in (0, 1)]
@@ -191,6 +206,25 @@ class Rehearsal:
 
         return Timetable(((kill_every, kill), (100.0, reload), (75.0, sink_down), (130.0, full)))
 
+    def _books(self, begin: float) -> Timetable:
+        """What is done for the account alone."""
+
+        def write() -> None:
+            self._watched_s = time.monotonic() - begin
+            self._keep(self._told(0.0, None))
+
+        return Timetable(((LEDGER_S, self._look_into_journals), (SO_FAR_S, write)))
+
+    def _keep(self, told: dict[str, Any]) -> dict[str, Any]:
+        """The figures so far, in a file: hours of them must not be lost with what comes after."""
+        if self._so_far:
+            write_whole(self._so_far, json.dumps(told, indent=1).encode())
+        return told
+
+    def _look_into_journals(self) -> None:
+        for ledger in self._ledgers.values():
+            ledger.look()
+
     def _sink_up(self) -> None:
         self._receiver.down = False
 
@@ -213,18 +247,24 @@ class Rehearsal:
             self._killer.look(self._of_each("visup_restarts_total"), frames)
             cameras = [f.get("visup_memory_bytes", 0.0) for f in self._figures.values()]
             if len(cameras) == len(NAMES) and all(cameras):
-                self._memory.append(sum(cameras) / 2**20 + _resident_mb(pid))
+                used = sum(cameras) / 2**20 + _resident_mb(pid)
+                self._memory.append((time.monotonic(), used))
 
-    def _told(self, closing_s: float, code: int) -> dict[str, Any]:
+    def _told(self, closing_s: float, code: int | None) -> dict[str, Any]:
         items = {name: self._of_camera(name) for name in NAMES}
-        keys = ("alerts", "lost", "twice", "resent", "without_evidence", "kills", "restarts")
+        keys = (
+            *("alerts", "lost", "twice", "resent", "unrecorded", "without_evidence"),
+            *("kills", "restarts", "frames", "dropped"),
+        )
         backs = [k.back_s for k in self._killer.kills if k.back_s is not None]
         total = {
-            **sums_of(list(items.values()), (*keys, "frames", "dropped")),
+            **sums_of(list(items.values()), keys),
             "not_back": sum(k.back_s is None for k in self._killer.kills),
             "median_s": median(backs) if backs else 0.0,
             "slowest_s": max(backs, default=0.0),
             "memory_growth": _growth(self._memory),
+            "memory_mb": _by_minute(self._memory),
+            "watched_s": self._watched_s,
             "closing_s": closing_s,
             "exit_code": code,
             "troubles": sum(s.troubles for s in self._streams),
@@ -238,7 +278,7 @@ class Rehearsal:
         figures = self._figures.get(name, {})
         own = [k for k in self._killer.kills if k.camera == name]
         return {
-            **asdict(account_of(self._store / name, self._receiver.records)),
+            **asdict(self._ledgers[name].account(list(self._receiver.records))),
             "kills": len(own),
             "slowest_s": max((k.back_s or 0.0 for k in own), default=0.0),
             "restarts": figures.get("visup_restarts_total", 0.0),
@@ -255,12 +295,21 @@ def failed(figures: Mapping[str, Any]) -> bool:
     return bool(total["lost"] or total["twice"] > total["resent"] or late)
 
 
-def _growth(memory: Sequence[float]) -> float:
+def _growth(memory: Sequence[tuple[float, float]]) -> float:
     """From the second quarter to the last, as a share."""
-    quarter = len(memory) // 4
+    used = [mb for _, mb in memory]
+    quarter = len(used) // 4
     if not quarter:
         return 0.0
-    return median(memory[-quarter:]) / median(memory[quarter : 2 * quarter]) - 1.0
+    return median(used[-quarter:]) / median(used[quarter : 2 * quarter]) - 1.0
+
+
+def _by_minute(memory: Sequence[tuple[float, float]]) -> list[float]:
+    """Medians of all processes together, megabytes."""
+    minutes: dict[int, list[float]] = {}
+    for at, mb in memory:
+        minutes.setdefault(int((at - memory[0][0]) / 60.0), []).append(mb)
+    return [round(median(used), 1) for _, used in sorted(minutes.items())]
 
 
 def _resident_mb(pid: int) -> float:

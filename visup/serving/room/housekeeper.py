@@ -107,11 +107,7 @@ class Housekeeper:
             counts = Counter(_kind(one) for one in gone if one.why is why)
             if counts:
                 freed = sum(one.size for one in gone if one.why is why) / 1e6
-                what = " and ".join(
-                    f"{n} runs" if kind == "runs" else f"evidence of {n} alerts"
-                    for kind, n in sorted(counts.items())
-                )
-                said = f"{what} deleted ({freed:.1f} MB): {WHY[why]}"
+                said = f"deleted {_listed(counts)} ({freed:.1f} MB): {WHY[why]}"
                 kind = SiteEvent.NO_ROOM if why is RemovalReason.DISK else SiteEvent.DELETED
                 self._tell(SITE, said, kind, why=why.value, freed_bytes=round(freed * 1e6))
 
@@ -120,7 +116,7 @@ class Housekeeper:
         full = free < self.limits.free_bytes
         if full and not self._full:
             said = (
-                f"the disk has {free / 1e9:.1f} GB left and nothing that can be deleted: make room"
+                f"the disk has {free / 1e9:.1f} GB left, and nothing more can be deleted: make room"
             )
             self._tell(SITE, said, SiteEvent.NO_ROOM, free_bytes=round(free))
         self._full = full
@@ -128,6 +124,13 @@ class Housekeeper:
 
 def _kind(one: Removal) -> str:
     return "runs" if isinstance(one.what, StoredRun) else EVIDENCE
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    runs, alerts = counts.get("runs", 0), counts.get(EVIDENCE, 0)
+    told = [f"{runs} {'run' if runs == 1 else 'runs'}"] if runs else []
+    told += [f"the evidence of {alerts} {'alert' if alerts == 1 else 'alerts'}"] if alerts else []
+    return " and ".join(told)
 
 
 def _remove(one: Removal) -> None:

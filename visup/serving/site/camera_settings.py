@@ -26,6 +26,9 @@ PIECE_BYTES = 2**20
 CLOSING_S = 2.0
 """For a sink at the end of a run, seconds: a service that is stopped closes within five."""
 
+RESERVE_BYTES = 4 * 2**20
+"""Set aside in each journal for a full disk: minutes of 640 x 480 pixels at 5 frames a second."""
+
 
 def camera_of(
     site: SiteTable, one: CameraTable, folder: Path, environment: Mapping[str, str]
@@ -92,6 +95,7 @@ def _options(
         run_bytes=int(1e9 * site.recording.run_gb),
         quiet=one.quiet,
         timezone=site.timezone,
+        reserve_bytes=RESERVE_BYTES,
     )
 
 
