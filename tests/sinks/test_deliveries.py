@@ -76,7 +76,7 @@ def test_of_too_many_the_oldest_are_lost_and_counted(
 
 def test_a_file_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "d.sqlite").write_text("no database, but long enough to be read as one")
-    with pytest.raises(OutputError, match="have not taken"):
+    with pytest.raises(OutputError, match="queue of undelivered alerts"):
         DeliveryLog(tmp_path / "d.sqlite")
 
 

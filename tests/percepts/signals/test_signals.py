@@ -144,7 +144,7 @@ def test_a_signal_that_nobody_tells_is_refused_with_what_is_meant(tmp_path: Path
             str(clip(tmp_path)), rules=[tmp_path / "own.rules"], signals=[tmp_path / "own.csv"]
         ))  # fmt: skip
     assert "battery" in str(told.value)
-    with pytest.raises(VisupError, match="nobody tells"):
+    with pytest.raises(VisupError, match="no source provides"):
         list(visup.watch(str(clip(tmp_path)), rules=[tmp_path / "own.rules"]))
 
 
