@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import isinf
 from typing import Any, cast
 
 from visup.agent import Mind, Truth
-from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
 from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
@@ -33,10 +33,14 @@ from visup.rules.safety.compiled_rules import compile_rules
 from visup.rules.safety.explain import RuleExplanation, explain_rule
 from visup.rules.safety.verdicts import Evaluation, remapped
 
-_CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)\)")
+_CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)(?:\)|$)")
+"""A word with its arguments, also where the parenthesis behind them is missing."""
+_NAME = re.compile(r"\b[A-Za-z_]\w*")
 _BOUND = re.compile(r"\b(?:exists|forall)\s+([A-Za-z_]\w*)")
 _BY_ID = re.compile(r"object_(\d+)")
 _SAY = 'say "."'
+_WRITTEN = "condition"
+"""What is said in place of a file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,23 +193,41 @@ def objects_named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, .
     return tuple(i for i in present if mind.objects[i].name in models)
 
 
-UNFINISHED = "(,<>=+-*/["
-"""Signs with which nothing ends."""
+UNFINISHED = re.compile(r"(?:[(,<>=+*/\[-]|\b(?:and|or|not|unless|until|within|for))\s*$")
+"""Signs and words with which nothing ends."""
 
 
 def _rule(text: str, variables: tuple[str, ...]) -> Rule:
-    last = text.rstrip()[-1:]
-    if last and last in UNFINISHED:
-        raise RuleError(f"'{text}' ends too early", expected=f"what belongs after '{last}'")
+    if not text.strip():
+        raise RuleError("there is no condition", expected="one such as: touching(a, b)")
+    if last := UNFINISHED.search(text):
+        expected = f"what belongs after '{last[0].strip()}'"
+        raise RuleError(f"'{text}' ends too early", expected=expected)
     lines = f"rule watched({', '.join(variables)}): info when\n{text}\n{_SAY}"
     try:
-        (rule,) = parse_rules(lines, "<expression>")
-    except RuleError as fault:
-        if isinstance(fault.where, SourceLocation) and fault.where.line > text.count("\n") + 2:
-            # It was the wrapping that did not fit: the user wrote too little.
-            raise RuleError(f"'{text}' ends too early", expected=fault.expected) from None
-        raise
+        (rule,) = parse_rules(lines, _WRITTEN)
+    except (RuleError, ErrorGroup) as fault:
+        raise _of_text(text, fault) from None
     return rule
+
+
+def _of_text(text: str, fault: RuleError | ErrorGroup) -> RuleError | ErrorGroup:
+    """What is wrong with a rule around a text, as what is wrong with the text: at its own lines."""
+    found = list(fault.errors) if isinstance(fault, ErrorGroup) else [fault]
+    own = [e for e in found if isinstance(e.where, SourceLocation) and e.where.line > 1]
+    told = [_unwrapped(text, e) for e in own or found]
+    return told[0] if len(told) == 1 else ErrorGroup(list(told))
+
+
+def _unwrapped(text: str, fault: VisupError) -> RuleError:
+    place = fault.where
+    if not isinstance(place, SourceLocation) or place.line == 1:
+        return RuleError(f"'{text}' is no condition ({fault.what})", expected=fault.expected)
+    if place.line > text.count("\n") + 2:
+        # It was the wrapping that did not fit: the user wrote too little.
+        return RuleError(f"'{text}' ends too early", expected=fault.expected)
+    where = replace(place, line=place.line - 1)
+    return RuleError(fault.what, where=where, expected=fault.expected, hint=fault.hint)
 
 
 def _with_variables(text: str) -> tuple[str, tuple[str, ...]]:
@@ -216,14 +238,15 @@ def _with_variables(text: str) -> tuple[str, tuple[str, ...]]:
     def rewritten(call: re.Match[str]) -> str:
         word: Any = RULES.words.get(call[1]) or RULES.quantities.get(call[1])
         names = [a.strip() for a in call[2].split(",")]
-        if word is None or len(names) != len(word.takes):
+        if word is None or len(names) != len(word.takes):  # told later, and its names are known
+            found.update(dict.fromkeys(n for n in _NAME.findall(call[2]) if n not in bound))
             return call[0]
         for n, takes in enumerate(word.takes):
             if takes == "object":
                 names[n] = f"object_{names[n]}" if names[n].isdecimal() else names[n]
                 if names[n] not in bound and names[n].isidentifier():
                     found[names[n]] = None
-        return f"{call[1]}({', '.join(names)})"
+        return f"{call[1]}({', '.join(names)}{')' if call[0].endswith(')') else ''}"
 
     return _CALL.sub(rewritten, text), tuple(found)
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from threading import Event, Thread, Timer
 from typing import Any
 
 import pytest
@@ -150,29 +154,77 @@ def test_workers_of_dask_fill_the_same_lake_and_survive_a_deadly_clip(tmp_path: 
     assert rows(lake) == rows(alone)
 
 
-def test_workers_that_are_all_gone_are_not_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The process that workers are forked from is killed, and they with it: nobody can take their place."""
+def starters() -> list[int]:
+    """The processes of this one that workers are forked from."""
     psutil = pytest.importorskip("psutil", reason="processes are found with psutil")
+    found = []
+    for process in psutil.Process().children():
+        with suppress(psutil.Error):  # it has just ended
+            found += [process.pid] if "forkserver" in " ".join(process.cmdline()) else []
+    return found
+
+
+def kill_starters(until: Event) -> None:
+    """Kill the process that workers are forked from, and whatever takes its place, as soon as it is there."""
+    while not until.wait(0.2):
+        for pid in starters():
+            os.kill(pid, signal.SIGKILL)
+
+
+@pytest.fixture
+def ten(tmp_path: Path) -> list[Clip]:
     pytest.importorskip("distributed", reason="needs the extra `cluster`")
-    monkeypatch.setattr("visup.archive.filling.pool.STARVED_S", 3.0)
-    some = clips(tmp_path / "clips", *map(str, range(1, 9)))
-    lake = Lake.create(tmp_path / "lake")
+    return clips(tmp_path / "clips", *map(str, range(1, 11)))
+
+
+def test_workers_come_again_when_they_cannot_be_started_at_once(
+    tmp_path: Path, ten: list[Clip]
+) -> None:
+    """What workers are forked from is killed, and so is what takes its place, before it has any."""
+    lake, alone, over = Lake.create(tmp_path / "lake"), Lake.create(tmp_path / "alone"), Event()
+    kills = list[str]()
 
     def kill(outcome: ClipOutcome) -> None:
-        for process in psutil.Process().children(recursive=True):
-            if "forkserver" in " ".join(process.cmdline()):
-                process.kill()
+        if not kills:
+            kills.append(outcome.run)
+            killer = Thread(target=kill_starters, args=(over,))
+            killer.start()
+            Timer(2.0, over.set).start()
+            killer.join()
 
-    with (
-        pytest.raises(SettingsError, match="all workers"),
-        open_pool(PoolSettings(workers=2)) as pool,
-    ):
-        fill(lake, make_plan(lake, some, SETTINGS), pool, kill, scripted)
+    with open_pool(PoolSettings(workers=2)) as pool:
+        begun = pool.own.cluster.workers.copy() if pool.own else {}
+        result = fill(lake, make_plan(lake, ten, SETTINGS), pool, kill, scripted)
+        assert pool.own is not None
+        assert begun.keys() != pool.own.cluster.workers.keys()  # Dask had given them up
+    assert result.added + len(result.failed) == len(ten)
+    assert all(f.put_aside for f in result.failed)
     begin_anew(lake, retry=True)
-    filled(lake, some)
-    assert len(lake.runs()) == len(some)
+    filled(lake, ten)
+    filled(alone, ten)
+    assert rows(lake) == rows(alone)
+
+
+def test_workers_that_never_come_again_are_not_waited_for(
+    tmp_path: Path, ten: list[Clip], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("visup.archive.filling.own_workers.MOST_RENEWALS", 1)
+    lake, over = Lake.create(tmp_path / "lake"), Event()
+    killer = Thread(target=kill_starters, args=(over,))
+
+    def kill(outcome: ClipOutcome) -> None:
+        if killer.ident is None:
+            killer.start()
+
+    plan = make_plan(lake, ten, SETTINGS)
+    with open_pool(PoolSettings(workers=2)) as pool:
+        with pytest.raises(SettingsError, match="all workers were lost"):
+            fill(lake, plan, pool, kill, scripted)
+        over.set()
+        killer.join()
+    begin_anew(lake, retry=True)
+    filled(lake, ten)
+    assert len(lake.runs()) == len(ten)
 
 
 def test_a_scheduler_that_is_not_there_is_told() -> None:
@@ -225,6 +277,16 @@ def test_a_manifest_says_what_each_clip_is_watched_for(place: Path) -> None:
         {"gripper": "new"},
     )
     assert second == Clip(place / "deep/b.avi")
+
+
+@pytest.mark.parametrize("words", [["m.csv", "."], [".", "m.csv"]])
+def test_what_a_manifest_says_holds_wherever_else_its_clips_are_named(
+    place: Path, words: list[str]
+) -> None:
+    (place / "m.csv").write_text("source,gripper\na.mp4,new\n")
+    labels = {Path(str(c.source)).name: c.labels for c in clips_of(words)}
+    assert labels.pop("a.mp4") == {"gripper": "new"}
+    assert list(labels.values()) == [{}, {}, {}]
 
 
 def test_the_manifest_of_the_page_is_one(tmp_path: Path) -> None:

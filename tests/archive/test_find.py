@@ -218,14 +218,25 @@ def test_and_then_is_written_in_the_rule_language(text: str, meant: str) -> None
         ("touching(a, b) and then", "something is missing beside `and then`"),
         ("gap(a, b)", "neither true nor false"),
         ("toching(a, b)", "touching"),
-        ("touching(a, b", ""),
-        ("", ""),
+        ("touching(a, b", "condition:1:14: ')' is missing\n    touching(a, b\n"),
+        (
+            "touching(arm satellite)",
+            "condition:1:13: ',' is missing\n    touching(arm satellite)\n",
+        ),
+        (
+            "touching(a, b) and then diverges(a, b) within 5 s",
+            "condition:1:1: there is no relation",
+        ),
+        ("touching(a, b) fro 2 s", "condition:1:16: 'fro' does not belong here"),
+        ("touching(a, b) and", "'touching(a, b) and' ends too early"),
+        ("", "there is no condition"),
     ],
 )
 def test_what_is_no_condition_is_refused(text: str, said: str) -> None:
     with pytest.raises((RuleError, ErrorGroup)) as told:
         read_search(text)
     assert said in str(told.value)
+    assert "watched" not in str(told.value)  # the rule that is made of it
 
 
 def test_a_sequence_is_true_once_it_is_complete(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ class Clip:
 
 
 def clips_of(sources: Iterable[str]) -> list[Clip]:
-    """The clips that some words name, in their order, each once.
+    """The clips that some words name, in their order, each once, with what a manifest says of them.
 
     Args:
         sources: Files; folders of images; folders in which clips are looked for, also further down; patterns
@@ -60,7 +60,8 @@ def clips_of(sources: Iterable[str]) -> list[Clip]:
     found: dict[Path | StoredFile, Clip] = {}
     for word in sources:
         for clip in _named(word):
-            found.setdefault(clip.source, clip)
+            if found.get(clip.source, bare := Clip(clip.source)) == bare:
+                found[clip.source] = clip
     return list(found.values())
 
 

@@ -7,20 +7,17 @@ handed over at a time, so that a scheduler never holds a hundred thousand of the
 
 from __future__ import annotations
 
-import logging
-import multiprocessing
-import time
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
-from threading import Event, Thread
 from typing import Any
 
 from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import SettingsError
 from visup.archive.extra import imported
 from visup.archive.filling.attempts import Attempts
+from visup.archive.filling.own_workers import OwnWorkers, own_workers
 from visup.archive.filling.pieces import ClipPiece, PieceBook, given_up, watch_piece
 from visup.archive.filling.plan import FailedClip, Job
 from visup.archive.filling.pool_settings import PoolSettings
@@ -31,9 +28,6 @@ WAITING_PER_WORKER = 3
 """Jobs handed over for each worker: while one is watched, the next is there."""
 CONNECT_S = 20
 MOST_RESUBMISSIONS = 5
-STARVED_S = 60.0
-"""How long workers of this machine may all be away, before one no longer waits for them."""
-LOOK_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +37,12 @@ class Pool:
     Attributes:
         client: Of Dask, or None for this process.
         dashboard: Address of Dask's dashboard, or None.
-        own: Whether the workers were started for this, so that none are to be waited for once all are gone.
+        own: Its workers, when they were started for this.
     """
 
     client: Any = None
     dashboard: str | None = None
-    own: bool = False
+    own: OwnWorkers | None = None
 
     def outcomes(
         self, lake: Lake, jobs: Sequence[Job], watch: Watch = watch_into
@@ -75,50 +69,9 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
         with _connected(distributed, settings.scheduler) as client:
             yield Pool(client, client.dashboard_link)
         return
-    memory = "auto" if settings.memory_gb is None else int(settings.memory_gb * 1e9)
     has_dashboard = find_spec("bokeh") is not None
-    with (
-        _quiet(),
-        _loaded_once(distributed),
-        distributed.LocalCluster(
-            n_workers=settings.processes,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            memory_limit=memory,
-            dashboard_address="127.0.0.1:0",  # any free port: several may fill lakes here
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield Pool(client, cluster.dashboard_link if has_dashboard else None, own=True)
-
-
-@contextmanager
-def _loaded_once(distributed: Any) -> Iterator[None]:
-    """Workers are forked from a process that has loaded all that they need, and done nothing else.
-
-    So a worker in place of one that died is there at once, and what is loaded stands in memory once.
-    """
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        yield
-        return
-    with imported("dask").config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
-        server = distributed.utils.get_mp_context()
-        server.set_forkserver_preload(["distributed", watch_piece.__module__, "visup.runs.wiring"])
-        yield
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Workers that die are told of in visup's words, and not in Dask's."""
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
+    with own_workers(settings) as own, distributed.Client(own.cluster) as client:
+        yield Pool(client, own.cluster.dashboard_link if has_dashboard else None, own)
 
 
 def _connected(distributed: Any, address: str) -> Any:
@@ -137,36 +90,6 @@ def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome
     while piece := book.next():
         if outcome := book.done(piece, watch_piece(lake, piece, watch)):
             yield outcome
-
-
-@contextmanager
-def _lost_when_starved(pool: Pool, running: Collection[Any]) -> Iterator[None]:
-    """Meanwhile jobs are taken back when all workers of this machine are gone, and none comes after them.
-
-    Dask replaces a worker that dies, unless the process dies that workers are forked from.
-    """
-    over = Event()
-
-    def look() -> None:
-        seen = time.monotonic()
-        # That the scheduler is gone is told where it is asked.
-        with suppress(OSError, RuntimeError):
-            while not over.wait(LOOK_S):
-                if pool.client.ncores():
-                    seen = time.monotonic()
-                elif time.monotonic() - seen > STARVED_S:
-                    pool.client.cancel(list(running), force=True)
-                    return
-
-    watcher = Thread(target=look, name="workers", daemon=True)
-    if pool.own:
-        watcher.start()
-    try:
-        yield
-    finally:
-        over.set()
-        if pool.own:
-            watcher.join(CONNECT_S)
 
 
 def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
@@ -190,10 +113,15 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
 
     for _ in range(max(1, len(client.ncores())) * WAITING_PER_WORKER):
         submit(book.next())
-    with _lost_when_starved(pool, running):
+
+    def take_back() -> None:
+        client.cancel(list(running), force=True)
+
+    with pool.own.kept(client, take_back) if pool.own else nullcontext():
         for future in completed:
-            piece, again = running.pop(future)
+            piece, again = running[future]
             outcome = _outcome(lake, piece, future, again)
+            del running[future]
             if outcome is None:
                 submit(piece, again + 1)
                 continue
@@ -207,13 +135,14 @@ def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutco
     """What became of a piece; None when it is to be handed over once more."""
     run, source = piece.job.run, piece.job.settings.source
     if future.status == "finished":
-        found: ClipOutcome = future.result()
-        return found
+        with suppress(Exception):  # its worker has died since, with the result
+            found: ClipOutcome = future.result()
+            return found
     if Attempts(lake.path, piece.key).exhausted:
         return given_up(lake, piece)
     if future.status != "error":
         raise SettingsError(
-            "the scheduler was lost, or all workers",
+            "all workers were lost, or the scheduler",
             hint="run the same command again: what is in the lake is kept, and the rest is done",
         )
     if again >= MOST_RESUBMISSIONS:

@@ -28,6 +28,9 @@ def read_pattern(text: str) -> Expression:
         RuleError: It is none, or not as it should be.
         ManyErrors: It has several faults.
     """
+    if len(parts := list(_parts(text))) > 1:
+        for part in parts:  # what is wrong with one is told at its own place
+            expression(_said(_WITHIN.sub(r"\g<what>", part)))
     found = expression(desugared(text))
     if found.quantity:
         raise RuleError(

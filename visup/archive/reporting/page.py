@@ -38,7 +38,7 @@ def lake_page(found: LakeStatistics, lake: Path) -> str:
         "tiles": _tiles(found),
         "verdicts": figures([verdict_figure(found)], "No run says when it was taken."),
         "durations": _duration_table(found.durations, ""),
-        "weeks": figures(duration_figures(found), "No stage was followed."),
+        "weeks": figures(duration_figures(found), "No stage is of a week that is known."),
         "actors": _duration_table(found.by_actor, "who played, or label"),
         "drifts": _drifts(found),
         "failures": _failures(found),
@@ -67,7 +67,11 @@ def _tiles(found: LakeStatistics) -> str:
     ended: dict[str, int] = {}
     for _, verdict, count in found.verdicts:
         ended[verdict] = ended.get(verdict, 0) + count
-    facts = {"runs": f"{found.runs:,}", "hours of video": f"{found.hours:,.1f}"}
+    facts = {"runs": f"{found.runs:,}"}
+    if found.hours < 1.0:
+        facts["minutes of video"] = f"{60.0 * found.hours:.1f}"
+    else:
+        facts["hours of video"] = f"{found.hours:,.1f}"
     facts |= {v.replace("_", " "): f"{n:,}" for v, n in sorted(ended.items()) if v != "none"}
     tiles = (f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in facts.items())
     return f"<dl class=tiles>{''.join(tiles)}</dl>"

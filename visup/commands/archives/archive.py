@@ -191,9 +191,9 @@ def compact(
         done = compacting.compact(found, grace_s=0.0 if now else compacting.GRACE_S)
         if store:
             store.push(found)
-    ending = "" if done.partitions == 1 else "s"
-    said = f"Merged {done.joined} runs; the lake has {done.partitions} partition{ending}."
-    gone = f" Replaced files of {done.tidied} runs were removed." if done.tidied else ""
+        merged = _counted(done.joined, "run")
+        said = f"Merged {merged}; the lake has {_counted(done.partitions, 'partition')}."
+        gone = f" Replaced files of {done.tidied} runs were removed." if done.tidied else ""
     echo(f"{said}{gone}")
 
 
@@ -222,7 +222,7 @@ def report(
     with open_database(open_lake(lake)) as database:
         found = lake_statistics(database)
     write_lake_page(found, Path(lake), path)
-    echo(f"{path}: {found.runs} runs")
+    echo(f"{path}: {_counted(found.runs, 'run')}")
 
 
 @app.command("replay")
@@ -338,7 +338,7 @@ def _print_plan(console: Console, into: str, plan: Plan, workers: int) -> None:
     from visup.archive.filling.filling import estimated_s
     from visup.archive.storing.places import copy_of
 
-    said = [f"{len(plan.jobs)} to watch ({plan.bytes / 1e6:.0f} MB)"]
+    said = [f"{len(plan.jobs)} to watch ({_size(plan.bytes)})"]
     cut = [len(job.spans) for job in plan.jobs if job.spans]
     said += [f"{len(cut)} of them in {sum(cut)} chunks"] if cut else []
     said += [f"{plan.present} already in the lake"] if plan.present else []
@@ -346,7 +346,7 @@ def _print_plan(console: Console, into: str, plan: Plan, workers: int) -> None:
     said += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
     seconds = estimated_s(copy_of(into), plan.bytes, workers)
     if plan.jobs and seconds is not None:
-        said.append(f"about {_duration(seconds)} on {max(1, workers)} worker(s)")
+        said.append(f"about {_duration(seconds)} on {_counted(max(1, workers), 'worker')}")
     console.print(f"Clips: {', '.join(said)}.", soft_wrap=True, markup=False)
 
 
@@ -354,11 +354,11 @@ def _closing(result: FillResult) -> Iterator[str]:
     if result.added and result.work_s:
         rate = result.video_s / result.work_s
         yield (
-            f"{result.added} runs added, {_duration(result.video_s)} of video; "
+            f"{_counted(result.added, 'run')} added, {_duration(result.video_s)} of video; "
             f"each worker watched {rate:.2f} s of video per second."
         )
     if result.failed:
-        yield f"{len(result.failed)} clips have no run:"
+        yield f"{_counted(len(result.failed), 'clip')} without a run:"
         yield from (f"  {f.source}: {f.reason.splitlines()[0]}" for f in result.failed)
 
 
@@ -366,3 +366,12 @@ def _duration(seconds: float) -> str:
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _size(count: int) -> str:
+    """So many bytes, in what can be read at a glance."""
+    return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e6:.1f} MB"

@@ -131,8 +131,13 @@ def _tell(console: Console, found: FoundRun, as_json: bool) -> None:
         console.print(f"{found.clip}", style="bold", soft_wrap=True, markup=False)
         for line in _lines(found.hits):
             console.print(f"  {line}", soft_wrap=True, markup=False)
+        first = found.hits[0].begin
         console.print(
-            f"  inspect it: visup step {found.folder}", soft_wrap=True, markup=False, style="dim"
+            f"  inspect it: visup step {found.folder} (then: go {first:.1f}s),"
+            f" or visup console {found.folder}",
+            soft_wrap=True,
+            markup=False,
+            style="dim",
         )
 
 

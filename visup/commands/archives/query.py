@@ -73,7 +73,8 @@ def query(
         answer = database.ask(sql)
     if options.out:
         write_answer(answer, form, options.out)
-        echo(f"{options.out}: {answer.num_rows} rows")
+        rows = "1 row" if answer.num_rows == 1 else f"{answer.num_rows} rows"
+        echo(f"{options.out}: {rows}")
     elif form == "json":
         echo_json(answer_rows(answer))
     elif form == "csv":
@@ -89,6 +90,9 @@ def _show(console: Console, answer: pa.Table) -> None:
     from visup.archive.asking.answers import cell
     from visup.terminal.tables import table
 
+    if not answer.num_rows:
+        console.print(f"No rows ({', '.join(answer.column_names)}).", markup=False, soft_wrap=True)
+        return
     shown = table(*map(escape, answer.column_names))
     head = answer.slice(0, SHOWN_ROWS)
     columns = [column.to_pylist() for column in head.columns]

@@ -44,7 +44,12 @@ MACHINERY_EVALUATIONS = (
             ),
             count("formulas", 50, "exact: number of random conditions.", 1),
             count("every", 4, "exact, large: use every n-th frame of a mission."),
-            count("kills", 4, "kills: workers to kill, and a tenth as many schedulers.", 0),
+            count(
+                "kills",
+                4,
+                "kills: workers to kill, and a tenth as many commands, and processes that start workers.",
+                0,
+            ),
             count("clips", 8, "kills: number of short clips."),
             count("runs", 1_000, "large: number of runs, of a thousand rows each."),
             count("frames", 100, "throughput: frames per mission."),

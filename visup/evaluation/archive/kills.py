@@ -5,12 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent.model.errors import OutputError
 from visup.archive.extra import imported
@@ -18,27 +20,39 @@ from visup.archive.lake import Lake
 from visup.archive.schema import TABLES
 from visup.evaluation.figures import Progress
 
-FRAMES = 50
+FRAMES = 16
 SIZE = (160, 120)
+DISC = 31
+STEP = 5
+"""Pixels that a disc moves in a frame."""
 WORKERS = 2
-SLOWEST_S = 1800.0
+SLOWEST_S = 3600.0
+Gray = NDArray[np.uint8]
+KINDS = ("workers", "starters", "heads")
+"""Who is killed: workers, the processes that these are started by, the command with all of them."""
 
 
-def write_clips(folder: Path, count: int) -> Path:
-    """Short clips, no two alike: a textured disc crosses a textured ground."""
+def write_clips(folder: Path, count: int, seed: int = 0) -> Path:
+    """Short clips, no two alike: two textured discs pass each other before a textured ground."""
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(count):
-        rng = np.random.default_rng(number)
-        ground = cv2.GaussianBlur(rng.integers(0, 120, SIZE[::-1]).astype(np.uint8), (0, 0), 1.5)
-        disc = cv2.GaussianBlur(rng.integers(120, 255, (31, 31)).astype(np.uint8), (0, 0), 1.5)
+        rng = np.random.default_rng((seed, number))
+        ground = _texture(rng, (0, 120), SIZE[::-1])
+        discs = [_texture(rng, (120, 255), (DISC, DISC)) for _ in range(2)]
         kind, path = cv2.VideoWriter.fourcc(*"MJPG"), folder / f"clip-{number:04}.avi"
         writer = cv2.VideoWriter(str(path), kind, 25.0, SIZE)
         for index in range(FRAMES):
-            image = ground.copy()
-            image[40:71, 8 + 2 * index : 39 + 2 * index] = disc
+            image, x = ground.copy(), 8 + STEP * index
+            image[20 : 20 + DISC, x : x + DISC] = discs[0]
+            image[70 : 70 + DISC, SIZE[0] - x - DISC : SIZE[0] - x] = discs[1]
             writer.write(np.repeat(image[:, :, None], 3, axis=2))
         writer.release()
     return folder
+
+
+def _texture(rng: np.random.Generator, values: tuple[int, int], shape: tuple[int, int]) -> Gray:
+    rough = rng.integers(*values, shape).astype(np.uint8)
+    return cv2.GaussianBlur(rough, (0, 0), 1.5).astype(np.uint8)
 
 
 def compare_killed(
@@ -46,36 +60,44 @@ def compare_killed(
 ) -> dict[str, Any]:
     """Fill a lake undisturbed, and one while processes are killed; compare them row for row.
 
+    Kills are spread over about as long as filling the lake undisturbed takes. Should it be full before all
+    of them are done, further lakes are filled, and compared, too.
+
     Args:
-        place: A folder for both.
+        place: A folder for all lakes.
         clips: How many short clips.
         kills: How many times a worker is killed.
-        heads: How many times the command is, with its scheduler and all its workers.
-        seed: Of when, and whom.
+        heads: How many times the command is, with its scheduler and all its workers; and as many times one
+            of the processes that workers are started by.
+        seed: Of the clips, and of when and whom.
         progress: Shows what is being done.
 
     Returns:
-        `clips`, `kills` and `heads` that were done, `calls` of the command, `runs` in the lake, `rows`
-        compared, and `different` rows.
+        `clips`, `workers`, `starters` and `heads` that were killed, `calls` of the command, `lakes` that were
+        filled, `rows` compared, and `different` rows.
     """
-    footage, rng = write_clips(place / "clips", clips), Random(seed)
+    footage = write_clips(place / "clips", clips, seed)
     progress("undisturbed")
-    _wait(_begun(footage, place / "whole"))
-    done = {"kills": 0, "heads": 0, "calls": 0}
     begin = time.monotonic()
-    lake = place / "killed"
-    while len(_runs(lake)) < clips or done["kills"] < kills or done["heads"] < heads:
-        if time.monotonic() - begin > SLOWEST_S:
-            break
-        if len(_runs(lake)) == clips:  # all is there before all kills are done: one more lake
-            lake = lake.with_name(f"{lake.name}-more")
-        progress(f"{len(_runs(lake))} of {clips} runs, {done['kills']} workers killed")
-        _disturbed(footage, lake, (kills, heads), done, rng)
-    lakes = sorted(place.glob("killed*"))
+    _wait(_begun(footage, place / "whole"))
+    took, begin = time.monotonic() - begin, time.monotonic()
+    killer = RandomKills(
+        dict(zip(KINDS, (kills, heads, heads), strict=True)),
+        2.0 * took / (kills + 2 * heads),
+        Random(seed),
+    )
+    calls, lakes = 0, [place / "killed"]
+    while (killer.left or len(_runs(lakes[-1])) < clips) and time.monotonic() - begin < SLOWEST_S:
+        if len(_runs(lakes[-1])) == clips:
+            lakes.append(place / f"killed-{len(lakes)}")
+        progress(f"{len(_runs(lakes[-1]))} of {clips} runs, {sum(killer.left.values())} kills left")
+        calls += 1
+        killer.disturb(_begun(footage, lakes[-1]))
     rows = [_differences(place / "whole", each) for each in lakes]
     return {
         "clips": clips,
-        **done,
+        **killer.done,
+        "calls": calls,
         "lakes": len(lakes),
         "rows": sum(r[0] for r in rows),
         "different": sum(r[1] for r in rows),
@@ -96,31 +118,56 @@ def _wait(process: subprocess.Popen[bytes]) -> None:
         raise OutputError(f"`visup archive run` ended with {process.returncode}")
 
 
-def _disturbed(
-    footage: Path, lake: Path, wanted: tuple[int, int], done: dict[str, int], rng: Random
-) -> None:
-    """One call of the command, during which workers are killed, and perhaps it is itself."""
-    process = _begun(footage, lake)
-    done["calls"] += 1
-    while process.poll() is None:
-        time.sleep(rng.uniform(0.2, 2.5))
-        family = _family(process.pid)
-        if done["heads"] < wanted[1] and rng.random() < 0.25:
-            done["heads"] += 1
-            _kill([process.pid, *family])
-        elif family and done["kills"] < wanted[0]:
-            done["kills"] += 1
-            _kill([rng.choice(family)])
-    process.wait()
+class RandomKills:
+    """Kills processes of the command at random moments.
+
+    Args:
+        wanted: How often, for each of `KINDS`.
+        pause_s: The longest time between two kills.
+        rng: Of when, and whom.
+    """
+
+    def __init__(self, wanted: Mapping[str, int], pause_s: float, rng: Random) -> None:
+        self._wanted, self._pause_s, self._rng = wanted, pause_s, rng
+        self.done = dict.fromkeys(wanted, 0)
+
+    @property
+    def left(self) -> dict[str, int]:
+        """How many kills of each kind are still to be done."""
+        left = {kind: self._wanted[kind] - self.done[kind] for kind in self._wanted}
+        return {kind: count for kind, count in left.items() if count > 0}
+
+    def disturb(self, process: subprocess.Popen[bytes]) -> None:
+        """Kill processes of one call of the command, and perhaps itself, until it has ended."""
+        while process.poll() is None:
+            time.sleep(self._rng.uniform(0.0, self._pause_s))
+            if not (left := self.left):
+                process.wait()
+                return
+            kind = self._rng.choices(list(left), list(left.values()))[0]
+            if victims := self._victims(process.pid, kind):
+                self.done[kind] += 1
+                _kill(victims)
+        process.wait()
+
+    def _victims(self, command: int, kind: str) -> list[int]:
+        """Who is to be killed at once: one worker, one of those that start them, or all."""
+        starters, everybody = _family(command)
+        if kind == "heads":
+            return [command, *everybody]
+        those = starters if kind == "starters" else sorted({*everybody} - {*starters})
+        return [self._rng.choice(those)] if those else []
 
 
-def _family(process: int) -> list[int]:
-    """The processes that one has started, those of these among them."""
+def _family(process: int) -> tuple[list[int], list[int]]:
+    """The processes that one has started, and those with all that these have started."""
     psutil = imported("psutil")
     try:
-        return [child.pid for child in psutil.Process(process).children(recursive=True)]
+        command = psutil.Process(process)
+        below = [[p.pid for p in command.children(recursive=deep)] for deep in (False, True)]
     except psutil.Error:
-        return []
+        return [], []
+    return below[0], below[1]
 
 
 def _kill(processes: list[int]) -> None:

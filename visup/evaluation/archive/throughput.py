@@ -5,7 +5,8 @@ from __future__ import annotations
 import shutil
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,10 +37,12 @@ def measure_throughput(
 
     Returns:
         `video_s` of a round; `plain_s`, `lake_s`, `one_s` and `two_s`, medians; `speedup` of two workers over
-        one, and `overhead` of a lake over plain watching on one process, a share.
+        one; `overhead` of a lake over plain watching on one process, a share, and `overhead_cpu`, the same of
+        processor time, which other work on the machine changes little.
     """
     clips = [_beginning(m / "video.mp4", place / f"{m.name}.avi", frames) for m in missions]
     taken: dict[str, list[float]] = {name: [] for name in ("plain", "lake", "one", "two")}
+    busy: dict[str, list[float]] = {name: [] for name in taken}
     video_s = 0.0
     with open_pool(PoolSettings(workers=1)) as one, open_pool(PoolSettings(workers=2)) as two:
         for pool in (one, two):  # what is loaded once a worker is loaded
@@ -47,18 +50,30 @@ def measure_throughput(
         _plain(place / "warm-run", clips)
         for number in range(rounds):
             progress(f"round {number + 1} of {rounds}")
-            taken["plain"].append(_plain(place / "run", clips))
-            for name, pool in (("lake", Pool()), ("one", one), ("two", two)):
-                seconds, video_s = _filled(place / name, clips, pool)
-                taken[name].append(seconds)
+            ways: Mapping[str, Callable[[], float]] = {
+                "plain": partial(_plain, place / "run", clips),
+                "lake": partial(_filled, place / "lake", clips, Pool()),
+                "one": partial(_filled, place / "one", clips, one),
+                "two": partial(_filled, place / "two", clips, two),
+            }
+            for name, way in ways.items():
+                begin, begun = time.perf_counter(), time.process_time()
+                video_s = way()
+                taken[name].append(time.perf_counter() - begin)
+                busy[name].append(time.process_time() - begun)
     ratios = zip(taken["one"], taken["two"], strict=True)
-    costs = zip(taken["lake"], taken["plain"], strict=True)
     return {
         "video_s": video_s,
         **{f"{name}_s": statistics.median(of) for name, of in taken.items()},
         "speedup": statistics.median(a / b for a, b in ratios),
-        "overhead": statistics.median(a / b for a, b in costs) - 1.0,
+        "overhead": _overhead(taken),
+        "overhead_cpu": _overhead(busy),
     }
+
+
+def _overhead(seconds: Mapping[str, Sequence[float]]) -> float:
+    costs = zip(seconds["lake"], seconds["plain"], strict=True)
+    return statistics.median(a / b for a, b in costs) - 1.0
 
 
 def _beginning(source: Path, target: Path, frames: int) -> Path:
@@ -78,25 +93,22 @@ def _beginning(source: Path, target: Path, frames: int) -> Path:
 
 
 def _plain(folder: Path, clips: Sequence[Path]) -> float:
-    begin = time.perf_counter()
+    """Watch clips into run folders; gives no seconds of video, since a lake tells them alone."""
     for number, clip in enumerate(clips):
         place = folder / str(number)
         place.mkdir(parents=True)
         watch_into(WatchSettings(str(clip)), place)
-    seconds = time.perf_counter() - begin
     shutil.rmtree(folder)
-    return seconds
+    return 0.0
 
 
-def _filled(folder: Path, clips: Sequence[Path], pool: Pool) -> tuple[float, float]:
-    """Seconds that it takes to fill a new lake, and seconds of video."""
+def _filled(folder: Path, clips: Sequence[Path], pool: Pool) -> float:
+    """Fill a new lake; gives the seconds of video."""
     lake = Lake.create(folder)
-    begin = time.perf_counter()
     plan = make_plan(lake, [Clip(c, taken=0.0) for c in clips], WatchSettings(""))
     result = fill(lake, plan, pool, _silent)
-    seconds = time.perf_counter() - begin
     shutil.rmtree(folder)
-    return seconds, result.video_s
+    return result.video_s
 
 
 def _silent(outcome: ClipOutcome) -> None:
