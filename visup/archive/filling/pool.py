@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
+import cv2
+
 from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import SettingsError
 from visup.archive.extra import imported
@@ -92,6 +94,12 @@ def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome
             yield outcome
 
 
+def _on_worker(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
+    """Do a piece on one core: the others have workers of their own, and threads would be in their way."""
+    cv2.setNumThreads(1)
+    return watch_piece(lake, piece, watch)
+
+
 def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
     distributed, client = imported("distributed"), pool.client
     book, running = PieceBook(jobs), dict[Any, tuple[ClipPiece, int]]()
@@ -101,7 +109,7 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
         if piece is None:
             return
         future = client.submit(
-            watch_piece,
+            _on_worker,
             Lake(lake.path.absolute()),
             piece,
             watch,
