@@ -22,10 +22,8 @@ from visup.archive.filling.pool_settings import PoolSettings
 
 MOST_RENEWALS = 6
 """How often workers are started in place of lost ones, before all of them have been there again."""
-STARVED_S = 120.0
-"""How long all workers may be away before one no longer waits for them."""
-START_S = 300
-"""How long a worker may take to start in place of another one, before Dask gives up its place."""
+START_S = 300.0
+"""How long a worker may take to start in place of another one; a busy machine needs minutes for it."""
 LOOK_S = 1.0
 
 
@@ -61,7 +59,7 @@ class OwnWorkers:
                     if there := len(client.ncores()):
                         seen = time.monotonic()
                     self._renew(there)
-                    if time.monotonic() - seen > STARVED_S or self._given_up(there):
+                    if time.monotonic() - seen > START_S or self._given_up(there):
                         starve()
                         return
 
@@ -127,7 +125,7 @@ def _loaded_once(distributed: Any) -> Iterator[None]:
 
     So a worker in place of one that died is there at once, and what is loaded stands in memory once.
     """
-    changed: dict[str, Any] = {"distributed.deploy.lost-worker-timeout": START_S}
+    changed: dict[str, Any] = {"distributed.deploy.lost-worker-timeout": f"{START_S} s"}
     if "forkserver" in multiprocessing.get_all_start_methods():
         changed["distributed.worker.multiprocessing-method"] = "forkserver"
     with imported("dask").config.set(changed):
