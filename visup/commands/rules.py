@@ -139,8 +139,8 @@ def judge(
         ]
         echo_json(rows, indent=2)
         return
-    for span in found or ["no rule was true"]:
-        echo(str(span))
+    for line in map(str, found) if found else ("no rule was true",):
+        echo(line)
 
 
 def _minds(source: str, setting: Given) -> Iterator[Mind]:

@@ -19,6 +19,7 @@ from visup.rules.language.parser import parse_rules
 from visup.rules.safety.signal_rules import RuleSpan, judge_rule
 
 CUT = Ends("cut", "cut")
+Row = tuple[float, dict[str, Any]]
 
 
 def rule(when: str, head: str = "hot()") -> Rule:
@@ -26,7 +27,7 @@ def rule(when: str, head: str = "hot()") -> Rule:
     return found
 
 
-def spans(when: str, *rows: tuple[float, dict[str, Any]], reading: Any = "held") -> list[Any]:
+def spans(when: str, *rows: Row, reading: Any = "held") -> list[Any]:
     told = judge_rule(rule(when), rows, reading, CUT, 10.0)
     return [(s.begin_s, s.end_s) for s in told if s.truth is Truth.TRUE]
 
@@ -49,7 +50,11 @@ def test_numbers_may_lie_on_a_line_between_samples() -> None:
 
 
 def test_words_and_truth_values_are_signals_too() -> None:
-    rows = [(0.0, {"mode": "auto", "fan": True}), (4.0, {"mode": "hand"}), (6.0, {"fan": 0})]
+    rows: list[Row] = [
+        (0.0, {"mode": "auto", "fan": True}),
+        (4.0, {"mode": "hand"}),
+        (6.0, {"fan": 0}),
+    ]
     assert spans("signal_is(mode, auto) and signal_on(fan)", *rows) == [(0.0, 4.0)]
     assert spans("not signal_known(fan)", *rows) == [(4.0, 6.0)]
     assert spans("not signal_on(fan)", *rows) == [(6.0, 10.0)]
@@ -59,7 +64,7 @@ def test_what_is_not_known_neither_alerts_nor_suspends() -> None:
     suspended = parse_rules(
         'rule hot(): warning\n when signal(heat) > 5\n unless signal_on(fan)\n say "Hot."\n'
     )[0]
-    rows = [(0.0, {"heat": 9}), (2.0, {"heat": 9, "fan": True}), (4.0, {"fan": False})]
+    rows: list[Row] = [(0.0, {"heat": 9}), (2.0, {"heat": 9, "fan": True}), (4.0, {"fan": False})]
     assert judge_rule(suspended, rows, "held", CUT, 6.0) == [
         RuleSpan("hot", 0.0, 2.0, Truth.TRUE),
         RuleSpan("hot", 4.0, 6.0, Truth.UNKNOWN),
