@@ -22,14 +22,14 @@ def known_signals(mind: Mind) -> Mapping[str, Any]:
 
 def number(facts: Snapshot, name: str) -> Floats:
     """A signal that is a number, as an interval; unknown of any other."""
-    value = _number_of(known_signals(facts.mind).get(name))
+    value = number_of(known_signals(facts.mind).get(name))
     return np.array([-np.inf, np.inf] if value is None else [value, value])
 
 
 def is_on(facts: Snapshot, name: str) -> Codes:
     """Whether a signal is true, or a number other than 0; unknown of a word."""
     value = known_signals(facts.mind).get(name)
-    plain = isinstance(value, bool | np.bool_) or _number_of(value) is not None
+    plain = isinstance(value, bool | np.bool_) or number_of(value) is not None
     return _code(bool(value) if plain else None)
 
 
@@ -44,7 +44,7 @@ def is_known(facts: Snapshot, name: str) -> Codes:
     return _code(known_signals(facts.mind).get(name) is not None)
 
 
-def _number_of(value: Any) -> float | None:
+def number_of(value: Any) -> float | None:
     """A signal as a number; None of what is none."""
     plain = isinstance(value, int | float | np.integer | np.floating)
     if not plain or isinstance(value, bool) or not np.isfinite(value):

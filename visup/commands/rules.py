@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -100,6 +100,47 @@ def explain(
     told = explanations(mind, rule)
     for text in told or [f"at {mind.time:g} s too few objects are in view to evaluate any rule"]:
         echo(text)
+
+
+@app.command()
+def judge(
+    file: Annotated[Path, typer.Argument(help="A rule file; its rules are about signals alone.")],
+    signals: Annotated[
+        Path,
+        typer.Option("--signal", help="Table of signals (CSV) whose first column is the time."),
+    ],
+    reading: Annotated[
+        Literal["held", "linear", "samples"],
+        typer.Option("--between", help="Values between samples: held, linear, or samples alone."),
+    ] = "held",
+    ends: Annotated[
+        Literal["unknown", "cut", "lasting", "weak", "strong"],
+        typer.Option(
+            help="Outside the recording: unknown; no part of any window; the last value; or, of what "
+            "is undecided, the best or the worst. All but the first cut windows at the first sample."
+        ),
+    ] = "unknown",
+    end: Annotated[float | None, typer.Option(help="End of the recording, seconds.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Report exactly when rules about signals were true, also between samples."""
+    from visup.percepts.signals.files import read_signals
+    from visup.rules.dense_time import Ends
+    from visup.rules.language.parser import load_rules
+    from visup.rules.safety.signal_rules import judge_rule
+
+    table, outside = read_signals(signals), Ends("unknown" if ends == "unknown" else "cut", ends)
+    samples = list(zip(table.times, table.rows, strict=True))
+    found = [s for r in load_rules(file) for s in judge_rule(r, samples, reading, outside, end)]
+    if as_json:
+        rows = [
+            {"rule": s.rule, "begin_s": s.begin_s, "end_s": s.end_s, "truth": s.truth.value}
+            for s in found
+        ]
+        echo_json(rows, indent=2)
+        return
+    for line in map(str, found) if found else ("no rule was true",):
+        echo(line)
 
 
 def _minds(source: str, setting: Given) -> Iterator[Mind]:
