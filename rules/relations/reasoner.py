@@ -187,8 +187,12 @@ RELATIONS = MemoryKey("rules.relations", RelationMemory())
 
 def kinematics(mind: Mind) -> Kinematics:
     """The quantities of the last step, as `RelationReasoner` left them in the mind."""
-    kept = mind.recall(RELATIONS)
-    return kept.measured
+    return mind.recall(RELATIONS).measured
+
+
+def sample_window(mind: Mind) -> SampleWindow:
+    """The last samples of all bodies, as `RelationReasoner` left them in the mind."""
+    return mind.recall(RELATIONS).history
 
 
 def relation_of(mind: Mind, name: str, a: int, b: int) -> Relation | None:

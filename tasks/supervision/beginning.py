@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from visup.agent import StageBelief, Status
 from visup.agent.model.fast_replace import replace
-from visup.rules.formula.truth import YES
-from visup.rules.predicates.snapshot import Snapshot
-from visup.rules.predicates.vocabulary import PREDICATES
 from visup.tasks.automaton.states import leaves
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.snapshot import TaskSnapshot
+from visup.tasks.verification.setting_out import setting_out
 
 
 def with_begun(
@@ -20,7 +18,7 @@ def with_begun(
     Args:
         before: The stages as they were believed last, in the same order.
         stages: As they are believed now.
-        stirs: Whether one who plays in what is under way moves: with that a task begins.
+        stirs: Whether one who plays in what is under way sets out: with that a task begins.
     """
     stirs = stirs and is_first(before)
     pairs = zip(before, stages, strict=True)
@@ -46,7 +44,7 @@ CAME_LATER_S = 0.3
 
 
 def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
-    """Whether an actor of the most likely current steps moves, or has just appeared."""
+    """Whether an actor of the most likely current steps sets out, or has just appeared."""
     if posterior is None or posterior.likeliest.finished is not None:
         return False
     actors = {a for leaf in leaves(posterior.likeliest.state) for a in leaf.step.actors}
@@ -55,6 +53,4 @@ def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
     start = min((b.first_seen for b in mind.objects.values()), default=0.0)
     if came and max(came) - start > CAME_LATER_S:
         return True
-    facts = Snapshot(mind)
-    moves = PREDICATES["moving"].look(facts)
-    return any(i in facts.row and moves[facts.row[i]] == YES for i in ids)
+    return not setting_out(mind).isdisjoint(ids)

@@ -9,11 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition, with_payloads
 from visup.tasks.automaton.derivatives import begin, derivatives, enter
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
 from visup.tasks.verification.step_monitor import StepMonitor, entered
+
+FIRST_LOOK_S = 0.5
+"""What has been so from the first look on is known so long after it: relations take a while to be judged."""
 
 Target = tuple[Transition, tuple[TaskStep, ...], State[int] | None]
 """A transition, the steps that begin by it, and the state it leads to; None at the end."""
@@ -74,8 +78,11 @@ class OpenTransitions:
         self._starts: list[tuple[State[int], int]] = []
 
     def begin(self, now: float) -> list[tuple[State[StepMonitor], int]]:
-        """The states in which the task may begin now, each with its number."""
-        fresh = entered(now)
+        """The states in which the task may begin now, each with its number.
+
+        What was so as long as anybody has looked does not begin a stage that asks for more.
+        """
+        fresh = replace(entered(now), turn=now + FIRST_LOOK_S)
         return [
             (with_payloads(state, [Leaf(x.step, fresh) for x in leaves(state)]), node)
             for state, node in self._beginnings(now)

@@ -2,8 +2,8 @@
 
 Read in this order: `observe.py` (the current observation of an action), `stage_conditions.py` (what the task
 itself says of the beginning, end, progress and failure of a step), `step_monitor.py` (the status of a
-step over time), `reported.py` (relations of actors as reported), `step_model.py` (how well the
-observations fit it), `settings.py` (the time constants).
+step over time), `setting_out.py` (who begins to move), `reported.py` (relations of actors as reported),
+`step_model.py` (how well the observations fit it), `settings.py` (the time constants).
 """
 
 from visup.tasks.verification.observe import ActionObservation, observe

@@ -1,0 +1,98 @@
+"""Who sets out: a body that moves, or a part of it, while the picture as a whole does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats
+from visup.rules.relations.samples import SampleWindow
+from visup.tasks.verification.setting_out import LAG_S, farther_than_others, reaching_out
+
+TIMES = np.arange(0.0, 1.0, 0.1)
+LIMIT = 7.0
+
+shifts = st.tuples(st.floats(-60, 60), st.floats(-60, 60))
+
+
+def window(reach: Floats, free: Floats | None = None) -> SampleWindow:
+    """Samples of some bodies whose outlines reach so far; (T, M, 16) pixels."""
+    count, bodies, _ = reach.shape
+    return SampleWindow(
+        tuple(range(bodies)),
+        TIMES[:count],
+        reach,
+        np.ones(reach.shape, dtype=bool) if free is None else free > 0,
+        np.zeros((count, bodies, bodies)),
+        np.zeros((count, bodies)),
+        np.zeros((count, bodies, 2)),
+    )
+
+
+def resting(bodies: int) -> Floats:
+    """Round bodies side by side that rest."""
+    places = np.array([(100.0 * k, 50.0) for k in range(bodies)])
+    return np.repeat((places @ DIRECTIONS.T + 20.0)[None], len(TIMES), axis=0)
+
+
+def path(shift: tuple[float, float]) -> Floats:
+    """(T, 16) how far the outline of a body that moves steadily by a shift reaches beyond its place."""
+    share = np.linspace(0.0, 1.0, len(TIMES))
+    along: Floats = np.outer(share, np.asarray(shift) @ DIRECTIONS.T)
+    return along
+
+
+@given(st.integers(1, 4))
+def test_what_rests_sets_out_nowhere(bodies: int) -> None:
+    assert not reaching_out(window(resting(bodies)), LIMIT).any()
+
+
+@given(st.integers(2, 4), shifts)
+def test_what_all_do_alike_is_the_cameras_doing(bodies: int, shift: tuple[float, float]) -> None:
+    seen = window(resting(bodies) + path(shift)[:, None])
+    assert not reaching_out(seen, LIMIT).any()
+    if np.hypot(*shift) > 1.0:
+        assert not farther_than_others(seen).any()
+
+
+@given(st.integers(1, 4), st.integers(0, 3), shifts)
+def test_one_that_goes_far_enough_is_the_one_that_sets_out(
+    bodies: int, who: int, shift: tuple[float, float]
+) -> None:
+    reach, who = resting(bodies), who % bodies
+    reach[:, who] += path(shift)
+    found = reaching_out(window(reach), LIMIT)
+    lag = np.abs(path(shift)[-1] - path(shift)[round(len(TIMES) - 1 - LAG_S / 0.1)]).max()
+    others = [k for k in range(bodies) if k != who]
+    assert found[who] == (lag > LIMIT) or lag == pytest.approx(LIMIT)
+    assert bodies == 2 or not found[others].any()
+
+
+@given(st.permutations(range(4)), shifts)
+def test_the_order_of_bodies_does_not_matter(order: list[int], shift: tuple[float, float]) -> None:
+    reach = resting(4)
+    reach[:, 1] += path(shift)
+    seen, turned = window(reach), window(reach[:, order])
+    for question in (farther_than_others, lambda w: reaching_out(w, LIMIT)):
+        assert np.array_equal(question(turned), question(seen)[order])
+
+
+def test_a_part_that_reaches_out_is_enough() -> None:
+    reach = resting(3)
+    reach[6:, 0, 3] += 10.0
+    assert reaching_out(window(reach), LIMIT).tolist() == [True, False, False]
+
+
+def test_what_is_cut_by_the_border_tells_nothing() -> None:
+    reach, free = resting(2), np.ones((len(TIMES), 2, FAN))
+    reach[6:, 0, 3] += 10.0
+    free[:, 0, 3] = 0.0
+    assert not reaching_out(window(reach, free), LIMIT).any()
+
+
+def test_a_history_that_is_too_short_tells_nothing() -> None:
+    reach = resting(2)[:3]
+    reach[2, 0] += 30.0
+    assert not reaching_out(window(reach), LIMIT).any()
