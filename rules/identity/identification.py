@@ -55,11 +55,11 @@ class NamesHeard:
     """What was said of an object in one step.
 
     Attributes:
-        kind: By its whole silhouette, by what the image border left of it, or by what found it.
+        kind: By its silhouette, or by what found it.
         hypotheses: Names and views, in any order; empty where nobody looked.
     """
 
-    kind: Literal["whole", "cut", "found"]
+    kind: Literal["shape", "found"]
     hypotheses: tuple[Hypothesis, ...] = ()
 
 
@@ -161,12 +161,9 @@ class IdentityReasoner:
             said, share = self._weighed(mind, belief.id, look, waited), new * visible
             votes = replace(votes, heard=mind.time)
         tallies = {}
-        for kind, tally in (("whole", votes.whole), ("cut", votes.cut), ("found", votes.found)):
-            # What is known of the whole is kept while the border cuts it, as that of what is hidden.
-            kept = kind == "whole" and look.kind == "cut"
-            fade = dt, s.tau_hidden_s if kept else tau
+        for kind, tally in (("shape", votes.shape), ("found", votes.found)):
             heard = said if kind == look.kind else Tally()
-            tallies[kind] = faded(tally, heard, share, fade, s.most_candidates)
+            tallies[kind] = faded(tally, heard, share, (dt, tau), s.most_candidates)
         return joined(replace(votes, **tallies), s, waited)
 
     def _weighed(
@@ -205,9 +202,7 @@ class IdentityReasoner:
 
 def _look(belief: ObjectBelief, said: tuple[Hypothesis, ...], found: Collection[int]) -> NamesHeard:
     """What was said of an object, as what kind of look."""
-    if belief.id in found:
-        return NamesHeard("found", said)
-    return NamesHeard("cut" if belief.region.cut else "whole", said)
+    return NamesHeard("found" if belief.id in found else "shape", said)
 
 
 def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> Mind:

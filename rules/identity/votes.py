@@ -21,11 +21,9 @@ each time, the possibility that the object is none of the models gets the vote o
 similarity `stranger`. While it has the most votes, because all names are weak or change all the
 time, the object is an 'unknown object'.
 
-How much a look tells hangs on its kind (`LookKind`). A silhouette that the image border cuts looks like
-many things, so that such looks are counted apart and weigh less; meanwhile the votes of looks at the whole
-silhouette are kept as those of a hidden object are. What a task expects to see, and no other object is
-believed to be, was more likely before anybody looked: it counts as more similar, since errors of
-similarity last as long as the view, and has some votes from the start.
+Looks at a silhouette are counted apart from those by which a behaviour found the object. What a task expects
+to see, and no other object is believed to be, was more likely before anybody looked: it counts as more
+similar, since errors of similarity last as long as the view, and has some votes from the start.
 
 Votes are read as evidence: the likelihood of a name is proportional to exp(`evidence` * v).
 """
@@ -51,11 +49,9 @@ class LookKind:
     Attributes:
         awaited: How much more similar a model counts that an actor of a task stands for, while no
             other object is believed to be it.
-        weight: What its votes count.
     """
 
     awaited: float
-    weight: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +68,7 @@ class VoteSettings:
         least_share: Names with a smaller share of the votes are dropped.
         known_votes: Votes that the best name needs for the object to be known at all.
         stranger: Similarity that an object has to some model even when it is none of them.
-        whole: Looks at whole silhouettes.
-        cut: Looks at silhouettes that the image border cuts.
+        shape: Looks at the silhouette.
         found: Looks by which a behaviour found the region itself.
         expected: Votes that an awaited model has before anybody looked at the silhouette.
         apart_s: Hypotheses this far apart in time are of different pictures.
@@ -91,8 +86,7 @@ class VoteSettings:
     least_share: float = 0.03
     known_votes: float = 0.3
     stranger: float = 0.5
-    whole: LookKind = LookKind(awaited=0.1)
-    cut: LookKind = LookKind(awaited=0.1, weight=0.25)
+    shape: LookKind = LookKind(awaited=0.1)
     found: LookKind = LookKind(awaited=0.06)
     expected: float = 1.5
     apart_s: float = 0.2
@@ -119,10 +113,9 @@ class ObjectVotes:
     """What is remembered of one object's votes.
 
     Attributes:
-        counts: (name, votes), most votes first: of all looks, each kind by its weight.
+        counts: (name, votes), most votes first: of all looks.
         none: Votes for its being none of the models.
-        whole: Those of looks at its whole silhouette.
-        cut: Those of looks at what the image border left of it.
+        shape: Those of looks at its silhouette.
         found: Those of looks by which it was found.
         heard: Seconds of the last hypotheses about it, or None.
         leader: The name that leads clearly now, or None.
@@ -132,8 +125,7 @@ class ObjectVotes:
 
     counts: VoteCounts = ()
     none: float = 0.0
-    whole: Tally = Tally()
-    cut: Tally = Tally()
+    shape: Tally = Tally()
     found: Tally = Tally()
     heard: float | None = None
     leader: str | None = None
@@ -277,20 +269,20 @@ def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], mos
 
 
 def joined(votes: ObjectVotes, settings: VoteSettings, awaited: Collection[str]) -> ObjectVotes:
-    """The votes of an object with those of all looks, each kind by its weight, added up.
+    """The votes of an object with those of all looks added up.
 
     Args:
         votes: With the tally of each kind.
-        settings: What the kinds count, and what awaited models have from the start.
+        settings: What awaited models have from the start.
         awaited: Models that are expected and not yet found.
     """
-    kinds = (settings.whole, votes.whole), (settings.cut, votes.cut), (settings.found, votes.found)
+    kinds = votes.shape, votes.found
     total: dict[str, float] = {}
-    for kind, tally in kinds:
+    for tally in kinds:
         for name, v in tally.counts:
-            total[name] = total.get(name, 0.0) + kind.weight * v
+            total[name] = total.get(name, 0.0) + v
     if not votes.found.counts:
         for name in total.keys() & awaited:
             total[name] += settings.expected
     counts = tuple(sorted(total.items(), key=lambda item: (-item[1], item[0])))
-    return replace(votes, counts=counts, none=sum(k.weight * t.none for k, t in kinds))
+    return replace(votes, counts=counts, none=sum(t.none for t in kinds))

@@ -1,4 +1,4 @@
-"""Looks of different kinds: at a silhouette that is whole, cut by the border, or awaited by a task."""
+"""What a silhouette tells of models that a task awaits."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def believed(
 
 @settings(max_examples=40, deadline=None)
 @given(votes, votes, st.floats(0.0, 20.0))
-def test_votes_of_all_looks_are_added_up_by_their_weights(
-    whole: tuple[tuple[str, float], ...], cut: tuple[tuple[str, float], ...], none: float
+def test_votes_of_all_looks_are_added_up(
+    shape: tuple[tuple[str, float], ...], found: tuple[tuple[str, float], ...], none: float
 ) -> None:
-    counted = joined(ObjectVotes(whole=Tally(whole, none), cut=Tally(cut, none)), SET, {"a"})
+    counted = joined(ObjectVotes(shape=Tally(shape, none), found=Tally(found, none)), SET, {"a"})
     for name, v in counted.counts:
-        own = dict(whole).get(name, 0.0) + SET.cut.weight * dict(cut).get(name, 0.0)
-        assert v == pytest.approx(own + SET.expected * (name == "a"))
-    assert counted.none == pytest.approx((1.0 + SET.cut.weight) * none)
+        own = dict(shape).get(name, 0.0) + dict(found).get(name, 0.0)
+        assert v == pytest.approx(own + SET.expected * (name == "a" and not found))
+    assert counted.none == pytest.approx(2.0 * none)
     assert [v for _, v in counted.counts] == sorted((v for _, v in counted.counts), reverse=True)
 
 
@@ -69,19 +69,6 @@ def test_where_nobody_looked_a_tally_only_fades(
     after = faded(Tally(counts, none), Tally(), 0.0, (dt, SET.tau_s), 5)
     assert after.none <= none
     assert all(v <= dict(counts)[name] for name, v in after.counts)
-
-
-def test_a_name_given_to_the_whole_is_kept_when_the_border_cuts_it() -> None:
-    """Six seconds long what is left of it looks a little more like something else."""
-
-    def said(i: int) -> list[tuple[str, float]]:
-        return [("probe", 0.85)] if i < 100 else [("lamp", 0.7), ("probe", 0.66)]
-
-    def box(i: int) -> tuple[int, int, int, int]:
-        return INSIDE if i < 100 else AT_BORDER
-
-    assert believed(said, box, 250).name == "probe"
-    assert believed(said, lambda i: INSIDE, 350).name == "lamp"
 
 
 def test_of_names_that_a_cut_silhouette_allows_the_awaited_one_is_believed() -> None:
