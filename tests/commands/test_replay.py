@@ -70,7 +70,7 @@ def test_mistakes_are_told_in_one_message(visup: Call, run: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--resume", "run"), "is over"),
+        (("--resume", "run"), "is complete"),
         (("clip.avi", "--resume", "run"), "takes no source"),
         (("--resume", "run", "--fps", "5"), "takes no source"),
         (("--resume", "."), "no recorded run"),

@@ -60,6 +60,6 @@ def test_what_is_not_there_or_has_no_name_is_refused(
 
 def test_without_its_video_nothing_is_remembered(tmp_path: Path) -> None:
     record(tmp_path / "run", doubtful(COUNT), SETTINGS, source=str(tmp_path / "gone.avi"))
-    with pytest.raises(VisupError, match="the video is not there"):
+    with pytest.raises(VisupError, match="the video is no longer available"):
         remember(RunView(tmp_path / "run"), 5, 1, "box", tmp_path)
     assert not (tmp_path / MODELS).exists()
