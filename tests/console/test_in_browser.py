@@ -338,7 +338,7 @@ def test_the_wall_shows_alerts_with_pictures_and_keeps_who_saw_them(
     assert [f.opinion for f in read_feedback(folder / "yard-run").values()] == ["seen"]
     browser.value("document.querySelector('input[aria-label=\"Search alerts\"]').focus()")
     browser.type("nowhere")
-    shows(browser, "No such alert.")
+    shows(browser, "No such alerts.")
 
 
 def violations(browser: Browser) -> list[str]:
@@ -391,5 +391,5 @@ def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) ->
         )  # an icon without its font is a long word
         browser.until("document.documentElement.scrollWidth <= 390")
         browser.value("document.querySelector('a[href=\"/wall\"]').click()")
-        shows(browser, "the picture of alert")
+        shows(browser, "picture of alert")
         assert browser.value("document.documentElement.scrollWidth") <= 390

@@ -87,7 +87,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     assert outcome(parts) == outcome(whole)
     assert any("perceived again" in n for n in result.notes) == (state != "kept")
     assert any("it was changed" in n for n in result.notes) == (state == "damaged")
-    with pytest.raises(OutputError, match="is over"):
+    with pytest.raises(OutputError, match="is complete"):
         interrupted_run(parts)
 
 

@@ -214,7 +214,7 @@ def test_sequences_are_found_run_and_scored(tmp_path: Path) -> None:
     figures = evaluate_motion(tmp_path, progress=told.append)
     assert told == ["set/disc"]
     item = figures["items"]["set/disc"]
-    assert set(item) == {"J", "F", "ghost", "ms", "ratio"}
+    assert set(item) == {"J", "F", "f_measure", "ghost", "ms", "ratio"}
     assert 0.3 < item["J"] <= 1
     assert figures["total"]["J"] == item["J"]
     short = evaluate_motion(place, limit=3)["items"]["disc"]

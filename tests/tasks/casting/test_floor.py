@@ -81,7 +81,7 @@ def test_a_zones_file_tells_the_same(tmp_path: Path) -> None:
     ("text", "said"),
     [
         (FILE.replace("[560, 400]", "[320, 400]").replace("[420, 200]", "[560, 400]"), "line"),
-        (FILE.replace("[2, 0], ", ""), "not as it should"),
+        (FILE.replace("[2, 0], ", ""), "the ground is invalid"),
         (FILE[FILE.index("[[zone") :], "where the floor is"),
         (FILE.replace("floor = [[0.5, 0], ", "floor = [[0.5, 0]]#"), "corners"),
     ],
