@@ -21,7 +21,8 @@ from visup.archive.filling.pieces import watch_piece
 from visup.archive.filling.pool_settings import PoolSettings
 
 MOST_RENEWALS = 6
-"""How often workers are started in place of lost ones, before all of them have been there again."""
+"""How often workers are started in place of lost ones, before all of them have been there again; after each
+failure it waits twice as long, a minute in all."""
 START_S = 300.0
 """How long a worker may take to start in place of another one; a busy machine needs minutes for it."""
 LOOK_S = 1.0
@@ -40,6 +41,7 @@ class OwnWorkers:
     cluster: Any
     count: int
     renewals: int = field(default=0, init=False)
+    _not_before: float = field(default=0.0, init=False)
 
     @contextmanager
     def kept(self, client: Any, starve: Callable[[], None]) -> Iterator[None]:
@@ -75,9 +77,10 @@ class OwnWorkers:
         """Start workers in the places that Dask has given up; `there` are at work."""
         if there >= self.count:
             self.renewals = 0
-        lost = self._lost()
-        if not lost or self.renewals >= MOST_RENEWALS:
+        lost, now = self._lost(), time.monotonic()
+        if not lost or self.renewals >= MOST_RENEWALS or now < self._not_before:
             return
+        self._not_before = now + 2.0**self.renewals
         self.renewals += 1
         self.cluster.sync(self.cluster.scale_down, lost)
         self.cluster.scale(self.count)

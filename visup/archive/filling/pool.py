@@ -148,12 +148,13 @@ def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutco
             return found
     if Attempts(lake.path, piece.key).exhausted:
         return given_up(lake, piece)
-    if future.status != "error":
+    if future.status == "cancelled":
         raise SettingsError(
             "all workers were lost, or the scheduler",
             hint="run the same command again: what is in the lake is kept, and the rest is done",
         )
     if again >= MOST_RESUBMISSIONS:
-        reason = f"its workers were lost {again} times ({error_line(future.exception())})"
+        why = f" ({error_line(future.exception())})" if future.status == "error" else ""
+        reason = f"its workers were lost {again} times{why}"
         return ClipOutcome(run, source, failure=FailedClip(source, reason))
     return None
