@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
 
 import numpy as np
 import pytest
@@ -78,16 +76,6 @@ def press(browser: Browser, text: str) -> None:
     browser.value(
         f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() == '{text}').click()"
     )
-
-
-def settled(browser: Browser, script: str) -> Any:
-    """What a script gives once it has given the same for a while: pages move while their parts arrive."""
-    value, same = browser.value(script), 0
-    while same < 5:
-        time.sleep(0.1)
-        before, value = value, browser.value(script)
-        same = same + 1 if value == before else 0
-    return value
 
 
 def shows(browser: Browser, text: str) -> None:
@@ -236,8 +224,7 @@ def test_a_task_is_written_checked_tried_and_a_zone_is_drawn_and_saved(
     choose(browser, "What is written", "zones")
     shows(browser, "Click the corners")
     browser.value("document.querySelector('.q-toggle').click()")
-    x, y, w, h = settled(
-        browser,
+    x, y, w, h = browser.settled(
         "(() => { const r = document.querySelector('svg.overlay').getBoundingClientRect();"
         "return [r.x, r.y, r.width, r.height]; })()",
     )

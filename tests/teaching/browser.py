@@ -128,6 +128,15 @@ class Browser:
             time.sleep(0.02)
         raise AssertionError(f"never true: {script}")
 
+    def settled(self, script: str) -> Any:
+        """What a script gives once it has stayed the same for half a second: pages move while parts arrive."""
+        value, same = self.value(script), 0
+        while same < 5:
+            time.sleep(0.1)
+            before, value = value, self.value(script)
+            same = same + 1 if value == before else 0
+        return value
+
     def move(self, x: float, y: float) -> None:
         """Move the pointer to a place."""
         self._mouse("mouseMoved", x, y, 0)
