@@ -129,7 +129,7 @@ class Browser:
         raise AssertionError(f"never true: {script}")
 
     def settled(self, script: str) -> Any:
-        """What a script gives once it has stayed the same for half a second, as parts of pages arrive late."""
+        """What a script gives once it has stayed the same for half a second."""
         value, same = self.value(script), 0
         while same < 5:
             time.sleep(0.1)
