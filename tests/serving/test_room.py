@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.serving.fakes import Bench
-from visup.serving.room.housekeeper import LOOK_S, Housekeeper
+from visup.serving.room.housekeeper import SCAN_S, Housekeeper
 from visup.serving.room.retention import DAY_S, FRESH_S, SLACK, RemovalReason, removals
 from visup.serving.room.stored import StoredEvidence, StoredFiles, StoredRun, look_into
 from visup.serving.site.records import RetentionLimits
@@ -168,7 +168,7 @@ def test_it_looks_once_in_a_while_and_never_twice_at_a_time(tmp_path: Path, benc
         house.turn(float(second), [])
         if house._thread:
             house._thread.join()
-    assert len(looks) == 1 + int(24 // LOOK_S)
+    assert len(looks) == 1 + int(24 // SCAN_S)
 
 
 def test_a_store_is_looked_into(tmp_path: Path) -> None:

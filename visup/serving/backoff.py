@@ -1,4 +1,4 @@
-"""When a camera that ended is begun again: soon at first, then ever more seldom."""
+"""Exponential backoff for restarting a camera process that ended."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import dataclass, replace
 FIRST_WAIT_S = 1.0
 LONGEST_WAIT_S = 60.0
 CALM_S = 20.0
-"""Whoever has run for so long is taken to be well: the next time it is begun again soon. To begin takes some
-three seconds of a processor: one that ends every 20 s for ever costs little more than one that runs."""
+"""A process that ran at least this long counts as healthy and resets the backoff. Starting takes about 3 s of
+processor time, so one that crashes every 20 s costs little more than one that keeps running."""
 
 
 @dataclass(frozen=True, slots=True)
 class Backoff:
-    """How often a camera ended lately.
+    """The backoff state of one process.
 
     Attributes:
-        failures: Since it last ran well.
+        failures: Consecutive failures since the last healthy run.
     """
 
     failures: int = 0
 
     @property
     def wait_s(self) -> float:
-        """Seconds until it is begun again.
+        """Seconds to wait before the next start.
 
         >>> [Backoff(n).wait_s for n in (1, 2, 3, 9)]
         [1.0, 2.0, 4.0, 60.0]
@@ -32,9 +32,9 @@ class Backoff:
         return min(LONGEST_WAIT_S, doubled) if self.failures else 0.0
 
     def after(self, ran_s: float) -> Backoff:
-        """Once it has ended again.
+        """The state after the process ended again.
 
         Args:
-            ran_s: How long it had made steps, seconds.
+            ran_s: How long the process made steps, seconds.
         """
         return replace(self, failures=1 if ran_s >= CALM_S else self.failures + 1)

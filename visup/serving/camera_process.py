@@ -1,8 +1,8 @@
-"""The process of one camera: a run as any other, which tells its supervisor that it is alive.
+"""The process of one camera: an ordinary run that reports to its supervisor.
 
 `python -m visup.serving.camera_process PIPE` reads its job from standard input, which stays open as long as
-the supervisor lives: without one it closes its books and ends, so that no camera is watched twice. As long
-as there is no job it makes itself ready for one.
+the supervisor lives: when it closes, the process closes its recording and exits, so that no camera is watched
+twice. Until a job arrives the process warms up.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ from visup.serving.run_store import RunStore
 from visup.serving.warm_up import has_job, warm_up
 
 CLOSING_S = 10.0
-"""How long a run's last process is waited for, seconds."""
+"""How long to wait for the previous process of a run to close, seconds."""
 
 DELIVERIES = "deliveries.sqlite"
-"""In the folder of a camera: alerts that its sinks have not taken yet."""
+"""In the folder of a camera: alerts that its sinks have not accepted yet."""
 
 BEAT_S = 0.5
-"""Seconds between two signs of life."""
+"""Seconds between heartbeats."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Places(RunStore):
-    """Where further runs go; the supervisor is told when one begins."""
+class _ReportingRunStore(RunStore):
+    """Folders of further runs; reports each new run to the supervisor."""
 
     pipe: ReportPipe
 
@@ -58,7 +58,7 @@ class _Places(RunStore):
 
 
 class Heartbeat:
-    """Tells now and then how a run does: an observer of its steps, given its figures after each.
+    """Reports the state of a run at intervals: observes its steps and receives its figures after each.
 
     Args:
         pipe: To the supervisor.
@@ -72,7 +72,7 @@ class Heartbeat:
         self._beliefs: dict[str, int] = {}
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Count what a step tells."""
+        """Count the frame and the alerts of a step."""
         self._frames += 1
         opened = (a.severity.name.lower() for a in step.alerts if a.closed is None)
         self._opened.update(f"alerts_{severity}" for severity in opened)
@@ -82,7 +82,7 @@ class Heartbeat:
         }
 
     def beat(self, figures: RunFigures) -> None:
-        """Tell all that was counted, when it is time to."""
+        """Send the counts if a heartbeat is due."""
         now = time.monotonic()
         if now - self._last < BEAT_S:
             return
@@ -101,10 +101,10 @@ class Heartbeat:
 
 
 def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
-    """Do a job to its end; whatever comes of it is told.
+    """Run a job to its end and report the outcome.
 
     Args:
-        job: What to do.
+        job: The job.
         pipe: To the supervisor.
     """
     if job.threads is not None:
@@ -113,14 +113,14 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
     audience = Audience(
         observers=(heart,),
         figures=heart.beat,
-        places=_Places(job.folder.parent, job.fingerprint, pipe),
+        places=_ReportingRunStore(job.folder.parent, job.fingerprint, pipe),
         notice=lambda text: pipe.send(ReportKind.NOTICE, text=text),
     )
     try:
         if job.resume:
-            # A process before this one may still close its books.
+            # The previous process may still be closing the recording.
             acquire_lock(job.folder / JOURNAL, "this run", CLOSING_S).release()
-        past = _past(job) if job.resume else None
+        past = _interrupted(job) if job.resume else None
         folder = job.folder if past else fresh_folder(job.folder, job.settings.source)
         pipe.send(ReportKind.OPENED, resumed=past is not None)
         result = supervise(
@@ -132,20 +132,20 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
             at_once=False,
         )
     except VisupError as fault:
-        discard_unbegun(job.folder)  # what is refused before its first frame leaves none behind
+        discard_unbegun(job.folder)  # a run refused before its first frame leaves no folder
         pipe.send(ReportKind.REFUSED, text=str(fault), source=isinstance(fault, SourceError))
         return ExitCode.BAD_INPUT
-    _tell(result, result.folder or folder, pipe)
+    _report_end(result, result.folder or folder, pipe)
     return result.exit_code
 
 
-def _past(job: CameraJob) -> InterruptedRun:
-    """The run that goes on, with code and password that the supervisor names."""
+def _interrupted(job: CameraJob) -> InterruptedRun:
+    """The run to resume, with the code and the password that the supervisor names."""
     named = job.settings.source if has_secret(job.settings.source) else None
     return interrupted_run(job.folder, job.settings.behaviours, job.settings.plugins, named)
 
 
-def _tell(result: RunResult, folder: Path, pipe: ReportPipe) -> None:
+def _report_end(result: RunResult, folder: Path, pipe: ReportPipe) -> None:
     pipe.send(
         ReportKind.ENDED,
         live=Recording.open(folder).facts().get("live"),
@@ -158,26 +158,26 @@ def _tell(result: RunResult, folder: Path, pipe: ReportPipe) -> None:
 
 
 def _end_with(supervisor: BinaryIO) -> None:
-    """Ask this process to end once the supervisor is gone."""
+    """Ask this process to end when the supervisor is gone."""
     with suppress(OSError):
         supervisor.read()
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def main() -> None:
-    """Read the job, and do it."""
+    """Read the job and run it."""
     pipe = ReportPipe(int(sys.argv[1]))
     if not has_job():
         warm_up(has_job)
     line = sys.stdin.buffer.readline()
     if not line:
-        return  # the supervisor has gone, and there was nothing to do
+        return  # the supervisor is gone, and there was no job
     job = parse_job(line)
     reader = threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True)
     reader.start()
     code = watch_camera(job, pipe)
     sys.stdout.flush()
-    # Threads that wait for a camera or a sink must not hold up the end.
+    # Threads waiting for a camera or a sink must not delay the exit.
     os._exit(code)
 
 

@@ -1,4 +1,4 @@
-"""One camera for months: its process is begun, watched, ended when it hangs or swells, and begun again."""
+"""The supervisor of one camera: starts its process, ends it when it hangs or grows too large, restarts it."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ from visup.serving.site_log import SiteEvent, Tell
 
 ASK_AGAIN_S = 2.5
 CLOSE_S = 5.0
-"""A process that was asked to end is asked again after the one (it may wait for a frame that does not come),
-and killed after the other, seconds."""
+"""Seconds after which a process that was asked to end is asked again (it may be waiting for a frame that does
+not come), and killed."""
 
-MOST_VAIN = 3
-"""A run that cannot be taken up so many times in a row is left, and a new one begun: its state may be what
-ends the process."""
+MAX_FAILED_RESUMES = 3
+"""After this many failed attempts in a row to resume a run a new one is begun: the saved state may be what
+crashes the process."""
 
 
 class CameraState(StrEnum):
-    """What is done with a camera now."""
+    """The state of a camera's supervision."""
 
     WAITING = "waiting"
-    """It is begun when its time has come."""
+    """Its process starts when the backoff has passed."""
     STARTING = "starting"
-    """Its process has not made a step yet."""
+    """Its process has made no step yet."""
     WATCHING = "watching"
     CLOSING = "closing"
     """Its process was asked to end."""
     OVER = "over"
-    """Its source was seen to the end, or it is watched no more."""
+    """Its source has ended, or it is no longer watched."""
 
 
 class Child(Protocol):
-    """What is used of a process; see `CameraChild`."""
+    """The part of `CameraChild` that the supervisor uses."""
 
     def reports(self) -> Sequence[CameraReport]:
-        """What it told since it was last asked."""
+        """Reports received since the last call."""
         ...
 
     def exit_code(self) -> int | None:
-        """With what it ended, or None."""
+        """The exit code, or None."""
         ...
 
     def memory_mb(self) -> float | None:
@@ -62,21 +62,21 @@ class Child(Protocol):
         ...
 
     def ask_to_end(self) -> None:
-        """Let it close its books."""
+        """Ask it to close its recording and end."""
         ...
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill it."""
         ...
 
     def close(self) -> None:
-        """Let go of it once it has ended."""
+        """Release its resources once it has ended."""
         ...
 
 
 @dataclass(slots=True)
-class _Life:
-    """One process, from its beginning to its end."""
+class _Supervised:
+    """One process of the camera; times in seconds of the supervisor's clock."""
 
     child: Child
     resumed: bool
@@ -86,27 +86,27 @@ class _Life:
     last_step: float | None = None
     away: bool = False
     asked: float | None = None
-    asked_again: bool = False
+    asked_twice: bool = False
     killed: bool = False
     end: CameraReport | None = None
 
 
 class CameraSupervisor:
-    """Watches over one camera; nothing here waits.
+    """Supervises one camera; no method blocks.
 
     Args:
-        camera: Which.
+        camera: The camera.
         store: Folder of all runs.
-        tell: Told what happens.
-        start: Begins a process.
+        tell: Receives the events.
+        start: Starts a process.
 
     Attributes:
         camera: As given; replaced when the site file changes.
-        state: What is done with it now.
-        restarts: How often its process was begun again.
+        state: The state of its supervision.
+        restarts: How often its process was restarted.
         killed_at_close: Whether a process that was asked to end had to be killed.
-        figures: What is counted of it.
-        run: Folder of the run that was begun or taken up last, or None.
+        figures: Its counters and gauges.
+        run: Folder of the run begun or resumed last, or None.
     """
 
     def __init__(
@@ -123,68 +123,70 @@ class CameraSupervisor:
         self.figures = CameraFigures()
         self.run: Path | None = None
         self._folder = store / camera.name
-        self._say = tell
+        self._notify = tell
         self._start = start
-        self._life: _Life | None = None
+        self._process: _Supervised | None = None
         self._due = 0.0
         self._backoff = Backoff()
-        self._vain = 0
-        self._then: SiteCamera | None = camera
+        self._failed_resumes = 0
+        self._next_camera: SiteCamera | None = camera
 
     def turn(self, now: float) -> None:
-        """See to it once; several times a second is right.
+        """Do what is due; call it several times a second.
 
         Args:
-            now: Seconds from any start, never going back.
+            now: Seconds of a monotonic clock.
         """
-        if self._life:
-            self._listen(self._life, now)
-            self._limit(self._life, now)
-            if (code := self._life.child.exit_code()) is not None:
-                self._ended(self._life, code, now)
+        if self._process:
+            self._listen(self._process, now)
+            self._limit(self._process, now)
+            if (code := self._process.child.exit_code()) is not None:
+                self._ended(self._process, code, now)
         elif self.state is CameraState.WAITING and now >= self._due:
             self._begin(now)
 
     def replace(self, camera: SiteCamera, now: float) -> None:
-        """Go on with other settings: its process ends in good order, and is begun with these."""
-        self._then, self.camera = camera, camera
-        self._due, self._backoff, self._vain = now, Backoff(), 0
-        if self._life:
-            self._ask(self._life, now)
+        """Change the settings: the process is asked to end and restarted with the new ones."""
+        self._next_camera, self.camera = camera, camera
+        self._due, self._backoff, self._failed_resumes = now, Backoff(), 0
+        if self._process:
+            self._ask(self._process, now)
         else:
             self.state = CameraState.WAITING
 
     def stop(self, now: float) -> None:
-        """Watch it no more; `state` is OVER once its process has ended."""
-        self._then = None
-        if self._life:
-            self._ask(self._life, now)
+        """Stop watching; `state` is OVER once the process has ended."""
+        self._next_camera = None
+        if self._process:
+            self._ask(self._process, now)
         else:
             self.state = CameraState.OVER
 
     def status(self, now: float) -> CameraStatus:
-        """What is told of it to those who ask from outside."""
-        life = self._life
-        self.figures.take({"cpu_s": life.child.cpu_s()} if life else {})
-        stepped = None if life is None or life.last_step is None else now - life.last_step
+        """The state of the camera for monitoring."""
+        process = self._process
+        self.figures.take({"cpu_s": process.child.cpu_s()} if process else {})
+        stepped = None if process is None or process.last_step is None else now - process.last_step
         return CameraStatus(
             self.camera.name,
             self.state.value,
             self.restarts,
-            life.child.memory_mb() if life else None,
+            process.child.memory_mb() if process else None,
             stepped,
             self.figures.totals,
             dict(self.figures.latest),
         )
 
     def _tell(self, text: str, kind: SiteEvent, **facts: Any) -> None:
-        self._say(self.camera.name, text, kind, **facts)
+        self._notify(self.camera.name, text, kind, **facts)
 
     def _begin(self, now: float) -> None:
         camera = self.camera
         try:
             run = (
-                run_under_way(self._folder, camera.fingerprint) if self._vain < MOST_VAIN else None
+                run_under_way(self._folder, camera.fingerprint)
+                if self._failed_resumes < MAX_FAILED_RESUMES
+                else None
             )
             folder = run or begin_run(self._folder, camera.fingerprint)
             job = CameraJob(
@@ -204,127 +206,129 @@ class CameraSupervisor:
             )
             return
         self.run = folder
-        self._life = _Life(child, run is not None, now, now)
+        self._process = _Supervised(child, run is not None, now, now)
         self.state = CameraState.STARTING
         verb, kind = ("resumes", SiteEvent.RESUMED) if run else ("starts", SiteEvent.BEGUN)
         self._tell(f"{verb} run {folder.name}", kind, run=folder.name)
 
-    def _listen(self, life: _Life, now: float) -> None:
-        for report in life.child.reports():
-            life.heard = now
+    def _listen(self, process: _Supervised, now: float) -> None:
+        for report in process.child.reports():
+            process.heard = now
             if report.kind is ReportKind.STEP:
-                life.away, life.last_step = False, now
+                process.away, process.last_step = False, now
                 self.figures.take(report.data)
-                if life.first_step is None:
-                    life.first_step, self._vain = now, 0
+                if process.first_step is None:
+                    process.first_step, self._failed_resumes = now, 0
                     if self.state is CameraState.STARTING:
                         self.state = CameraState.WATCHING
             elif report.kind is ReportKind.NOTICE:
-                life.away = True
+                process.away = True
                 self._tell(_text(report.data.get("text")), SiteEvent.NOTICE)
             elif report.kind is ReportKind.ROLLED:
                 run = Path(_text(report.data.get("run"))).name
                 self.run = self._folder / run
                 self._tell(f"continues in run {run}", SiteEvent.ROLLED, run=run)
             elif report.kind in (ReportKind.ENDED, ReportKind.REFUSED):
-                life.end = report
+                process.end = report
 
-    def _limit(self, life: _Life, now: float) -> None:
-        """End a process that takes too long or too much."""
+    def _limit(self, process: _Supervised, now: float) -> None:
+        """End a process that is silent for too long or uses too much memory."""
         limits = self.camera.limits
-        if life.asked is not None:
-            self._close(life, now - life.asked)
+        if process.asked is not None:
+            self._close(process, now - process.asked)
             return
-        patience = self.camera.settings.patience_s if life.away else 0.0
-        most = limits.start_s if life.first_step is None else limits.silent_s + patience
-        memory = life.child.memory_mb()
-        if now - life.heard > most:
+        patience = self.camera.settings.patience_s if process.away else 0.0
+        most = limits.start_s if process.first_step is None else limits.silent_s + patience
+        memory = process.child.memory_mb()
+        if now - process.heard > most:
             self._tell(
-                f"no sign of life for {now - life.heard:.0f} s: its process is killed",
+                f"no sign of life for {now - process.heard:.0f} s: its process is killed",
                 SiteEvent.HUNG,
             )
-            life.child.kill()
-            life.heard, life.killed = now, True
+            process.child.kill()
+            process.heard, process.killed = now, True
         elif memory is not None and memory > limits.memory_mb:
             self._tell(
                 f"{memory:.0f} MB in use, {limits.memory_mb:.0f} allowed: its process is restarted",
                 SiteEvent.TOO_LARGE,
                 memory_mb=round(memory),
             )
-            self._ask(life, now)
+            self._ask(process, now)
 
-    def _close(self, life: _Life, waited: float) -> None:
-        if waited > CLOSE_S and not life.killed:
-            life.killed = self.killed_at_close = True
+    def _close(self, process: _Supervised, waited: float) -> None:
+        if waited > CLOSE_S and not process.killed:
+            process.killed = self.killed_at_close = True
             self._tell(
                 f"its process did not close within {CLOSE_S:g} s and is killed",
                 SiteEvent.NOT_CLOSED,
             )
-            life.child.kill()
-        elif waited > ASK_AGAIN_S and not life.asked_again:
-            life.asked_again = True
-            life.child.ask_to_end()
+            process.child.kill()
+        elif waited > ASK_AGAIN_S and not process.asked_twice:
+            process.asked_twice = True
+            process.child.ask_to_end()
 
-    def _ask(self, life: _Life, now: float) -> None:
-        if life.asked is None:
-            life.asked = now
-            life.child.ask_to_end()
+    def _ask(self, process: _Supervised, now: float) -> None:
+        if process.asked is None:
+            process.asked = now
+            process.child.ask_to_end()
         self.state = CameraState.CLOSING
 
-    def _ended(self, life: _Life, code: int, now: float) -> None:
-        self._listen(life, now)  # its last words
-        life.child.close()
+    def _ended(self, process: _Supervised, code: int, now: float) -> None:
+        self._listen(process, now)  # reports sent before it ended
+        process.child.close()
         self.figures.process_ended()
-        self._life = None
-        asked = life.asked is not None
-        if self._then is None or (not asked and self._seen_whole(life)):
+        self._process = None
+        asked = process.asked is not None
+        if self._next_camera is None or (not asked and self._source_ended(process)):
             self.state = CameraState.OVER
-            words = _last_words(life, "it is no longer watched" if self._then is None else "")
+            words = _outcome(
+                process, "it is no longer watched" if self._next_camera is None else ""
+            )
             self._tell(words, SiteEvent.ENDED)
             return
         self.state = CameraState.WAITING
         if asked:
-            self._tell(_last_words(life, "it is restarted"), SiteEvent.ENDED)
+            self._tell(_outcome(process, "it is restarted"), SiteEvent.ENDED)
             return
-        self._count(life, now)
+        self._count(process, now)
         self._due = now + self._backoff.wait_s
         self.restarts += 1
-        why = _last_words(life, "") if life.end else _how(code, killed=life.killed)
+        why = _outcome(process, "") if process.end else _death(code, killed=process.killed)
         again = f"{why}; restarting in {self._backoff.wait_s:g} s"
         self._tell(again, SiteEvent.DIED, exit_code=code, wait_s=self._backoff.wait_s)
 
-    def _count(self, life: _Life, now: float) -> None:
-        """What an end says of the next beginning."""
-        ran = 0.0 if life.first_step is None else now - life.first_step
+    def _count(self, process: _Supervised, now: float) -> None:
+        """Update the backoff and the count of failed attempts to resume after an end."""
+        ran = 0.0 if process.first_step is None else now - process.first_step
         self._backoff = self._backoff.after(ran)
-        if not life.resumed or life.first_step is not None:
-            self._vain = 0
-        elif life.end and life.end.kind is ReportKind.REFUSED:
-            # The run itself is refused, and will be again; a camera that is not there may come back.
-            self._vain = 0 if life.end.data.get("source") else MOST_VAIN
+        if not process.resumed or process.first_step is not None:
+            self._failed_resumes = 0
+        elif process.end and process.end.kind is ReportKind.REFUSED:
+            # A run that is refused will be refused again; a camera that is not reachable may come back.
+            self._failed_resumes = 0 if process.end.data.get("source") else MAX_FAILED_RESUMES
         else:
-            self._vain += 1
+            self._failed_resumes += 1
 
-    def _seen_whole(self, life: _Life) -> bool:
-        """Whether there is nothing more to see: a file, to its end."""
-        end = life.end
+    def _source_ended(self, process: _Supervised) -> bool:
+        """Whether the source is a file that was played to its end."""
+        end = process.end
         return bool(end and end.kind is ReportKind.ENDED and end.data.get("live") is False)
 
 
-def _last_words(life: _Life, then: str) -> str:
-    end = life.end
+def _outcome(process: _Supervised, consequence: str) -> str:
+    end = process.end
     if end is None:
-        return then or "it is over"
+        return consequence or "it is over"
     if end.kind is ReportKind.REFUSED:
-        said = f"it cannot be watched: {_text(end.data.get('text'))}"
+        text = f"it cannot be watched: {_text(end.data.get('text'))}"
     else:
         problem = end.data.get("problem")
-        said = f"verdict {end.data.get('verdict') or 'none'} after {end.data.get('steps')} frames"
-        said += f" ({_text(problem)})" if problem else ""
-    return f"{said}; {then}" if then else said
+        text = f"verdict {end.data.get('verdict') or 'none'} after {end.data.get('steps')} frames"
+        text += f" ({_text(problem)})" if problem else ""
+    return f"{text}; {consequence}" if consequence else text
 
 
-def _how(code: int, *, killed: bool) -> str:
+def _death(code: int, *, killed: bool) -> str:
     if killed:
         return "its process was killed"
     return (
@@ -333,5 +337,5 @@ def _how(code: int, *, killed: bool) -> str:
 
 
 def _text(value: Any) -> str:
-    """Words of a process, on one line."""
+    """A text of the process on one line."""
     return "; ".join(part.strip() for part in str(value).splitlines())

@@ -1,4 +1,4 @@
-"""The console beside the cameras: a process of its own, begun again when it ends; no camera waits for it."""
+"""The console of a site in a process of its own, restarted when it ends; no camera waits for it."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from visup.serving.site_supervisor import SiteSupervisor
 
 CLOSING_S = 2.0
-"""How long it may take to end once it is asked to, seconds."""
+"""How long the process may take to end when asked to, seconds."""
 
 Begin = Callable[[Sequence[str], Mapping[str, str]], "subprocess.Popen[bytes]"]
 
 
 def console_command(console: SiteConsole, store: Path) -> Sequence[str]:
-    """What is run; tokens are no part of it, for everybody sees the commands of a machine."""
+    """The command line; it holds no tokens, because every user of the machine can list commands."""
     host, port = console.listen
     names = (part for name in console.names for part in ("--name", name))
     saved = () if console.save_to is None else ("--save-to", str(console.save_to))
@@ -35,19 +35,19 @@ def console_command(console: SiteConsole, store: Path) -> Sequence[str]:
 
 
 def console_environment(console: SiteConsole) -> Mapping[str, str]:
-    """Tokens, as the command takes them; and that it shall end with its parent."""
-    given = {
+    """The tokens as environment variables, and the request to end with the parent."""
+    variables = {
         "VISUP_CONSOLE_WITH_PARENT": "1",
         "VISUP_CONSOLE_TOKEN": console.token,
         "VISUP_CONSOLE_VIEWER_TOKEN": console.viewer_token,
     }
-    return {name: token for name, token in given.items() if token is not None}
+    return {name: token for name, token in variables.items() if token is not None}
 
 
 def begun(command: Sequence[str], tokens: Mapping[str, str]) -> subprocess.Popen[bytes]:
-    """Begin the process; it ends when its standard input does, however the service ends.
+    """Start the process; it ends when its standard input closes, however the service ends.
 
-    What it prints for people who start it by hand has the token in it, and goes nowhere.
+    Its standard output is discarded: the address printed for people who start it by hand contains the token.
     """
     return subprocess.Popen(
         command,
@@ -59,12 +59,12 @@ def begun(command: Sequence[str], tokens: Mapping[str, str]) -> subprocess.Popen
 
 
 class ConsoleProcess:
-    """Keeps the console of a site going, as the site file says now.
+    """Runs the console of a site as its site file says.
 
     Args:
         store: Folder of all runs.
-        tell: Told what happens.
-        begin: Begins a process.
+        tell: Receives the events.
+        begin: Starts the process.
     """
 
     def __init__(self, store: Path, tell: Tell, begin: Begin = begun) -> None:
@@ -74,7 +74,7 @@ class ConsoleProcess:
         self._backoff, self._begun_at, self._due = Backoff(), 0.0, 0.0
 
     def turn(self, supervisor: SiteSupervisor, now: float) -> None:
-        """Begin it, begin it again, or end it; waits for nothing but its end."""
+        """Start, restart or end the console as needed; waits for nothing but its end."""
         if self._wanted != supervisor.console:
             self.close()
             self._wanted, self._backoff, self._due = supervisor.console, Backoff(), now
@@ -84,7 +84,7 @@ class ConsoleProcess:
             self._start(self._wanted, now)
 
     def close(self) -> None:
-        """End it."""
+        """End the console."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -104,7 +104,9 @@ class ConsoleProcess:
                 console_command(console, self._store), console_environment(console)
             )
         except OSError as fault:
-            self._again(f"the console cannot be started ({fault.strerror or fault})", 0.0, now)
+            self._schedule_restart(
+                f"the console cannot be started ({fault.strerror or fault})", 0.0, now
+            )
             return
         self._begun_at = now
         self._tell(SITE, f"the console is at {address}", SiteEvent.CONSOLE, address=address)
@@ -114,14 +116,14 @@ class ConsoleProcess:
         if process is not None:
             _free(process)
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
-        self._again(f"the console ended ({how})", now - self._begun_at, now)
+        self._schedule_restart(f"the console ended ({how})", now - self._begun_at, now)
 
-    def _again(self, what: str, ran_s: float, now: float) -> None:
+    def _schedule_restart(self, what: str, ran_s: float, now: float) -> None:
         self._backoff = self._backoff.after(ran_s)
         wait = self._backoff.wait_s
         self._due = now + wait
-        told = f"{what}; restarting in {wait:g} s"
-        self._tell(SITE, told, SiteEvent.CONSOLE_ENDED, wait_s=wait)
+        text = f"{what}; restarting in {wait:g} s"
+        self._tell(SITE, text, SiteEvent.CONSOLE_ENDED, wait_s=wait)
 
 
 def _free(process: subprocess.Popen[bytes]) -> None:

@@ -1,4 +1,4 @@
-"""What a camera's process and its supervisor say to each other: a job, then reports, as lines of JSON."""
+"""The protocol between a camera process and its supervisor: one job, then reports, as lines of JSON."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from visup.agent.storage.jsonable import to_jsonable
 from visup.runs.settings import RunOptions, WatchSettings
 
 LONGEST_LINE = 4000
-"""Bytes of a report: what is shorter than a page goes through a pipe whole or not at all."""
+"""Bytes of a report: writes of less than a page (4096 bytes) to a pipe are atomic."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraJob:
-    """What a process is to do. It comes by a pipe, so that no password stands in a list of processes.
+    """The job of a process. It is sent through a pipe, so that no password appears in the list of processes.
 
     Attributes:
-        settings: Of the run.
+        settings: Settings of the run.
         options: How it is recorded, and where alerts go.
-        folder: Of the run.
-        resume: Whether the folder holds the run, and it goes on; else a new one is begun.
-        fingerprint: As the camera is now; runs that follow go on under the same.
-        threads: That OpenCV may use; None for as many as there are cores.
+        folder: Folder of the run.
+        resume: Whether to resume the run in the folder; otherwise a new one is begun.
+        fingerprint: Fingerprint of the camera's settings, also for the runs that follow.
+        threads: Number of OpenCV threads; None for one per core.
     """
 
     settings: WatchSettings
@@ -41,20 +41,20 @@ class CameraJob:
 
 
 class ReportKind(StrEnum):
-    """What a process tells."""
+    """The kinds of reports."""
 
     OPENED = "opened"
-    """What is needed is there, and the source is opened next; `resumed` says whether the run goes on."""
+    """The preparation succeeded and the source is opened next; `resumed` says whether a run is resumed."""
     STEP = "step"
-    """It is alive: `steps`, `lag_s`, and what is counted of it (`monitoring/camera_figures.py`)."""
+    """Heartbeat: `steps`, `lag_s`, and the figures of `monitoring/camera_figures.py`."""
     NOTICE = "notice"
-    """`text`: what cannot wait for a step, such as that the camera dropped."""
+    """`text`: a message that cannot wait for a step, such as that the camera dropped."""
     ROLLED = "rolled"
-    """The run is followed by another: `run`, its name."""
+    """Another run follows: `run`, its name."""
     ENDED = "ended"
-    """The run is over: `verdict`, `steps`, `problem`, `notes`, `stopped`; `live` of a camera."""
+    """The run is over: `verdict`, `steps`, `problem`, `notes`, `stopped`; `live` for a live source."""
     REFUSED = "refused"
-    """`text`: it cannot begin; `source` says whether that is because of the source."""
+    """The run cannot begin: `text` says why, `source` whether the source is the cause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class CameraReport:
     """One line from a process.
 
     Attributes:
-        kind: What it tells.
+        kind: Kind of report.
         data: Its values.
     """
 
@@ -76,35 +76,35 @@ def job_line(job: CameraJob) -> bytes:
 
 
 def parse_job(line: bytes) -> CameraJob:
-    """The job of a line."""
+    """Parse a job."""
     return TypeAdapter(CameraJob).validate_json(line)
 
 
 def report_line(report: CameraReport) -> bytes:
-    """A report as one line; texts that are too long are cut."""
-    told = {"kind": report.kind.value, **report.data}
-    line = json.dumps(told).encode()
+    """A report as one line; overlong texts are cut."""
+    fields = {"kind": report.kind.value, **report.data}
+    line = json.dumps(fields).encode()
     if len(line) > LONGEST_LINE:
-        most = LONGEST_LINE // (12 * max(1, len(told)))
-        told = {k: v[:most] if isinstance(v, str | list) else v for k, v in told.items()}
-        line = json.dumps({k: v for k, v in told.items() if not isinstance(v, list)}).encode()
+        longest = LONGEST_LINE // (12 * max(1, len(fields)))
+        fields = {k: v[:longest] if isinstance(v, str | list) else v for k, v in fields.items()}
+        line = json.dumps({k: v for k, v in fields.items() if not isinstance(v, list)}).encode()
     return line + b"\n"
 
 
 def parse_report(line: bytes) -> CameraReport | None:
-    """The report of a line; None of what is none."""
+    """Parse a report; None for a line that is not one."""
     try:
-        told = json.loads(line)
-        return CameraReport(ReportKind(told.pop("kind")), told)
+        fields = json.loads(line)
+        return CameraReport(ReportKind(fields.pop("kind")), fields)
     except (ValueError, AttributeError, KeyError, TypeError):
         return None
 
 
 class ReportPipe:
-    """The end of a process: a supervisor that does not read holds up nobody.
+    """The process's end of the report pipe; a supervisor that does not read never blocks it.
 
     Args:
-        handle: A pipe to write to.
+        handle: File descriptor of the pipe.
     """
 
     def __init__(self, handle: int) -> None:
@@ -112,7 +112,7 @@ class ReportPipe:
         self._handle = handle
 
     def send(self, kind: ReportKind, **data: Any) -> None:
-        """Tell something; it is lost when the pipe is full, or nobody listens any more."""
+        """Send a report; it is lost when the pipe is full or closed."""
         try:
             os.write(self._handle, report_line(CameraReport(kind, data)))
         except (BlockingIOError, BrokenPipeError):

@@ -1,4 +1,4 @@
-"""Where a camera's runs go, and which of them goes on: a note in its folder outlives the service."""
+"""The folders of a camera's runs; a note in the camera's folder names the one to resume after a restart."""
 
 from __future__ import annotations
 
@@ -23,39 +23,39 @@ _OVER = (Ending.COMPLETE.value, ROLLED)
 
 @dataclass(frozen=True, slots=True)
 class RunStore:
-    """Where the runs of one camera go.
+    """The runs of one camera.
 
     Attributes:
-        folder: Of the camera.
-        fingerprint: As the camera is now.
+        folder: Folder of the camera.
+        fingerprint: Fingerprint of the camera's present settings.
     """
 
     folder: Path
     fingerprint: str
 
     def place(self) -> Path:
-        """The folder of a further run."""
+        """A folder for a further run."""
         return free_place(self.folder)
 
     def go_on_with(self, run: Path) -> None:
-        """Have the next process go on with this run."""
+        """Make this the run that the next process resumes."""
         note_run(run, self.fingerprint)
 
 
 def run_under_way(folder: Path, fingerprint: str) -> Path | None:
-    """The run of a camera that can go on, or None.
+    """The run of a camera that can be resumed, or None.
 
     Args:
-        folder: Of the camera.
-        fingerprint: As the camera is now: a run goes on as it was begun, or not at all.
+        folder: Folder of the camera.
+        fingerprint: Fingerprint of the camera's present settings; a run resumes only under its own.
     """
     try:
-        told = json.loads(read_text_file(folder / CURRENT))
-        name, begun_as = str(told["run"]), str(told["fingerprint"])
+        note = json.loads(read_text_file(folder / CURRENT))
+        name, noted_fingerprint = str(note["run"]), str(note["fingerprint"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
     run = folder / name
-    if begun_as != fingerprint or Path(name).name != name:
+    if noted_fingerprint != fingerprint or Path(name).name != name:
         return None
     try:
         return None if Recording.open(run).facts().get("ended") in _OVER else run
@@ -64,11 +64,11 @@ def run_under_way(folder: Path, fingerprint: str) -> Path | None:
 
 
 def begin_run(folder: Path, fingerprint: str, now: datetime | None = None) -> Path:
-    """The folder of a new run, named for the time in UTC; it is not made yet, but noted.
+    """A folder for a new run, named for the time in UTC; it is noted but not yet created.
 
     Args:
-        folder: Of the camera; made if it is not there.
-        fingerprint: As the camera is now.
+        folder: Folder of the camera; created if missing.
+        fingerprint: Fingerprint of the camera's present settings.
         now: The time.
 
     Raises:
@@ -80,7 +80,7 @@ def begin_run(folder: Path, fingerprint: str, now: datetime | None = None) -> Pa
 
 
 def is_run_name(name: str) -> bool:
-    """Whether a folder of this name is a run's.
+    """Whether this is the name of a run's folder.
 
     >>> is_run_name("20261123T173355Z-2"), is_run_name("notes")
     (True, False)
@@ -89,10 +89,10 @@ def is_run_name(name: str) -> bool:
 
 
 def free_place(folder: Path, now: datetime | None = None) -> Path:
-    """A folder for a new run, named for the time in UTC; it is not made yet.
+    """A folder for a new run, named for the time in UTC; it is not yet created.
 
     Args:
-        folder: Of the camera; made if it is not there.
+        folder: Folder of the camera; created if missing.
         now: The time.
 
     Raises:
@@ -108,7 +108,7 @@ def free_place(folder: Path, now: datetime | None = None) -> Path:
 
 
 def note_run(run: Path, fingerprint: str) -> None:
-    """Note that it is this run that goes on.
+    """Note that this is the run to resume.
 
     Raises:
         OutputError: The folder cannot be written.

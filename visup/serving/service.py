@@ -1,4 +1,4 @@
-"""The service: all cameras of a site, and what stands beside them, put together."""
+"""The service: all cameras of a site with monitoring, console, retention and the spare process."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from visup.serving.site_log import SITE, SiteEvent, Tell
 from visup.serving.site_supervisor import SiteSupervisor, serve_site
 from visup.serving.spare_process import SpareProcess
 
-LOOK_S = 1.0
-"""Seconds between two looks at how the service does."""
+UPDATE_S = 1.0
+"""Seconds between updates of the monitoring status."""
 
 
 def serve(site: Site, tell: Tell, stop: StopRequest) -> ExitCode:
-    """Watch a site until a stop is asked for, or every source was seen to its end; see `serve_site`.
+    """Watch a site until a stop is requested or every source has ended; see `serve_site`.
 
     Args:
-        site: What is watched.
-        tell: Told what happens.
-        stop: What signals ask for.
+        site: The site.
+        tell: Receives the events.
+        stop: Stop and reload requests by signals.
 
     Raises:
         OutputError: The store cannot be written, or another service uses it.
@@ -40,28 +40,33 @@ def serve(site: Site, tell: Tell, stop: StopRequest) -> ExitCode:
         stack.callback(console.close)
         keeper = Housekeeper(site.store, site.retention, tell)
 
-        def keep_house(supervisor: SiteSupervisor, now: float) -> None:
+        def apply_retention(supervisor: SiteSupervisor, now: float) -> None:
             keeper.limits = supervisor.limits
             keeper.turn(now, supervisor.going_on)
 
-        def look(supervisor: SiteSupervisor, now: float) -> None:
+        def update_monitoring(supervisor: SiteSupervisor, now: float) -> None:
             monitor.turn(supervisor, now, keeper)
 
-        beside = (keep_house, look, console.turn, *((spare.turn,) if site.spare else ()))
-        return serve_site(site, tell, stop, spare.start, beside=beside)
+        background = (
+            apply_retention,
+            update_monitoring,
+            console.turn,
+            *((spare.turn,) if site.spare else ()),
+        )
+        return serve_site(site, tell, stop, spare.start, beside=background)
 
 
 class MonitoringFeed:
-    """Tells those who ask how the service does; one that cannot listen stops nothing.
+    """Keeps the monitoring server up to date; a server that cannot listen is reported and left out.
 
     Args:
-        site: Which says where to listen.
-        tell: Told where that is.
+        site: Says where to listen.
+        tell: Receives the address or the fault.
     """
 
     def __init__(self, site: Site, tell: Tell) -> None:
         self._server: MonitoringServer | None = None
-        self._looked = -LOOK_S
+        self._updated_at = -UPDATE_S
         if site.listen is None:
             return
         try:
@@ -73,13 +78,13 @@ class MonitoringFeed:
         tell(SITE, f"health and metrics are at {at}", SiteEvent.MONITORED, address=at)
 
     def turn(self, supervisor: SiteSupervisor, now: float, keeper: Housekeeper) -> None:
-        """Look at how the service does, once in a while."""
-        if self._server and now - self._looked >= LOOK_S:
-            self._looked = now
+        """Update the status at intervals."""
+        if self._server and now - self._updated_at >= UPDATE_S:
+            self._updated_at = now
             status = supervisor.status(now)
             self._server.status = replace(status, room=keeper.room, deleted=dict(keeper.deleted))
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         if self._server:
             self._server.close()

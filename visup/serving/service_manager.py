@@ -1,4 +1,4 @@
-"""Words to systemd, where it has begun the service (`Type=notify`): ready, alive, stopping."""
+"""Notifications to systemd (`Type=notify`): ready, alive, stopping."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from contextlib import suppress
 
 
 def notify_manager(state: str) -> None:
-    """Tell the service manager something; nobody listens where it did not begin this process.
+    """Notify the service manager, if it started this process.
 
     Args:
         state: Such as 'READY=1', 'WATCHDOG=1', 'STOPPING=1'.
     """
-    place = os.environ.get("NOTIFY_SOCKET")
-    if not place:
+    path = os.environ.get("NOTIFY_SOCKET")
+    if not path:
         return
-    address = f"\0{place[1:]}" if place.startswith("@") else place
-    with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
-        told.connect(address)
-        told.send(state.encode())
+    address = f"\0{path[1:]}" if path.startswith("@") else path
+    with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.connect(address)
+        sender.send(state.encode())

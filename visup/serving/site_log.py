@@ -1,4 +1,4 @@
-"""What happens to cameras, told to whoever keeps the service: as lines, or as records that programs read."""
+"""The service log: events of cameras as lines of text or as JSON records."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from visup.agent.storage.wall_clock import utc_text
 from visup.wording import escaped_json
 
 SITE = "site"
-"""What messages that are about no camera are about."""
+"""Subject of messages that concern no single camera."""
 
 
 class SiteEvent(StrEnum):
-    """Kinds of what happens."""
+    """Kinds of events."""
 
     BEGUN = "begun"
     RESUMED = "resumed"
@@ -27,7 +27,7 @@ class SiteEvent(StrEnum):
     NOT_CLOSED = "not_closed"
     NOT_BEGUN = "not_begun"
     NOTICE = "notice"
-    """A word of the camera itself, such as that its stream dropped."""
+    """A message of the camera process, such as that its stream dropped."""
     ROLLED = "rolled"
     RELOADED = "reloaded"
     NOT_RELOADED = "not_reloaded"
@@ -56,26 +56,26 @@ _WARNINGS = frozenset(
 
 
 class Tell(Protocol):
-    """Told what happened."""
+    """Receives the events of the service."""
 
     def __call__(
         self, camera: str, text: str, kind: SiteEvent = SiteEvent.NOTICE, /, **facts: Any
     ) -> None:
-        """Pass it on.
+        """Pass an event on.
 
         Args:
             camera: Its name, or `SITE`.
             text: One sentence.
-            kind: What sort of thing it is.
-            facts: The same for programs, such as `run` or `exit_code`.
+            kind: Kind of event.
+            facts: Details for programs, such as `run` or `exit_code`.
         """
 
 
 class SiteLog:
-    """Writes what happens, a line each.
+    """Writes one line for each event.
 
     Args:
-        write: Takes a line.
+        write: Receives a line.
         as_json: Whether lines are JSON objects.
         now: Seconds since 1970.
     """
@@ -99,5 +99,5 @@ class SiteLog:
             self._write(f"{time_text} {camera}: {text}")
             return
         level = "warning" if kind in _WARNINGS else "info"
-        named = {"time": time_text, "level": level, "host": self._host, "camera": camera}
-        self._write(escaped_json({**named, "kind": kind.value, "text": text, **facts}))
+        record = {"time": time_text, "level": level, "host": self._host, "camera": camera}
+        self._write(escaped_json({**record, "kind": kind.value, "text": text, **facts}))

@@ -1,4 +1,4 @@
-"""All cameras of a site: each with a supervisor of its own; the site file can change under them."""
+"""Supervises all cameras of a site, each with a supervisor of its own; the site file can be reloaded."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from visup.serving.site.records import RetentionLimits, Site, SiteConsole
 from visup.serving.site_log import SITE, SiteEvent, Tell
 
 TURN_S = 0.1
-"""Seconds between two looks at all cameras."""
+"""Seconds between two turns of all supervisors."""
 
 
 class SiteSupervisor:
     """The supervisors of all cameras.
 
     Args:
-        site: What is watched.
-        tell: Told what happens.
-        start: Begins a process.
+        site: The site.
+        tell: Receives the events.
+        start: Starts a process.
 
     Attributes:
-        cameras: By name; those that are watched no more are gone once their processes have ended.
+        cameras: The supervisors by name, without cameras that are no longer in the site file.
     """
 
     def __init__(
@@ -47,26 +47,26 @@ class SiteSupervisor:
         self._killed_at_close = False
 
     def turn(self, now: float) -> None:
-        """See to every camera once."""
+        """Do what is due for every camera."""
         for one in (*self.cameras.values(), *self._left):
             one.turn(now)
         self._killed_at_close |= any(one.killed_at_close for one in self._left)
         self._left = [one for one in self._left if one.state is not CameraState.OVER]
 
     def reload(self, site: Site, now: float) -> None:
-        """Watch what a changed site file says; cameras that did not change are not touched.
+        """Apply a changed site file; cameras that did not change are not touched.
 
-        A camera whose name was given to other settings ends in good order and begins with these.
+        A camera whose settings changed is asked to end and restarted with the new ones.
         """
         if site.store != self._site.store:
-            told = "another store is used after a restart of the service"
-            self._tell(SITE, told, SiteEvent.NOT_RELOADED)
-        wanted = {c.name: c for c in site.cameras}
-        for name in [n for n in self.cameras if n not in wanted]:
+            text = "another store is used after a restart of the service"
+            self._tell(SITE, text, SiteEvent.NOT_RELOADED)
+        cameras = {c.name: c for c in site.cameras}
+        for name in [n for n in self.cameras if n not in cameras]:
             gone = self.cameras.pop(name)
             gone.stop(now)
             self._left.append(gone)
-        for name, camera in wanted.items():
+        for name, camera in cameras.items():
             if name not in self.cameras:
                 self.cameras[name] = self._supervisor(name, site)
             elif self.cameras[name].camera != camera:
@@ -74,40 +74,40 @@ class SiteSupervisor:
         self._site = site
 
     def stop(self, now: float) -> None:
-        """Watch nothing any more."""
+        """Stop watching all cameras."""
         for one in self.cameras.values():
             one.stop(now)
 
     def status(self, now: float) -> SiteStatus:
-        """What is told of it to those who ask from outside."""
+        """The state of the site for monitoring."""
         return SiteStatus(now, tuple(one.status(now) for one in self.cameras.values()))
 
     @property
     def going_on(self) -> tuple[Path, ...]:
-        """Folders of the runs that are under way, or will be taken up."""
-        every = (*self.cameras.values(), *self._left)
-        return tuple(one.run for one in every if one.run)
+        """Folders of the runs that are active or will be resumed."""
+        supervisors = (*self.cameras.values(), *self._left)
+        return tuple(one.run for one in supervisors if one.run)
 
     @property
     def limits(self) -> RetentionLimits:
-        """What is kept of the store, as the site file says now."""
+        """The retention limits of the present site file."""
         return self._site.retention
 
     @property
     def console(self) -> SiteConsole | None:
-        """The console, as the site file says now."""
+        """The console of the present site file."""
         return self._site.console
 
     @property
     def calm(self) -> bool:
-        """Whether no camera is just being begun or ended."""
-        return all(one.state in _CALM for one in self.cameras.values())
+        """Whether no camera is starting or closing."""
+        return all(one.state in _CALM_STATES for one in self.cameras.values())
 
     @property
     def over(self) -> bool:
-        """Whether no process is left, and none will be begun."""
-        every = (*self.cameras.values(), *self._left)
-        return all(one.state is CameraState.OVER for one in every)
+        """Whether no process is left and none will be started."""
+        supervisors = (*self.cameras.values(), *self._left)
+        return all(one.state is CameraState.OVER for one in supervisors)
 
     @property
     def closed_well(self) -> bool:
@@ -116,20 +116,20 @@ class SiteSupervisor:
 
     def _supervisor(self, name: str, site: Site) -> CameraSupervisor:
         (camera,) = (c for c in site.cameras if c.name == name)
-        store = self._site.store  # one store for the whole life of a service
+        store = self._site.store  # the store does not change during the life of a service
         return CameraSupervisor(camera, store, self._tell, _sharing(self._start, len(site.cameras)))
 
 
 def _sharing(start: Callable[[CameraJob], Child], cameras: int) -> Callable[[CameraJob], Child]:
-    """How cameras are started when they share the cores: threads in each other's way only cost time."""
+    """Start cameras with an equal share of the cores each: more threads than cores only cost time."""
     threads = max(1, (os.cpu_count() or 1) // cameras)
     return lambda job: start(replace(job, threads=threads))
 
 
-_CALM = (CameraState.WATCHING, CameraState.OVER)
+_CALM_STATES = (CameraState.WATCHING, CameraState.OVER)
 
 Beside = Callable[[SiteSupervisor, float], None]
-"""What is done besides at every turn, given the time; it must not wait, and sees to how often is right."""
+"""Called at every turn with the time; it must not block, and limits its own rate."""
 
 
 def serve_site(
@@ -140,15 +140,15 @@ def serve_site(
     clock: WaitingClock | None = None,
     beside: Sequence[Beside] = (),
 ) -> ExitCode:
-    """Watch a site until a stop is asked for, or every source was seen to its end.
+    """Watch a site until a stop is requested or every source has ended.
 
     Args:
-        site: What is watched.
-        tell: Told what happens.
-        stop: What signals ask for; a reload reads the site file again.
-        start: Begins a process.
-        clock: By what it goes.
-        beside: What is done besides.
+        site: The site.
+        tell: Receives the events.
+        stop: Stop and reload requests by signals; a reload reads the site file again.
+        start: Starts a process.
+        clock: Clock of the service.
+        beside: Further tasks of every turn.
 
     Returns:
         `GOOD`, or `NOT_RECORDED` when a process had to be killed as it did not close in time.
@@ -182,8 +182,8 @@ def _reload(supervisor: SiteSupervisor, path: Path, tell: Tell, now: float) -> N
     try:
         site = read_site(path)
     except VisupError as fault:
-        told = f"the site file has mistakes, nothing was changed: {fault}"
-        tell(SITE, told, SiteEvent.NOT_RELOADED)
+        text = f"the site file has mistakes, nothing was changed: {fault}"
+        tell(SITE, text, SiteEvent.NOT_RELOADED)
         return
     tell(SITE, "the site file was reloaded", SiteEvent.RELOADED)
     supervisor.reload(site, now)

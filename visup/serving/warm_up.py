@@ -1,6 +1,6 @@
-"""What a process does that has no job yet: what cameras need is loaded, and compiled loops with it.
+"""Warms up a process that has no job yet: loads the modules and the compiled loops.
 
-As a program (`python -m visup.serving.warm_up`) it has the loops compiled, so that no run waits for that.
+As a program (`python -m visup.serving.warm_up`) it compiles the loops, so that no run waits for that.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from visup.runs.demo import demo_settings
 from visup.runs.wiring import build_agent, open_video
 
 FRAMES = 12
-"""Of the shipped clip: in these there is something that moves, is followed and is recognised."""
+"""Frames of the shipped clip, enough for something to move, be tracked and be recognised."""
 
 
 def warm_up(stop: Callable[[], bool] = lambda: False) -> None:
-    """Look at some frames of the shipped clip.
+    """Process some frames of the shipped clip.
 
     Args:
-        stop: Asked before each frame whether there is something better to do.
+        stop: Asked before each frame; True ends the warm-up.
     """
     with suppress(VisupError):
         settings = demo_settings()
@@ -39,7 +39,7 @@ def warm_up(stop: Callable[[], bool] = lambda: False) -> None:
 
 
 def has_job() -> bool:
-    """Whether something was written to standard input, or nobody will."""
+    """Whether standard input has data or is closed."""
     return bool(select.select([sys.stdin], [], [], 0.0)[0])
 
 

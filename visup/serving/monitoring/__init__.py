@@ -1,5 +1,5 @@
-"""How a service does, for other programs: `/healthz`, `/readyz`, `/metrics`.
+"""Health and metrics of a service for other programs: `/healthz`, `/readyz`, `/metrics`.
 
-Read `camera_figures.py` (what is counted of a camera), `status.py` (all of a site at one moment),
-`prometheus.py` (its form) and `endpoint.py` (who may ask).
+Read `camera_figures.py` (counters of a camera), `status.py` (the state of a site), `prometheus.py` (the
+exposition format) and `endpoint.py` (the HTTP server).
 """

@@ -1,4 +1,4 @@
-"""What is counted of a camera over all its processes: each counts from nothing, the sums never go back."""
+"""Counters and gauges of a camera over all its processes; totals never decrease."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any
 
 COUNTED = ("frames", "dropped", "cpu_s", "alerts_info", "alerts_warning", "alerts_critical")
 PHASE = "ms_"
-"""Before the name of a phase: milliseconds that it took."""
+"""Prefix of the name of a phase; the value is its time in milliseconds."""
 
 MEASURED = ("lag_s", "objects", "alerts_open")
 
 
 class CameraFigures:
-    """Sums and latest figures of a camera.
+    """Counters and gauges of a camera.
 
     Attributes:
-        latest: Figures that go up and down, as they were told last.
+        latest: The gauges as last reported.
     """
 
     def __init__(self) -> None:
@@ -25,9 +25,9 @@ class CameraFigures:
         self._before: dict[str, float] = {}
         self._now: dict[str, float] = {}
 
-    def take(self, told: Mapping[str, Any]) -> None:
-        """Take note of what a process tells of itself; what is no figure is left out."""
-        for name, value in told.items():
+    def take(self, reported: Mapping[str, Any]) -> None:
+        """Store the figures that a process reports; values that are not finite numbers are ignored."""
+        for name, value in reported.items():
             if not isinstance(value, int | float) or isinstance(value, bool) or not isfinite(value):
                 continue
             if name in COUNTED or name.startswith(PHASE):
@@ -36,13 +36,13 @@ class CameraFigures:
                 self.latest[name] = float(value)
 
     def process_ended(self) -> None:
-        """The next process counts from nothing."""
+        """Start again from 0 for the next process."""
         self._before = dict(self.totals)
         self._now = {}
         self.latest = {}
 
     @property
     def totals(self) -> Mapping[str, float]:
-        """Sums over all processes so far."""
+        """The counters over all processes so far."""
         names = [*self._before, *(n for n in self._now if n not in self._before)]
         return {n: self._before.get(n, 0.0) + self._now.get(n, 0.0) for n in names}

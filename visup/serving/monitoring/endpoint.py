@@ -1,7 +1,7 @@
-"""The server that tells how a service does: to this machine alone, unless the site file says otherwise.
+"""The HTTP server of the monitoring endpoints; by default it listens on this machine only.
 
-It answers three addresses, reads nothing of a request but its first line and headers, and is of threads of
-its own: whoever asks, or hangs, costs the cameras nothing.
+It serves three paths, reads only the request line and headers, and runs in its own threads, so that slow or
+hanging clients do not affect the cameras.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from visup.serving.monitoring.prometheus import metrics_page
 from visup.serving.monitoring.status import SiteStatus
 
 PATIENCE_S = 5.0
-"""For a client that is slow, seconds."""
+"""Socket timeout for a client, seconds."""
 
 MOST_CLIENTS = 16
-"""At once; whoever comes besides is turned away."""
+"""Concurrent requests; further ones are closed at once."""
 
 Answer = tuple[HTTPStatus, bytes, str]
 
@@ -33,12 +33,12 @@ class MonitoringServer:
 
     Args:
         host: Address to listen on.
-        port: Number; 0 for any that is free.
-        clock: Seconds from any start, by which ages are told.
+        port: Port; 0 for any free one.
+        clock: Monotonic clock, seconds, for ages.
 
     Attributes:
-        status: Of the site; replaced as a whole by whoever looks at it.
-        address: Where it listens, as part of a URL.
+        status: The state of the site; replaced as a whole by its owner.
+        address: HOST:PORT that it listens on, for URLs.
 
     Raises:
         OutputError: It cannot listen there.
@@ -63,12 +63,12 @@ class MonitoringServer:
         self._thread.start()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._server.shutdown()
         self._server.server_close()
 
     def answer(self, path: str, accept: str = "") -> Answer:
-        """What is told of an address: status, body, content type."""
+        """The response to a path: status, body, content type."""
         status, now = self.status, self._clock()
         if path == "/healthz":
             return _json(status.healthy(now), {"healthy": status.healthy(now)})
@@ -80,8 +80,8 @@ class MonitoringServer:
                 return (HTTPStatus.OK, *metrics_page(status, accept))
             except ExtraMissingError as missing:
                 return HTTPStatus.SERVICE_UNAVAILABLE, f"{missing}\n".encode(), _TEXT
-        told = b"/healthz, /readyz and /metrics are what there is.\n"
-        return HTTPStatus.NOT_FOUND, told, _TEXT
+        body = b"/healthz, /readyz and /metrics are what there is.\n"
+        return HTTPStatus.NOT_FOUND, body, _TEXT
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         answer = self.answer
@@ -105,8 +105,8 @@ class MonitoringServer:
                 self.end_headers()
                 self.wfile.write(body)
 
-            def log_message(self, *said: Any) -> None:
-                """Who asks is nobody's business."""
+            def log_message(self, *arguments: Any) -> None:
+                """Requests are not logged."""
 
         return MonitoringHandler
 
@@ -115,12 +115,12 @@ class _BoundedServer(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = MOST_CLIENTS
 
-    def __init__(self, *given: Any) -> None:
-        self._room = threading.BoundedSemaphore(MOST_CLIENTS)
-        super().__init__(*given)
+    def __init__(self, *arguments: Any) -> None:
+        self._free_slots = threading.BoundedSemaphore(MOST_CLIENTS)
+        super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        if not self._room.acquire(blocking=False):
+        if not self._free_slots.acquire(blocking=False):
             self.shutdown_request(request)
             return
         super().process_request(request, client_address)
@@ -129,10 +129,10 @@ class _BoundedServer(ThreadingHTTPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._room.release()
+            self._free_slots.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that has gone is no fault of the service."""
+        """A client that disconnected is no error of the service."""
 
 
 def _server_of(host: str) -> type[_BoundedServer]:
@@ -143,6 +143,6 @@ def _server_of(host: str) -> type[_BoundedServer]:
 _TEXT = "text/plain; charset=utf-8"
 
 
-def _json(fine: bool, told: dict[str, Any]) -> Answer:
-    status = HTTPStatus.OK if fine else HTTPStatus.SERVICE_UNAVAILABLE
-    return status, json.dumps(told).encode() + b"\n", "application/json"
+def _json(ok: bool, body: dict[str, Any]) -> Answer:
+    status = HTTPStatus.OK if ok else HTTPStatus.SERVICE_UNAVAILABLE
+    return status, json.dumps(body).encode() + b"\n", "application/json"

@@ -1,4 +1,4 @@
-"""The figures of a site in the form that Prometheus reads; needs `visup[serve]` (prometheus-client)."""
+"""The metrics of a site in the Prometheus exposition format; needs `visup[serve]` (prometheus-client)."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ _SEVERITIES = ("info", "warning", "critical")
 
 
 def metrics_page(status: SiteStatus, accept: str) -> tuple[bytes, str]:
-    """All figures as a page.
+    """All metrics as one page.
 
     Args:
-        status: Of the site.
-        accept: What the reader says it takes (the header of that name).
+        status: The state of the site.
+        accept: The `Accept` header of the request.
 
     Returns:
         The page and its content type.
@@ -71,31 +71,31 @@ def metrics_page(status: SiteStatus, accept: str) -> tuple[bytes, str]:
     except ModuleNotFoundError as missing:
         raise ExtraMissingError("a page of metrics", "serve") from missing
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Collected(status))
+    registry.register(_Collector(status))
     encode, kind = choose_encoder(accept)
     return bytes(encode(registry)), kind
 
 
-class _Collected:
-    """What prometheus-client asks for figures.
+class _Collector:
+    """A prometheus-client collector.
 
     Args:
-        status: Of the site.
+        status: The state of the site.
     """
 
     def __init__(self, status: SiteStatus) -> None:
         self._status = status
 
     def collect(self) -> Iterator[Metric]:
-        """Every figure of every camera."""
+        """Every metric of every camera, and those of the store."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
-        for name, said, value in _COUNTERS:
-            yield self._family(CounterMetricFamily(name, said, labels=["camera"]), value)
-        for name, said, value in _GAUGES:
-            yield self._family(GaugeMetricFamily(name, said, labels=["camera"]), value)
-        yield from self._labelled()
-        yield from self._of_the_store()
+        for name, help_text, value in _COUNTERS:
+            yield self._family(CounterMetricFamily(name, help_text, labels=["camera"]), value)
+        for name, help_text, value in _GAUGES:
+            yield self._family(GaugeMetricFamily(name, help_text, labels=["camera"]), value)
+        yield from self._labelled_metrics()
+        yield from self._store_metrics()
         yield _build_info()
 
     def _family(self, family: Any, value: Value) -> Metric:
@@ -105,8 +105,8 @@ class _Collected:
                 family.add_metric([camera.name], figure)
         return family
 
-    def _labelled(self) -> Iterator[Metric]:
-        """Figures of a camera that come in several kinds."""
+    def _labelled_metrics(self) -> Iterator[Metric]:
+        """Metrics of a camera with a second label."""
         from prometheus_client.core import CounterMetricFamily
 
         phases = CounterMetricFamily(
@@ -126,7 +126,7 @@ class _Collected:
         yield phases
         yield alerts
 
-    def _of_the_store(self) -> Iterator[Metric]:
+    def _store_metrics(self) -> Iterator[Metric]:
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         room = GaugeMetricFamily("visup_store_bytes", "Room of the store.", labels=["kind"])

@@ -1,4 +1,4 @@
-"""A site at one moment, as those see it who ask from outside."""
+"""The state of a site at one moment, for monitoring."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 READY_STATES = ("watching", "over")
 STALE_S = 15.0
-"""A supervisor that has not looked at its cameras for so long is not well, seconds."""
+"""A supervisor that has not updated its status for this long is unhealthy, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,12 +16,12 @@ class CameraStatus:
 
     Attributes:
         name: Its name.
-        state: What is done with it now.
-        restarts: How often its process was begun again.
-        memory_mb: Memory that its process has in use, megabytes; None where nobody knows.
-        step_age_s: How long ago its process told of a step, seconds; None before the first.
-        totals: Sums over all its processes.
-        latest: Figures that go up and down.
+        state: The state of its supervision.
+        restarts: How often its process was restarted.
+        memory_mb: Resident memory of its process, megabytes; None where not known.
+        step_age_s: Seconds since its process last reported a step; None before the first.
+        totals: Counters over all its processes.
+        latest: Gauges.
     """
 
     name: str
@@ -38,10 +38,10 @@ class SiteStatus:
     """All cameras of a site.
 
     Attributes:
-        at: When that was, by the clock of whoever asks for its age.
+        at: Time of the status, seconds of the monitoring server's clock.
         cameras: In the order of the file.
-        room: Bytes by what they are, such as 'free' and 'evidence'.
-        deleted: Files that were deleted to make room, by what they were.
+        room: Bytes by kind, such as 'free' and 'evidence'.
+        deleted: Counts of what was deleted to free space, by kind.
     """
 
     at: float
@@ -50,9 +50,9 @@ class SiteStatus:
     deleted: Mapping[str, float] = field(default_factory=dict)
 
     def healthy(self, now: float) -> bool:
-        """Whether the supervisor lives: it looked at its cameras a moment ago."""
+        """Whether the supervisor updated the status recently."""
         return now - self.at < STALE_S
 
     def ready(self, now: float) -> bool:
-        """Whether every camera is watched, or was seen to its end."""
+        """Whether every camera is watched or has ended."""
         return self.healthy(now) and all(c.state in READY_STATES for c in self.cameras)

@@ -1,5 +1,5 @@
-"""Room for what is recorded: what is kept for how long, and what goes first where the disk is full.
+"""Disk space and retention: how long recordings are kept, and what is deleted first when the disk is full.
 
-Read `stored.py` (what there is), `retention.py` (what goes, a pure function), `housekeeper.py` (who sees to
-it).
+Read `stored.py` (the content of a store), `retention.py` (what to delete, a pure function) and
+`housekeeper.py` (deletes it).
 """

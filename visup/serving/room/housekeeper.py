@@ -1,4 +1,4 @@
-"""Sees to the room of a store once in a while, in a thread: a slow disk holds up no camera."""
+"""Applies the retention rules to a store at intervals, in a thread, so that a slow disk blocks no camera."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from visup.serving.room.stored import StoredFiles, StoredRun, look_into
 from visup.serving.site.records import RetentionLimits
 from visup.serving.site_log import SITE, SiteEvent, Tell
 
-LOOK_S = 10.0
-"""Seconds between two looks: cameras of a site write some megabytes meanwhile."""
+SCAN_S = 10.0
+"""Seconds between two scans, in which the cameras of a site write some megabytes."""
 
 WHY = {
     RemovalReason.AGE: "they were older than is to be kept",
@@ -27,18 +27,18 @@ WHY = {
 
 
 class Housekeeper:
-    """Deletes what is not kept any more.
+    """Deletes what exceeds the retention limits.
 
     Args:
         store: Folder of all runs.
-        limits: What is kept; replaced when the site file changes.
-        tell: Told what was deleted.
+        limits: The retention limits; replaced when the site file changes.
+        tell: Receives the events.
         now: Seconds since 1970.
 
     Attributes:
         limits: As given.
-        room: Bytes of the store by what they are, as last looked at.
-        deleted: How many runs, and evidence of how many alerts, were deleted so far.
+        room: Bytes of the store by kind at the last scan.
+        deleted: Counts of the runs, and of the alerts whose evidence was deleted.
     """
 
     def __init__(
@@ -52,29 +52,29 @@ class Housekeeper:
         self.room: Mapping[str, float] = {}
         self.deleted: Counter[str] = Counter({"runs": 0, EVIDENCE: 0})
         self._store, self._tell, self._now = store, tell, now
-        self._looked: float | None = None
+        self._scanned_at: float | None = None
         self._full = False
         self._thread: threading.Thread | None = None
 
     def turn(self, now: float, going_on: Iterable[Path]) -> None:
-        """Look, if it is time to and the last look is over; returns at once.
+        """Start a scan if one is due and none is running; returns at once.
 
         Args:
-            now: Seconds from any start.
+            now: Seconds of a monotonic clock.
             going_on: Folders of the runs that are under way.
         """
         busy = self._thread is not None and self._thread.is_alive()
-        if busy or (self._looked is not None and now - self._looked < LOOK_S):
+        if busy or (self._scanned_at is not None and now - self._scanned_at < SCAN_S):
             return
-        self._looked = now
+        self._scanned_at = now
         under_way = tuple(going_on)
         self._thread = threading.Thread(
-            target=self._look_quietly, args=(under_way,), name="housekeeper", daemon=True
+            target=self._scan_in_thread, args=(under_way,), name="housekeeper", daemon=True
         )
         self._thread.start()
 
     def look(self, going_on: Iterable[Path]) -> None:
-        """Look, and delete what is not kept any more.
+        """Scan the store and delete what exceeds the limits.
 
         Args:
             going_on: Folders of the runs that are under way.
@@ -87,11 +87,11 @@ class Housekeeper:
         for one in gone:
             _remove(one)
         self._note(files, gone)
-        self._tell_of(gone)
-        self._tell_if_full(files.free + sum(one.size for one in gone))
+        self._report_deleted(gone)
+        self._report_if_full(files.free + sum(one.size for one in gone))
 
-    def _look_quietly(self, going_on: Iterable[Path]) -> None:
-        with suppress(OSError):  # a store that is away comes back, or its cameras tell
+    def _scan_in_thread(self, going_on: Iterable[Path]) -> None:
+        with suppress(OSError):  # the store may return; if not, its cameras report it
             self.look(going_on)
 
     def _note(self, files: StoredFiles, gone: tuple[Removal, ...]) -> None:
@@ -102,23 +102,23 @@ class Housekeeper:
         }
         self.deleted.update(_kind(one) for one in gone)
 
-    def _tell_of(self, gone: tuple[Removal, ...]) -> None:
+    def _report_deleted(self, gone: tuple[Removal, ...]) -> None:
         for why in RemovalReason:
             counts = Counter(_kind(one) for one in gone if one.why is why)
             if counts:
                 freed = sum(one.size for one in gone if one.why is why) / 1e6
-                said = f"deleted {_listed(counts)} ({freed:.1f} MB): {WHY[why]}"
+                text = f"deleted {_listed(counts)} ({freed:.1f} MB): {WHY[why]}"
                 kind = SiteEvent.NO_ROOM if why is RemovalReason.DISK else SiteEvent.DELETED
-                self._tell(SITE, said, kind, why=why.value, freed_bytes=round(freed * 1e6))
+                self._tell(SITE, text, kind, why=why.value, freed_bytes=round(freed * 1e6))
 
-    def _tell_if_full(self, free: float) -> None:
-        """Say it when nothing is left that could go, once until there is room again."""
+    def _report_if_full(self, free: float) -> None:
+        """Warn when nothing more can be deleted, once until there is space again."""
         full = free < self.limits.free_bytes
         if full and not self._full:
-            said = (
+            text = (
                 f"the disk has {free / 1e9:.1f} GB left, and nothing more can be deleted: make room"
             )
-            self._tell(SITE, said, SiteEvent.NO_ROOM, free_bytes=round(free))
+            self._tell(SITE, text, SiteEvent.NO_ROOM, free_bytes=round(free))
         self._full = full
 
 
@@ -128,13 +128,13 @@ def _kind(one: Removal) -> str:
 
 def _listed(counts: Mapping[str, int]) -> str:
     runs, alerts = counts.get("runs", 0), counts.get(EVIDENCE, 0)
-    told = [f"{runs} {'run' if runs == 1 else 'runs'}"] if runs else []
-    told += [f"the evidence of {alerts} {'alert' if alerts == 1 else 'alerts'}"] if alerts else []
-    return " and ".join(told)
+    parts = [f"{runs} {'run' if runs == 1 else 'runs'}"] if runs else []
+    parts += [f"the evidence of {alerts} {'alert' if alerts == 1 else 'alerts'}"] if alerts else []
+    return " and ".join(parts)
 
 
 def _remove(one: Removal) -> None:
-    """Delete it; a file that cannot be is tried again at the next look."""
+    """Delete it; a file that cannot be deleted is tried again at the next scan."""
     if isinstance(one.what, StoredRun):
         folder = one.what.folder
         others = [p for p in folder.iterdir() if p.name != EVIDENCE] if folder.is_dir() else []
@@ -143,7 +143,7 @@ def _remove(one: Removal) -> None:
         folder = one.what.files[0].parent.parent
         _delete(one.what.files)
     for empty in (folder / EVIDENCE, folder):
-        with suppress(OSError):  # there is something left in it
+        with suppress(OSError):  # not empty
             empty.rmdir()
 
 

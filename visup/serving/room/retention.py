@@ -1,8 +1,8 @@
-"""What goes from a store, by age, by the room that it may take, and by the room that is left on the disk.
+"""What to delete from a store, by age, by the size limit of the store, and by the free space of the disk.
 
-Three rules, in this order: what is too old goes; where the store is too large the oldest runs go, and the
-evidence of alerts after them; where the disk is full evidence goes first, since a journal is what a camera
-goes on from. A run that is under way keeps its journal.
+Three rules, in this order: what is too old is deleted; if the store is too large the oldest runs are deleted,
+then the evidence of alerts; if the disk is full evidence goes first, because a camera resumes from its
+journal. The journal of an active run is never deleted.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from visup.serving.site.records import RetentionLimits
 
 DAY_S = 86400.0
 FRESH_S = 120.0
-"""A run that was written to so lately may have just begun, or its books are being closed; whoever was told of
-an alert so lately may still look at its evidence."""
+"""Runs written within this time are kept: they may have just begun or be closing. So is evidence, except by
+age: someone may still be looking at a recent alert."""
 
 SLACK = 1.1
-"""So much more than is wanted is freed on a full disk, that not every look finds it full again."""
+"""A full disk is freed beyond its limit by this factor, so that the next scan does not find it full again."""
 
 
 class RemovalReason(StrEnum):
-    """RemovalReason something goes."""
+    """The rule by which something is deleted."""
 
     AGE = "age"
     STORE = "store"
@@ -33,11 +33,11 @@ class RemovalReason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Removal:
-    """Something that goes.
+    """Something to delete.
 
     Attributes:
-        what: A run, all but its evidence; or the evidence of an alert.
-        why: By which rule.
+        what: A run without its evidence, or the evidence of an alert.
+        why: The rule.
     """
 
     what: StoredRun | StoredEvidence
@@ -50,15 +50,15 @@ class Removal:
 
 
 def removals(files: StoredFiles, limits: RetentionLimits, now: float) -> tuple[Removal, ...]:
-    """What is to go, in this order.
+    """What to delete, in this order.
 
     Args:
-        files: What there is.
-        limits: What is kept.
+        files: The content of the store.
+        limits: The retention limits.
         now: Seconds since 1970.
     """
-    over = (r for r in files.runs if not r.goes_on and r.size and now - r.written > FRESH_S)
-    runs = sorted(over, key=lambda r: r.written)
+    finished = (r for r in files.runs if not r.goes_on and r.size and now - r.written > FRESH_S)
+    runs = sorted(finished, key=lambda r: r.written)
     evidence = sorted((e for r in files.runs for e in r.evidence), key=lambda e: e.written)
     settled = [e for e in evidence if now - e.written > FRESH_S]
     gone: list[Removal] = [
@@ -67,24 +67,24 @@ def removals(files: StoredFiles, limits: RetentionLimits, now: float) -> tuple[R
     ]
     if limits.store_bytes is not None:
         excess = files.size - limits.store_bytes - _freed(gone)
-        gone += _until(excess, [*runs, *settled], gone, RemovalReason.STORE)
+        gone += _freeing(excess, [*runs, *settled], gone, RemovalReason.STORE)
     free = files.free + _freed(gone)
     short = SLACK * limits.free_bytes - free if free < limits.free_bytes else 0.0
-    gone += _until(short, [*settled, *runs], gone, RemovalReason.DISK)
+    gone += _freeing(short, [*settled, *runs], gone, RemovalReason.DISK)
     return tuple(gone)
 
 
-Kept = StoredRun | StoredEvidence
+Stored = StoredRun | StoredEvidence
 
 
 def _old(items: list[StoredRun] | list[StoredEvidence], before: float) -> Iterator[Removal]:
     yield from (Removal(item, RemovalReason.AGE) for item in items if item.written < before)
 
 
-def _until(
-    needed: float, items: list[Kept], gone: list[Removal], why: RemovalReason
+def _freeing(
+    needed: float, items: list[Stored], gone: list[Removal], why: RemovalReason
 ) -> Iterator[Removal]:
-    """So many of them, the first first, that enough is freed."""
+    """The first items that together free enough."""
     already = {id(one.what) for one in gone}
     for item in items:
         if needed <= 0:

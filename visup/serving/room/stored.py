@@ -1,4 +1,4 @@
-"""What a store holds: runs, and the evidence of each alert in them."""
+"""The content of a store: runs, and the evidence of each alert in them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from visup.serving.run_store import is_run_name
 
 @dataclass(frozen=True, slots=True)
 class StoredEvidence:
-    """Files of one alert: its picture, its clip, its record.
+    """The files of one alert: picture, clip and record.
 
     Attributes:
         files: Paths.
@@ -33,11 +33,11 @@ class StoredRun:
     """A run in the store.
 
     Attributes:
-        folder: Of the run.
-        size: Bytes of all but evidence.
+        folder: Folder of the run.
+        size: Bytes without evidence.
         written: When it was last written to, seconds since 1970.
-        goes_on: Whether it is under way.
-        evidence: Of its alerts, the oldest first.
+        goes_on: Whether it is active.
+        evidence: Evidence of its alerts, oldest first.
     """
 
     folder: Path
@@ -49,11 +49,11 @@ class StoredRun:
 
 @dataclass(frozen=True, slots=True)
 class StoredFiles:
-    """All that a store holds.
+    """The content of a store.
 
     Attributes:
-        runs: Of all cameras.
-        free: Bytes that are free on its disk.
+        runs: Runs of all cameras.
+        free: Free bytes on its disk.
     """
 
     runs: tuple[StoredRun, ...]
@@ -71,11 +71,11 @@ class StoredFiles:
 
 
 def look_into(store: Path, going_on: Iterable[Path]) -> StoredFiles:
-    """What a store holds now; files that vanish meanwhile are left out.
+    """Scan a store; files that vanish meanwhile are left out.
 
     Args:
         store: Folder of all runs.
-        going_on: Folders of the runs that are under way.
+        going_on: Folders of the active runs.
     """
     under_way = set(going_on)
     folders = sorted(p for p in store.glob("*/*") if is_run_name(p.name) and _is_plain_folder(p))
@@ -84,43 +84,43 @@ def look_into(store: Path, going_on: Iterable[Path]) -> StoredFiles:
 
 
 def _is_plain_folder(path: Path) -> bool:
-    """What a link leads to belongs to somebody else."""
+    """A folder that is no symbolic link: the target of a link does not belong to the store."""
     return path.is_dir() and not path.is_symlink()
 
 
 def _run(folder: Path, *, goes_on: bool) -> StoredRun:
-    own = [seen for p in folder.iterdir() if p.name != EVIDENCE for seen in _sizes([p])]
+    own = [entries for p in folder.iterdir() if p.name != EVIDENCE for entries in _sizes([p])]
     evidence = folder / EVIDENCE
-    kept = tuple(_evidence(evidence)) if _is_plain_folder(evidence) else ()
+    alerts = tuple(_evidence(evidence)) if _is_plain_folder(evidence) else ()
     journal = folder / JOURNAL
-    written = max((at for _, at in own), default=max((e.written for e in kept), default=0.0))
+    written = max((at for _, at in own), default=max((e.written for e in alerts), default=0.0))
     with suppress(OSError):
         written = written or journal.stat().st_mtime
-    return StoredRun(folder, sum(size for size, _ in own), written, goes_on, kept)
+    return StoredRun(folder, sum(size for size, _ in own), written, goes_on, alerts)
 
 
 def _evidence(folder: Path) -> Iterator[StoredEvidence]:
-    """By alert: files whose names differ in their ending alone belong together."""
-    together: dict[str, list[Path]] = {}
+    """Evidence by alert: files whose names differ only in their suffixes belong together."""
+    by_stem: dict[str, list[Path]] = {}
     for path in folder.iterdir():
-        together.setdefault(path.name.lstrip(".").partition(".")[0], []).append(path)
+        by_stem.setdefault(path.name.lstrip(".").partition(".")[0], []).append(path)
     found = []
-    for files in together.values():
-        seen = _sizes(files)
-        if seen:
-            size, written = sum(s for s, _ in seen), max(at for _, at in seen)
+    for files in by_stem.values():
+        entries = _sizes(files)
+        if entries:
+            size, written = sum(s for s, _ in entries), max(at for _, at in entries)
             found.append(StoredEvidence(tuple(sorted(files)), size, written))
     yield from sorted(found, key=lambda e: (e.written, e.files))
 
 
 def _sizes(paths: Sequence[Path]) -> list[tuple[int, float]]:
-    """Size and time of each file that is there; of a folder, those of all files in it."""
+    """Size and time of each existing file; for a folder, of all files in it."""
     found = []
     for path in paths:
         with suppress(OSError):
             if _is_plain_folder(path):
                 found += _sizes(list(path.iterdir()))
             else:
-                told = path.lstat()
-                found.append((told.st_size, told.st_mtime))
+                status = path.lstat()
+                found.append((status.st_size, status.st_mtime))
     return found

@@ -1,4 +1,4 @@
-"""A camera of the site file as settings of a run: names of files from the file's folder, secrets in place."""
+"""A camera of the site file as settings of a run, with file names resolved and secrets filled in."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from visup.version import __version__
 
 PIECE_BYTES = 2**20
 CLOSING_S = 2.0
-"""For a sink at the end of a run, seconds: a service that is stopped closes within five."""
+"""How long a sink may take at the end of a run, seconds: a stopped service closes within five."""
 
 RESERVE_BYTES = 4 * 2**20
-"""Set aside in each journal for a full disk: minutes of 640 x 480 pixels at 5 frames a second."""
+"""Reserved in each journal for a full disk: minutes of 640 x 480 pixels at 5 frames a second."""
 
 
 def camera_of(
     site: SiteTable, one: CameraTable, folder: Path, environment: Mapping[str, str]
 ) -> SiteCamera:
-    """A camera with all that its runs are given.
+    """A camera with the settings and options of its runs.
 
     Args:
         site: The whole file.
         one: The camera's table.
-        folder: Of the site file, absolute.
-        environment: Variables that placeholders stand for.
+        folder: Folder of the site file, absolute.
+        environment: Values of placeholders.
 
     Raises:
         SettingsError: A placeholder cannot be replaced.
@@ -68,7 +68,7 @@ def camera_of(
         attention=one.attention,
         rest_s=one.rest_s or None,
     )
-    QuietHours.read(one.quiet, site.timezone)  # mistakes are told now
+    QuietHours.read(one.quiet, site.timezone)  # reports mistakes now
     options = _options(site, one, folder, environment)
     limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
     return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
@@ -100,19 +100,19 @@ def _options(
 
 
 def _evidence(site: SiteTable, one: CameraTable) -> EvidenceOptions | None:
-    given = site.evidence
-    if not given.wanted:
+    evidence = site.evidence
+    if not evidence.wanted:
         return None
-    link = None if given.link is None else f"{given.link.rstrip('/')}/{one.name}"
+    link = None if evidence.link is None else f"{evidence.link.rstrip('/')}/{one.name}"
     free = 1e9 * site.retention.free_gb
-    return EvidenceOptions(given.before_s, given.after_s, given.memory_mb, link, free)
+    return EvidenceOptions(evidence.before_s, evidence.after_s, evidence.memory_mb, link, free)
 
 
 def _access(site: SiteTable, folder: Path, environment: Mapping[str, str]) -> WebhookAccess:
-    given = site.webhooks
+    evidence = site.webhooks
     return WebhookAccess(
-        headers={k: filled(v, environment, folder) for k, v in given.headers.items()},
-        key=None if given.key is None else filled(given.key, environment, folder),
+        headers={k: filled(v, environment, folder) for k, v in evidence.headers.items()},
+        key=None if evidence.key is None else filled(evidence.key, environment, folder),
     )
 
 
@@ -142,13 +142,13 @@ def _sink(name: str, folder: Path) -> str:
 
 
 def _fingerprint(settings: WatchSettings) -> str:
-    """A digest of what beliefs depend on: settings, the files that they name, visup itself.
+    """A digest of what beliefs depend on: the settings, the files they name, the version of visup.
 
-    Of the source's address only what may be known enters it: the digest is kept in a file.
+    The source enters without its secrets, because the digest is saved in a file.
     """
     digest = hashlib.sha256(__version__.encode())
-    known = replace(settings, source=redacted(settings.source))
-    digest.update(repr(to_jsonable(known)).encode())
+    without_secrets = replace(settings, source=redacted(settings.source))
+    digest.update(repr(to_jsonable(without_secrets)).encode())
     for path in sorted(set(_files(settings))):
         digest.update(str(path).encode())
         digest.update(_digest(path))
@@ -156,9 +156,9 @@ def _fingerprint(settings: WatchSettings) -> str:
 
 
 def _files(settings: WatchSettings) -> Iterator[Path]:
-    """Files that a run reads when it begins; the source is none of them."""
+    """Files that a run reads when it begins, without the source."""
     texts = map(str, (*settings.tasks, *settings.signals, *settings.behaviours))
-    # A task may be named behind its file: `cell.task:pick`.
+    # The name of a task may follow its file: `cell.task:pick`.
     named = (Path(part) for text in texts for part in (text, text.rpartition(":")[0]) if part)
     others = (*settings.rules, settings.models, settings.zones, settings.detections)
     yield from (path for path in (*named, *filter(None, others)) if path.is_file())
@@ -171,5 +171,5 @@ def _digest(path: Path) -> bytes:
             while piece := file.read(PIECE_BYTES):
                 digest.update(piece)
     except OSError:
-        return b""  # what cannot be read is told when the run begins
+        return b""  # an unreadable file is reported when the run begins
     return digest.digest()

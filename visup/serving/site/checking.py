@@ -1,4 +1,4 @@
-"""Whether all cameras of a site can be watched, by this machine: the preflight of each, and what it takes."""
+"""The preflight of a site: whether each camera can be watched, and whether this machine is fast enough."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from visup.serving.site.records import Site, SiteCamera
 from visup.sinks import open_sink
 
 FRAMES = 15
-"""So many frames of each camera are looked at to learn what it takes; a third of them is not counted."""
+"""Frames processed to measure the load of a camera; the first third is warm-up and not counted."""
 
-ENOUGH = 0.8
-"""Of the processors no more than this is planned for: scenes are not always as quiet as now."""
+MAX_LOAD = 0.8
+"""Share of the processors that may be planned for: scenes are not always as quiet as during the check."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraCheck:
-    """What is known of a camera beforehand.
+    """The preflight result of a camera.
 
     Attributes:
-        camera: Which.
-        lines: What was found, a sentence each.
+        camera: The camera.
+        lines: Findings, a sentence each.
         fault: Why it cannot be watched, or None.
-        speed: What it takes, or None where that was not measured.
+        speed: Its load, or None if not measured.
     """
 
     camera: SiteCamera
@@ -42,11 +42,11 @@ class CameraCheck:
 
 
 def check_camera(camera: SiteCamera, *, speed: bool = True) -> CameraCheck:
-    """Open a camera's source and sinks, load all that it names, and look at some frames.
+    """Open a camera's source and sinks, load the files it names, and process some frames.
 
     Args:
-        camera: Which.
-        speed: Whether to measure what it takes.
+        camera: The camera.
+        speed: Whether to measure its load.
     """
     lines: list[str] = []
     try:
@@ -72,32 +72,33 @@ def store_fault(site: Site) -> str | None:
 
 
 def load_lines(checks: Sequence[CameraCheck], processors: int | None = None) -> Iterator[str]:
-    """What all cameras take together, and what to change where that is too much.
+    """The load of all cameras together, and what to change where it is too much.
 
     Args:
-        checks: Of the cameras; those that were not measured do not count.
-        processors: How many there are; those of this machine by default.
+        checks: Checks of the cameras; those without a measured speed do not count.
+        processors: Number of processors; by default this machine's.
     """
     count = processors or os.cpu_count() or 1
     measured = [(c.camera, c.speed) for c in checks if c.speed]
     if not measured:
         return
-    whole = sum(s.load for _, s in measured)
-    yield f"all cameras together use {whole:.1f} of {count} processors"
+    total_load = sum(s.load for _, s in measured)
+    yield f"all cameras together use {total_load:.1f} of {count} processors"
     for camera, speed in measured:
         if speed.load > 1.0:
             yield (
                 f"{WARNING}camera {camera.name}: {speed.wanted:.1f} frames per second are requested, "
-                f"{speed.possible:.1f} can be processed; pace = {_pace(ENOUGH * speed.possible)} is feasible"
+                f"{speed.possible:.1f} can be processed; "
+                f"pace = {_pace(MAX_LOAD * speed.possible)} is feasible"
             )
-    if whole > ENOUGH * count and len(measured) > 1:
-        share = min(ENOUGH, ENOUGH * count / len(measured))
-        each = (f"{c.name} {_pace(min(s.wanted, share * s.possible))}" for c, s in measured)
-        yield f"{WARNING}that leaves no reserve; feasible values of pace: {', '.join(each)}"
+    if total_load > MAX_LOAD * count and len(measured) > 1:
+        share = min(MAX_LOAD, MAX_LOAD * count / len(measured))
+        paces = (f"{c.name} {_pace(min(s.wanted, share * s.possible))}" for c, s in measured)
+        yield f"{WARNING}that leaves no reserve; feasible values of pace: {', '.join(paces)}"
 
 
 def speed_line(speed: Speed) -> str:
-    """What a camera takes, in words."""
+    """The load of a camera as a sentence."""
     return (
         f"speed: {speed.possible:.1f} frames per second can be processed, {speed.wanted:.1f} are "
         f"requested: {100 * speed.load:.0f} % of a processor"
@@ -105,5 +106,5 @@ def speed_line(speed: Speed) -> str:
 
 
 def _pace(rate: float) -> str:
-    """A rate as one would write it, rounded down to half a frame a second."""
+    """A rate, rounded down to half a frame per second."""
     return f"{max(0.5, int(2 * rate) / 2):g}"

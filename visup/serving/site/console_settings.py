@@ -1,4 +1,4 @@
-"""The console of a site, as its table says it."""
+"""The console settings of a site, from its table."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from visup.serving.site.placeholders import filled
 from visup.serving.site.records import SiteConsole
 
 SHORTEST_TOKEN = 16
-"""As of `visup console`."""
+"""Characters, as in `visup console`."""
 
 
 def console_of(
     table: ConsoleTable | None, folder: Path, environment: Mapping[str, str]
 ) -> SiteConsole | None:
-    """The console of a site; None where it has none.
+    """The console of a site, or None.
 
     Args:
-        table: As it stands in the site file.
-        folder: Of the site file, from which names of files count.
-        environment: Variables that placeholders stand for.
+        table: The table of the site file.
+        folder: Folder of the site file, to which file names are relative.
+        environment: Values of placeholders.
 
     Raises:
-        SettingsError: A token is too short, a placeholder cannot be replaced, or the folder is not there.
+        SettingsError: A token is too short, a placeholder cannot be replaced, or the folder does not exist.
     """
     if table is None:
         return None
     address = address_of(table.listen)
-    assert address is not None  # the form wants one
+    assert address is not None  # the form requires one
     viewer = table.viewer_token
     return SiteConsole(
         address,
@@ -42,7 +42,7 @@ def console_of(
 
 
 def address_of(listen: str) -> tuple[str, int] | None:
-    """Address and port out of `ADDRESS:PORT`; None out of nothing."""
+    """Address and port of `ADDRESS:PORT`; None for an empty text."""
     host, colon, port = listen.rpartition(":")
     return (host.strip("[]"), int(port)) if colon else None
 

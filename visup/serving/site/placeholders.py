@@ -21,9 +21,9 @@ def filled(text: str, environment: Mapping[str, str], folder: Path) -> str:
     'rtsp://guard:swordfish@cell/1'
 
     Args:
-        text: As it stands in the site file.
-        environment: Variables.
-        folder: From which relative names of files count.
+        text: Text of the site file.
+        environment: Values of variables.
+        folder: Folder to which file names are relative.
 
     Raises:
         SettingsError: There is no such variable or file.

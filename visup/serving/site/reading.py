@@ -1,4 +1,4 @@
-"""Reading the site file (TOML); what is wrong with it is told by line, in the user's words."""
+"""Reads the site file (TOML) and reports mistakes by line, in the terms of the file."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
 
     Args:
         path: The file.
-        environment: Variables that placeholders stand for; those of this process by default.
+        environment: Values of placeholders; by default this process's environment.
 
     Raises:
-        SettingsError: The file cannot be read, or something in it is not as it should be; a group of them
-            (`ErrorGroup`) tells every mistake with its line.
+        SettingsError: The file cannot be read or is not valid; several mistakes form a group
+            (`ErrorGroup`), each with its line.
     """
     text = _text(path)
     table = _table(text, path)
@@ -53,7 +53,7 @@ def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
     except VisupError as fault:
         where = locate(text, ("console",), str(path))
         faults.append(SettingsError(fault.what, where=where, expected=fault.expected))
-    _refuse([*faults, *_miscounted(table, path), *_twins(table, text, path)])
+    _raise_if_any([*faults, *_count_faults(table, path), *_duplicate_names(table, text, path)])
     return Site(
         path,
         path.resolve().parent / Path(table.store).expanduser(),
@@ -87,34 +87,34 @@ def _table(text: str, path: Path) -> SiteTable:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as fault:
-        said = str(fault)
+        shown = str(fault)
         raise SettingsError(
-            f"this is not TOML: {said.partition(' (at ')[0]}",
-            where=syntax_location(text, said, str(path)),
+            f"this is not TOML: {shown.partition(' (at ')[0]}",
+            where=syntax_location(text, shown, str(path)),
         ) from fault
     try:
-        # Lists of TOML are tuples here, which strict pydantic takes from JSON alone.
+        # TOML lists become tuples, which strict pydantic accepts from JSON only.
         return SiteTable.model_validate_json(json.dumps(document, default=str))
     except ValidationError as faults:
-        _refuse(_worded([dict(e) for e in faults.errors()], text, path))
+        _raise_if_any(_messages([dict(e) for e in faults.errors()], text, path))
         raise
 
 
-def _worded(faults: Sequence[Mapping[str, Any]], text: str, path: Path) -> list[VisupError]:
-    """Mistakes in the user's words, in the order of their lines."""
+def _messages(faults: Sequence[Mapping[str, Any]], text: str, path: Path) -> list[VisupError]:
+    """Mistakes in the terms of the file, in the order of their lines."""
     by_place: dict[tuple[str | int, ...], list[Mapping[str, Any]]] = {}
     for fault in faults:
         loc = tuple(part for part in fault["loc"] if part not in _ALTERNATIVES)
         by_place.setdefault(loc, []).append(fault)
-    located = [(locate(text, loc, str(path)), loc, said) for loc, said in by_place.items()]
+    located = [(locate(text, loc, str(path)), loc, shown) for loc, shown in by_place.items()]
     located.sort(key=lambda each: (each[0].line, each[0].column))
-    return [_mistake(where, loc, said) for where, loc, said in located]
+    return [_mistake(where, loc, shown) for where, loc, shown in located]
 
 
 def _mistake(
     where: SourceLocation, loc: tuple[str | int, ...], faults: Sequence[Mapping[str, Any]]
 ) -> VisupError:
-    """One mistake; of what may be of several kinds each has a fault."""
+    """One mistake; pydantic reports one fault for each alternative of a union type."""
     kind, (*table, key) = faults[0]["type"], loc or ("",)
     if kind == "extra_forbidden":
         known = _keys(table)
@@ -128,22 +128,22 @@ def _mistake(
         return SettingsError(
             f"'{key}' is missing", where=where, expected=_CAMERA if key == "camera" else None
         )
-    said = ".".join(str(part) for part in loc if not isinstance(part, int))
-    wanted = " or ".join(dict.fromkeys(map(_wanted, faults)))
+    shown = ".".join(str(part) for part in loc if not isinstance(part, int))
+    wanted = " or ".join(dict.fromkeys(map(_expected, faults)))
     value = _quoted(faults[0]["input"])
-    return SettingsError(f"{said} cannot be {value}", where=where, expected=wanted)
+    return SettingsError(f"{shown} cannot be {value}", where=where, expected=wanted)
 
 
 _CAMERA = '[[camera]], name = "cell", source = "rtsp://..."'
 _ALTERNATIVES = ("str", "tuple[str, ...]")
-"""Names of the kinds that a value may be of: they stand in the place that pydantic tells, and in no file."""
+"""Union alternatives that pydantic adds to the location of an error; they are not in the file."""
 
 
-def _wanted(fault: Mapping[str, Any]) -> str:
+def _expected(fault: Mapping[str, Any]) -> str:
     if fault["type"] == "string_pattern_mismatch":
         return _PATTERNS[str(fault["loc"][-1])]
-    said = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
-    return _PLAIN.get(said, said.replace("a valid ", "a "))
+    shown = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
+    return _PLAIN_TYPES.get(shown, shown.replace("a valid ", "a "))
 
 
 _PATTERNS = {
@@ -151,7 +151,7 @@ _PATTERNS = {
     "listen": "ADDRESS:PORT such as 127.0.0.1:9464, or nothing",
     "link": "an http or https address",
 }
-_PLAIN = {
+_PLAIN_TYPES = {
     "a valid string": "a text",
     "a valid array": "a list of texts",
     "a valid boolean": "true or false",
@@ -160,8 +160,8 @@ _PLAIN = {
 
 
 def _quoted(value: object) -> str:
-    said = repr(value)
-    return said if len(said) <= LONGEST_VALUE else f"{said[:LONGEST_VALUE]}..."
+    shown = repr(value)
+    return shown if len(shown) <= LONGEST_VALUE else f"{shown[:LONGEST_VALUE]}..."
 
 
 def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
@@ -174,7 +174,7 @@ def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
     return tuple(kinds[0].model_fields if kinds else SiteTable.model_fields)
 
 
-def _miscounted(table: SiteTable, path: Path) -> Iterator[VisupError]:
+def _count_faults(table: SiteTable, path: Path) -> Iterator[VisupError]:
     if not 1 <= len(table.camera) <= MOST_CAMERAS:
         yield SettingsError(
             f"there are {len(table.camera)} cameras in it",
@@ -183,8 +183,8 @@ def _miscounted(table: SiteTable, path: Path) -> Iterator[VisupError]:
         )
 
 
-def _twins(table: SiteTable, text: str, path: Path) -> Iterator[VisupError]:
-    """Cameras of one name would share a folder; file systems may not tell upper from lower case."""
+def _duplicate_names(table: SiteTable, text: str, path: Path) -> Iterator[VisupError]:
+    """Duplicate names: such cameras would share a folder. File systems may ignore case."""
     seen: set[str] = set()
     for number, one in enumerate(table.camera):
         if one.name.casefold() in seen:
@@ -196,7 +196,7 @@ def _twins(table: SiteTable, text: str, path: Path) -> Iterator[VisupError]:
         seen.add(one.name.casefold())
 
 
-def _refuse(faults: list[VisupError]) -> None:
+def _raise_if_any(faults: list[VisupError]) -> None:
     if len(faults) == 1:
         raise faults[0]
     if faults:

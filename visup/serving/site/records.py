@@ -1,4 +1,4 @@
-"""What is watched, as the site file says it: cameras, where their runs go, and what each process may take."""
+"""Records of a site: cameras, retention, process limits and the console."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from visup.runs.settings import RunOptions, WatchSettings
 
 @dataclass(frozen=True, slots=True)
 class ProcessLimits:
-    """What the process of a camera may take before it is ended and begun anew.
+    """Limits beyond which the process of a camera is restarted.
 
     Attributes:
-        memory_mb: Memory that it may have in use, megabytes.
-        silent_s: How long it may make no step while its source delivers, seconds.
-        start_s: How long it may take until its first step, seconds.
+        memory_mb: Resident memory, megabytes.
+        silent_s: Time without a step while the source delivers, seconds.
+        start_s: Time until the first step, seconds.
     """
 
     memory_mb: float
@@ -25,13 +25,13 @@ class ProcessLimits:
 
 @dataclass(frozen=True, slots=True)
 class RetentionLimits:
-    """What is kept, and for how long.
+    """How long recordings are kept, and how much space they may use.
 
     Attributes:
-        days: That runs are kept.
-        evidence_days: That pictures and clips of alerts are kept, and what is needed to read them.
-        store_bytes: Room that the store may take, or None.
-        free_bytes: Room to be left on its disk.
+        days: Days to keep runs.
+        evidence_days: Days to keep pictures, clips and records of alerts.
+        store_bytes: Maximum size of the store, or None.
+        free_bytes: Space to leave free on its disk.
     """
 
     days: float = 30.0
@@ -45,12 +45,12 @@ class SiteCamera:
     """One camera of a site.
 
     Attributes:
-        name: By which it is called everywhere.
-        settings: Of its runs.
+        name: Unique name.
+        settings: Settings of its runs.
         options: How they are recorded, and where alerts go.
-        limits: Of its process.
-        fingerprint: Differs when anything differs that its beliefs depend on: its settings, or files that
-            they name. A run goes on under the same fingerprint alone.
+        limits: Limits of its process.
+        fingerprint: Digest of what its beliefs depend on: settings and the files they name. A run is resumed
+            only under the same fingerprint.
     """
 
     name: str
@@ -62,14 +62,14 @@ class SiteCamera:
 
 @dataclass(frozen=True, slots=True)
 class SiteConsole:
-    """The console beside the cameras.
+    """The console of a site.
 
     Attributes:
         listen: Address and port.
-        token: Of those who may act.
-        viewer_token: Of those who may only look; None for nobody.
-        names: Under which this machine is asked for.
-        save_to: Folder into which operators may save what they write, or None.
+        token: Token for full access.
+        viewer_token: Token for read-only access; None for none.
+        names: Further host names of this machine.
+        save_to: Folder in which operators may save tasks, rules and zones, or None.
     """
 
     listen: tuple[str, int]
@@ -81,16 +81,16 @@ class SiteConsole:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """All that one service watches.
+    """The site that one service watches.
 
     Attributes:
         path: The site file.
         store: Folder of all runs; each camera has a folder of its name in it.
         cameras: In the order of the file.
-        retention: What is kept of the store.
-        listen: Address and port where is told how the service does, or None.
-        spare: Whether a process stands ready.
-        console: The console beside the cameras, or None.
+        retention: Retention limits of the store.
+        listen: Address and port of the monitoring server, or None.
+        spare: Whether to keep a spare process ready.
+        console: The console, or None.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""In which line of a TOML file a value stands, for messages: the standard library's reader does not say."""
+"""Finds the line of a value in a TOML file, for messages: `tomllib` does not report positions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _POSITION = re.compile(r"\(at line (\d+), column (\d+)\)")
 
 
 def locate(text: str, path: Sequence[str | int], file: str) -> SourceLocation:
-    """Where a value stands; of what has no line of its own, the nearest table or key around it.
+    """The location of a value; if it has no line of its own, of the nearest enclosing table or key.
 
     Args:
         text: The whole file.
@@ -34,21 +34,23 @@ def locate(text: str, path: Sequence[str | int], file: str) -> SourceLocation:
 
 
 def syntax_location(text: str, fault: str, file: str) -> SourceLocation:
-    """Where a text is no TOML.
+    """The location of a TOML syntax error.
 
     Args:
         text: The whole file.
-        fault: What the reader said of it.
+        fault: The message of `tomllib`.
         file: Its name.
     """
     lines = text.splitlines() or [""]
-    told = _POSITION.search(fault)
-    line, column = (int(told[1]), int(told[2])) if told else (len(lines), len(lines[-1]) + 1)
+    position = _POSITION.search(fault)
+    line, column = (
+        (int(position[1]), int(position[2])) if position else (len(lines), len(lines[-1]) + 1)
+    )
     return SourceLocation(file, line, column, _line(lines, line))
 
 
 def _places(text: str, file: str) -> Iterator[tuple[KeyPath, SourceLocation]]:
-    """Each header and each key with its place, in their order."""
+    """Each header and each key with its location, in their order."""
     tables: Counter[str] = Counter()
     table: KeyPath = ()
     for number, line in enumerate(text.splitlines(), start=1):
