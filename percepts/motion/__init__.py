@@ -1,16 +1,16 @@
 """Motion segmentation: frames in, moving regions out (paper, section 3).
 
-Read `segmenter.py` first: it is the loop, and each of its steps lives in a room of its own:
+Start with `segmenter.py`, the main loop; each of its steps has its own folder:
 
 - `features/`: the working image, motion constraints at its points, superpixels.
-- `layers/`: affine motions fitted to constraints; the background's; labels of superpixels.
+- `layers/`: affine motions fitted to constraints; background motion; labels of superpixels.
 - `tracks/`: objects over time: prediction, update, salience, merging, initiation, deletion.
-- `foreground/`: learned soft evidence of independent motion; the belief, and the objects formed from it.
+- `foreground/`: a learned per-superpixel probability of independent motion, and objects formed from it.
 - `static_camera/`: background subtraction while the camera does not move, fused with the layers.
 - `outlines/`: from label probabilities to a mask and its contour.
-- `output/`: the reported regions, directives, and since when each region has been in view.
+- `output/`: reported regions, directives, and when each region came into view.
 
-`behaviour.py` makes this available to the agent.
+`behaviour.py` adapts this to the agent.
 """
 
 from visup.percepts.motion.behaviour import MotionBehaviour

@@ -1,4 +1,4 @@
-"""The segmenter as a behaviour: one percept for each region that moves."""
+"""Motion segmentation as a behaviour: one percept for each moving region."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from visup.percepts.motion.output.backward_tracking import BackwardTracker
 from visup.percepts.motion.segmenter import MotionSegmenter
 
 HARMED = frozenset(HealthStatus) - {HealthStatus.OK, HealthStatus.DROPPED}
-"""Faults of the image itself; where frames are missing, those that come are sound."""
+"""Faults of the image itself; when frames are dropped, those that arrive are sound."""
 
 
 def image_is_sound(observation: Observation) -> bool:
-    """Whether a frame shows what there is, as far as its health was looked at."""
+    """Whether no reported health fault affects the image itself."""
     return all(p.confidence >= 1.0 and p.value.status not in HARMED for p in _health(observation))
 
 
 def image_is_trusted(observation: Observation) -> bool:
-    """Whether what moves in a frame may be told: its health is OK, or nobody looked at it."""
+    """Whether motion may be reported: the frame's health is OK or was not checked."""
     return all(p.value.status is HealthStatus.OK for p in _health(observation))
 
 
@@ -30,10 +30,10 @@ def _health(observation: Observation) -> list[Percept]:
 
 
 class MotionBehaviour:
-    """Reports regions; nothing while the camera's image is not to be trusted.
+    """Reports moving regions; nothing while the image cannot be trusted.
 
     Args:
-        settings: What can be set about seeing motion.
+        settings: Settings of the segmenter.
     """
 
     contract = Contract("motion", gives=("region",), hang_s=COMPILING_HANG_S)
@@ -43,21 +43,21 @@ class MotionBehaviour:
         self._backward = BackwardTracker()
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         return {"segmenter": self._segmenter.save(), "back": self._backward}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same settings remembered."""
+        """Restore the state of a behaviour with the same settings."""
         self._segmenter.load(state["segmenter"])
         self._backward = state["back"]
 
     def missed(self, observation: Observation) -> None:
-        """Take note of regions reported since the state that was taken on: their ids are used."""
+        """Reserve the ids of regions reported since the restored state."""
         for region in observation.of("region"):
             self._segmenter.used(region.id)
 
     def new_id(self) -> int:
-        """An id that no region of this video has had, nor will have."""
+        """An id that no region of this video has had or will have."""
         return self._segmenter.new_id()
 
     def perceive(
@@ -67,14 +67,14 @@ class MotionBehaviour:
 
         Args:
             frame: The next frame.
-            observation: What was reported before of this frame; unless its health is OK beyond doubt,
-                nothing moves.
+            observation: What was reported for this frame so far; no motion is reported unless its health is
+                fully OK.
             directives: 'expect_regions', 'look_at' and 'ignore' are obeyed.
 
         Returns:
             Percepts of kind 'region', by id.
         """
-        # Tracks live on over frames that are left out, but not over black ones taken for sight.
+        # Tracks survive skipped frames, but not black frames taken for a real view.
         if not image_is_sound(observation):
             return []
         regions = self._backward.step(frame, self._segmenter.step(frame, directives))

@@ -1,7 +1,7 @@
-"""Motion that rests while nothing in the picture changes: most cameras see nothing for most of the day.
+"""Motion segmentation that pauses while nothing in the picture changes, as in most cameras most of the time.
 
-A look at a small picture, a hundredth of the cost, tells whether anything is other than when all was last
-looked at. While nothing is, and nothing was seen to move, nothing moves.
+A change detector on cell means, at a hundredth of the cost, decides whether the picture differs from that of
+the last full step. While it does not and nothing moved, no regions are reported.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from visup.agent import Directive, Frame, Observation, Percept
 from visup.percepts.motion.behaviour import MotionBehaviour
 
 CELL = 8
-"""Pixels of a side that are averaged: noise goes, and what covers a quarter of one is seen."""
+"""Side of an averaged cell, pixels: noise averages out; a change over a quarter of a cell still shows."""
 
 CHANGE = 5
-"""From so many levels of a colour on a cell is other than it was: noise of a camera leaves two or three."""
+"""Levels of a colour channel from which a cell has changed: camera noise causes two or three."""
 
 CALM_S = 5.0
-"""Motion rests once nothing has changed or moved for so long, seconds."""
+"""Segmentation pauses once nothing has changed or moved for this many seconds."""
 
 
 class RestingMotion(MotionBehaviour):
-    """Reports regions; looks seldom while nothing changes.
+    """Reports regions; runs seldom while nothing changes.
 
     Args:
-        rest_s: Seconds between two looks while nothing changes.
+        rest_s: Seconds between two steps while nothing changes.
     """
 
     contract = MotionBehaviour.contract
@@ -42,12 +42,12 @@ class RestingMotion(MotionBehaviour):
         self._looked = self._moved = 0.0
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far."""
+        """The state after the frames so far."""
         rest = {"last": self._last, "looked": self._looked, "moved": self._moved}
         return {**super().save(), "rest": rest}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same settings remembered."""
+        """Restore the state of a behaviour with the same settings."""
         super().load(state)
         rest = state["rest"]
         self._last, self._looked, self._moved = rest["last"], rest["looked"], rest["moved"]
@@ -55,7 +55,7 @@ class RestingMotion(MotionBehaviour):
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """Report the regions of one frame; none, without a look, while nothing changes."""
+        """Report the regions of one frame; none, without segmentation, while nothing changes."""
         small = means_of_cells(frame.image)
         if self._last is None or _differ(self._last, small):
             self._moved = frame.time

@@ -1,8 +1,8 @@
-"""Seeing motion: frames in, regions out, causally (paper, section 3).
+"""The motion segmenter: frames in, regions out, causally (paper, section 3).
 
-Region and boundary work together: constraints are gathered where the image has structure, layers
-of motion are fitted to them, superpixels between image edges are given to the layer that explains
-them best, and the outlines so found say which constraints a layer may use in the next frame.
+Region and boundary cues work together: constraints are gathered where the image has structure, layers of
+motion are fitted to them, superpixels between image edges are assigned to the layer that explains them
+best, and the resulting outlines decide which constraints a layer may use in the next frame.
 """
 
 from __future__ import annotations
@@ -91,27 +91,27 @@ from visup.percepts.motion.tracks.warping import dense_likelihood, flow_back
 
 Numbered = TypeVar("Numbered", Track, Region)
 Shown = Future[tuple[FrameCues, CueMemory]]
-FARTHEST = 0.02  # share of the image that the camera may move over a baseline
+FARTHEST = 0.02  # farthest the camera may move over a baseline, as a share of the image
 
 
 class MotionSegmenter:
-    """Finds and follows what moves by itself; one per video.
+    """Segments and tracks independent motion; one per video.
 
     Args:
-        settings: What can be set.
-        model: What was learnt of moving foreground; as the settings say when None. One that is given is
-            asked in every frame, else not while the ground hardly moves, when nothing comes of its answer.
+        settings: Settings.
+        model: Foreground model; as the settings say when None. A given one is evaluated in every frame,
+            else it is skipped while the background hardly moves, when its result would not be used.
 
     Attributes:
         settings: As given.
-        trace: How the last frame was understood; None before the second one of a size.
+        trace: Intermediate results of the last frame; None before the second one of a size.
     """
 
     def __init__(
         self, settings: MotionSettings | None = None, model: ForegroundModel | None = None
     ) -> None:
         self.settings = settings or MotionSettings()
-        # Cells and points do not need each other: one core each. What is found is the same.
+        # Cells and points are independent: one core each, with the same results.
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
@@ -135,23 +135,23 @@ class MotionSegmenter:
 
     @property
     def camera_static(self) -> bool:
-        """Whether the camera is seen to be static, and what moves is found by background subtraction."""
+        """Whether the camera appears static, so that background subtraction is in use."""
         return self._static.active
 
     def save(self) -> dict[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         return saved_attributes(self, "settings", "trace", "_beside", "_engine", "_model")
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a segmenter of the same settings remembered."""
+        """Restore the state of a segmenter with the same settings."""
         vars(self).update(state)
 
     def used(self, region_id: int) -> None:
-        """A region of this id was reported before: no other is given it."""
+        """Reserve the id of a region reported before."""
         self._ids.reserve(region_id)
 
     def new_id(self) -> int:
-        """An id that no region has had, for what is seen by other means."""
+        """An id that no region has had, for objects detected by other means."""
         return self._ids.new()
 
     def step(self, frame: Frame, directives: Sequence[Directive] = ()) -> tuple[Region, ...]:
@@ -162,7 +162,7 @@ class MotionSegmenter:
             directives: 'expect_regions', 'look_at' and 'ignore' are obeyed.
 
         Returns:
-            The regions, by id. None in the first frame, or when the image size has changed.
+            The regions, by id. Empty in the first frame and after a change of image size.
         """
         if frame.size != self._size:
             self._reset(frame.size)
@@ -191,17 +191,17 @@ class MotionSegmenter:
 
     @property
     def _asks(self) -> bool:
-        """Whether the belief is asked what moves in this frame."""
+        """Whether the foreground model is evaluated in this frame."""
         unused = self._static.active or self._foreground.calm
         return self._model is not None and (self._always or not unused)
 
     def _follow_foreground(
         self, scene: FrameMeasurements, shown: Shown | None, tracked: TrackPosterior
     ) -> None:
-        """Bring the belief in what moves, and its objects, up to date, where one was learnt."""
+        """Update the foreground belief and its objects, if there is a model."""
         if self._model is None or shown is None:
             self._foreground = resting(self._foreground, scene)
-            tracks = self._under_ids_of_objects(tracked.tracks)
+            tracks = self._with_object_ids(tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
         least, stands = min_region_area(scene, self.settings), partial(stands_there, scene)
@@ -209,37 +209,37 @@ class MotionSegmenter:
         cues, self._foreground = follow_foreground(
             self._foreground, self._model, scene, shown.result(), tracked, admission
         )
-        tracks = self._under_ids_of_objects(tracked.tracks)
+        tracks = self._with_object_ids(tracked.tracks)
         share = self._foreground.belief.share
         self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior, cues, share)
 
     def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
-        """Regions of the objects of the foreground; of the tracks while the ground hardly moves."""
+        """Regions of the foreground objects; of the tracks while the background hardly moves."""
         asked = self._foreground.memory is not None
         if asked and not (self._static.active or self._foreground.calm):
             return report_objects(
                 self._foreground, tracks, scene, self._size, self.settings, self._beside
             )
         found = report_regions(tracks, scene, self._size, self.settings, self._beside)
-        return self._under_ids_of_objects(found)
+        return self._with_object_ids(found)
 
-    def _under_ids_of_objects(self, found: Sequence[Numbered]) -> tuple[Numbered, ...]:
-        """Tracks or regions of tracks under the ids of the objects that they follow."""
+    def _with_object_ids(self, found: Sequence[Numbered]) -> tuple[Numbered, ...]:
+        """Tracks, or their regions, under the ids of the objects they belong to."""
         known = self._foreground.objects
         return tuple(replace(one, id=known.id_of_track(one.id)) for one in found)
 
     def _begin(self, image: WorkImage) -> None:
-        """Take in the first frame of a size: there is nothing to compare it with."""
+        """Initialise from the first frame of a size, which has nothing to be compared with."""
         self._cells = superpixels(image, self.settings.cell, self.settings.contrast)
         self._prevalence = empty_prevalence(image.shape)
 
     def _initiated(
         self, known: Tracks, scene: FrameMeasurements, prior: Floats
     ) -> tuple[Tracks, Floats]:
-        """The tracks with new ones, and the label shares expected of all of them."""
+        """The tracks with new ones added, and the label priors of all."""
         tracks = initiate(known, scene, self.settings, self._last_key)
         self._note_keys(tracks)
-        # What was seen before is expected where it was.
+        # Without new tracks the prior is unchanged.
         return tracks, prior if tracks == known else label_priors(tracks, scene.cells)
 
     def _note_keys(self, tracks: Tracks) -> None:
@@ -252,9 +252,9 @@ class MotionSegmenter:
         prior: Floats,
         directives: Sequence[Directive],
     ) -> tuple[PointEvidence, Labelling, Shown | None]:
-        """What points say of the tracks, and the labels of the superpixels that follow (the E step).
+        """Evidence of the points for the tracks, and the labels of the superpixels that follow (the E step).
 
-        With what flow shows of the superpixels, where it is asked for: that is found meanwhile.
+        Also the foreground cues from flow, where they are needed: they are computed in parallel.
         """
         near = claimable_cells(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
@@ -275,7 +275,7 @@ class MotionSegmenter:
         evidence: PointEvidence,
         labelling: Labelling,
     ) -> Tracks:
-        """The tracks after the labels of a frame; parts merged, occluded ones split, lost ones deleted."""
+        """The tracks updated from the labels; parts merged, occluded ones split, lost ones deleted."""
         winner = labelling.winner
         tracks = update(tracks, scene, labelling, evidence.likelihood, self.settings)
         tracks = update_salience(tracks, scene, winner)
@@ -288,7 +288,7 @@ class MotionSegmenter:
     def _measured_frame(
         self, image: WorkImage, before: Superpixels
     ) -> tuple[FrameMeasurements, Tracks, Floats]:
-        """Measure motion, and carry the tracks to the newest image, with where they are expected."""
+        """Measure motion and predict the tracks, with the label priors, in the newest image."""
         cell, old = self.settings.cell, self._history.back(1)
         seconds = image.time - old.time
         found = self._beside.submit(find_points, image, cell, self.settings.noise)
@@ -312,16 +312,16 @@ class MotionSegmenter:
     def _carried(
         self, flow: Floats, before: Superpixels, coming: Future[Superpixels], seconds: float
     ) -> tuple[Superpixels, Tracks, Floats]:
-        """The newest cells, the tracks carried there, and the labels expected of the cells."""
-        cells = coming.result()  # one worker does one thing after the other: it is there
+        """The newest cells, the predicted tracks, and the label priors of the cells."""
+        cells = coming.result()  # the single worker runs jobs in order, so this one is finished
         tracks = predict_tracks(self._tracks, flow, before, cells, seconds)
         return cells, tracks, label_priors(tracks, cells)
 
     def _long_lags(self, image: WorkImage) -> list[int]:
-        """The longer baseline whose turn it is: they are measured one in each frame.
+        """The longer baseline to measure in this frame: they take turns, one per frame.
 
-        Long ones are for slow things. When the camera has turned far away since, there is little to
-        compare, and what there is misleads.
+        Long baselines serve slow motion. When the camera has turned far, there is little to compare,
+        and that misleads.
         """
         far = FARTHEST * max(image.shape)
         lags = [
@@ -332,7 +332,7 @@ class MotionSegmenter:
         return [lags[self._count % len(lags)]] if lags else []
 
     def _camera_shift(self, image: WorkImage, lag: int) -> float:
-        """How far the camera is predicted to have moved the middle of the image, pixels."""
+        """Predicted displacement of the image centre by the camera, pixels."""
         camera = self._predicted(image.time, image.time - self._history.back(lag).time)
         middle = np.asarray([image.shape[::-1]], dtype=np.float32) / np.float32(2)
         return float(np.hypot(*camera.at(middle)[0]))
@@ -348,7 +348,7 @@ class MotionSegmenter:
     def _begin_tracking(
         self, scene: FrameMeasurements, tracks: Tracks, lag: int
     ) -> Future[Constraints]:
-        """Begin to look for the points over a longer baseline, where known motions expect them."""
+        """Start tracking points over a longer baseline, from where known motions predict them."""
         old = self._history.back(lag)
         span = scene.time - old.time
         guess = predicted_positions(scene, tracks, self._predicted(scene.time, span), lag, span)
@@ -356,10 +356,10 @@ class MotionSegmenter:
         return self._beside.submit(track_points, scene.points, guess, old, scene.image, lag, noise)
 
     def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
-        """The background that constraints over one baseline show."""
+        """The background motion fitted to the constraints over one baseline."""
         image, lag = scene.image, c.lag
         camera = self._predicted(image.time, c.span_s)
-        # Until a baseline is long enough to tell, what is still in the image may be background.
+        # Until some baseline is long enough to tell, what stays still in the image may be background.
         fixed_too = self._camera_fixed_until is None or image.time < self._camera_fixed_until
         clear = background_weights(scene)[c.index]
         expected = ExpectedBackground(camera, fixed_too, self._prevalence)
@@ -374,7 +374,7 @@ class MotionSegmenter:
         return BaselineMotion(c, bg)
 
     def _predicted(self, now: float, span: float) -> Affine:
-        """The camera's motion over a baseline, from the nearest baseline that showed it of late."""
+        """The camera's motion over a baseline, from the nearest baseline with a recent estimate."""
         fresh = [r for r in self._camera.values() if now - r.time < 1.0]
         if not fresh:
             return Affine(np.zeros((2, 3)))
@@ -384,7 +384,7 @@ class MotionSegmenter:
 
 
 def _model(settings: MotionSettings) -> ForegroundModel | None:
-    """What was learnt of moving foreground, where that is wanted."""
+    """The foreground model, if the settings enable it."""
     if settings.foreground is not None:
         return read_model(settings.foreground)
     return shipped_model() if settings.learnt else None

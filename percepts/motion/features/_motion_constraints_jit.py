@@ -1,4 +1,4 @@
-"""Finding where motion can be measured, compiled; `motion_constraints` says what it is for."""
+"""Compiled loops of `motion_constraints`: strongest gradients and structure tensors."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ Ints = NDArray[np.int64]
 def strongest_gradients(
     gx: Floats, gy: Floats, cell: int, margin: int
 ) -> tuple[Ints, Ints, Floats]:
-    """The place of the strongest gradient in each square of an image.
+    """The position of the strongest gradient in each square of an image.
 
     Args:
         gx: (h, w) float32.
         gy: (h, w) float32.
         cell: Side of the squares, pixels.
-        margin: Pixels at the border of the image that do not count.
+        margin: Pixels at the border of the image that are skipped.
 
     Returns:
-        (N,) columns, (N,) rows, and (N,) float32 squared gradients, square by square; 0 where none
-        counts.
+        (N,) columns, (N,) rows, and (N,) float32 squared gradients, square by square; 0 in squares
+        without a gradient.
     """
     height, width = gx.shape
     rows, cols = height // cell, width // cell
@@ -44,7 +44,7 @@ def strongest_gradients(
 
 @compiled
 def structure_tensors(gx: Floats, gy: Floats, xs: Ints, ys: Ints, window: int) -> Floats:
-    """Structure tensors summed over windows, beyond the border the image mirrored.
+    """Structure tensors summed over windows; the image is mirrored at its border.
 
     Args:
         gx: (h, w) float32.

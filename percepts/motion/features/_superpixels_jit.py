@@ -1,4 +1,4 @@
-"""Passes over the pixels of superpixels and over their neighbours, compiled."""
+"""Compiled loops over the pixels of superpixels and over their neighbours."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Labels = NDArray[np.int32]
 def cell_statistics(
     labels: Labels, tone: NDArray[np.uint8], busy: Floats, count: int
 ) -> tuple[Floats, Floats, Labels]:
-    """What the pixels of each cell are like, all in one pass.
+    """Statistics of the pixels of each cell, in one pass.
 
     Args:
         labels: (h, w) cells, 0 to count - 1.
@@ -27,7 +27,7 @@ def cell_statistics(
 
     Returns:
         (count,) float32 pixels; (count, 6) float32 sums of x, y, the three tones and `busy`;
-        (count, 4) int32 (left, top, right, bottom), the latter two beyond the cell.
+        (count, 4) int32 (left, top, right, bottom), the latter two exclusive.
     """
     height, width = labels.shape
     number, sums = np.zeros(count, np.float32), np.zeros((count, 6), np.float32)
@@ -66,27 +66,27 @@ def dilate_cells(
 ) -> NDArray[np.bool_]:
     """Cells within some steps of (count, K) members.
 
-    `ends` and `neighbours` are as in CSR matrices; who is a neighbour of one has it as a neighbour. Only
-    from cells that were come to last is gone on: most sets are small.
+    `ends` and `neighbours` are as in CSR matrices and symmetric. Only the cells reached last are expanded,
+    since most sets are small.
     """
     count, kinds = members.shape
     near = members.copy()
-    come_to = np.empty(count, np.int32)
+    reached = np.empty(count, np.int32)
     for k in range(kinds):
         begin, end = 0, 0
         for i in range(count):
             if members[i, k]:
-                come_to[end] = i
+                reached[end] = i
                 end += 1
         for _ in range(steps):
             last = end
             for n in range(begin, last):
-                i = come_to[n]
+                i = reached[n]
                 for at in range(ends[i], ends[i + 1]):
                     other = neighbours[at]
                     if not near[other, k]:
                         near[other, k] = True
-                        come_to[end] = other
+                        reached[end] = other
                         end += 1
             begin = last
     return near
@@ -96,7 +96,7 @@ def dilate_cells(
 def carry_shares(
     old: Labels, new: Labels, flow: Floats, shares: Floats, area: Floats, every: int
 ) -> Floats:
-    """Shares of cells of an older image as they come to those of a newer one, along the flow.
+    """Shares of the cells of an older image, carried along the flow to a newer one.
 
     Args:
         old: (h, w) cells of the older image.
@@ -104,29 +104,29 @@ def carry_shares(
         flow: (h, w, 2) float32, from the newer back to the older.
         shares: (old count, K) float32.
         area: (count,) float32, how many pixels each cell of the newer one has.
-        every: One in so many pixels of a cell, its first one always, is asked where it comes from.
+        every: Every how many pixels of a cell are sampled; the first always is.
 
     Returns:
-        (count, K) float32 means over those pixels; what came into view counts as 0.
+        (count, K) float32 means over those pixels; those newly in view count as 0.
     """
     height, width = new.shape
     kinds = shares.shape[1]
     count = len(area)
-    asked, out = np.zeros(count, np.int32), np.zeros((count, kinds), np.float32)
-    # A mean is summed up share by share, so that what is whole stays whole within rounding.
+    sampled, out = np.zeros(count, np.int32), np.zeros((count, kinds), np.float32)
+    # The mean is summed share by share, so that a share of 1 stays 1 within rounding.
     part = np.empty(count, np.float32)
     for c in range(count):
         part[c] = np.float32(1) / np.float32(max((int(area[c]) + every - 1) // every, 1))
     for y in range(height):
         for x in range(width):
             c = new[y, x]
-            asked[c] += 1
-            if asked[c] > 1:
-                if asked[c] == every:
-                    asked[c] = 0
+            sampled[c] += 1
+            if sampled[c] > 1:
+                if sampled[c] == every:
+                    sampled[c] = 0
                 continue
             if every == 1:
-                asked[c] = 0
+                sampled[c] = 0
             u = x + int(np.rint(flow[y, x, 0]))
             v = y + int(np.rint(flow[y, x, 1]))
             if 0 <= u < width and 0 <= v < height:
@@ -146,8 +146,8 @@ def flat_seeds(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
         flat: Strength below which there is no edge worth following.
 
     Returns:
-        (h, w) int32, 0 elsewhere: the flattest 3 x 3 pixels in each square of `cell` pixels, or its
-        inside when that is flat all over.
+        (h, w) int32, 0 elsewhere: the flattest 3 x 3 pixels in each square of `cell` pixels, or the
+        square's interior when it is flat throughout.
     """
     rows, cols = strength.shape[0] // cell, strength.shape[1] // cell
     seeds = np.zeros(strength.shape, np.int32)
@@ -223,7 +223,7 @@ def half_size_means(
         count: How many cells.
 
     Returns:
-        (count,) float32; 0 where no pixel of a cell is seen.
+        (count,) float32; 0 where the box holds no pixel of a cell.
     """
     total, number = np.zeros(count), np.zeros(count, np.int64)
     for j in range(box[3]):
@@ -238,7 +238,7 @@ def half_size_means(
 def sum_point_evidence(
     labels: Labels, xy: Floats, normal: Floats, likelihood: Floats, far: float, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What points say of the cells on both of their sides.
+    """Evidence of points summed over the cells on both of their sides.
 
     Args:
         labels: (h, w) cells.
@@ -249,7 +249,7 @@ def sum_point_evidence(
         count: How many cells.
 
     Returns:
-        (count, K) float64 sums, and (count,) float64, over how many.
+        (count, K) float64 sums, and (count,) float64 numbers of points.
     """
     height, width = labels.shape
     kinds = likelihood.shape[1]
@@ -274,27 +274,27 @@ def bayes_shares(
     least: float,
     clip: float,
 ) -> tuple[Floats, Floats]:
-    """Shares of the labels of each cell after what its points and its pixels say.
+    """Posterior label shares of each cell, given its points and its pixels.
 
     Args:
         totals: (count, K) float64 sums of log likelihoods over points.
-        number: (count,) float64, of how many.
+        number: (count,) float64, how many points.
         more: (count, K) float32 dense log likelihood; all 0 where nothing is known.
         prior: (count, K) float32 shares before.
-        least: What is added to those.
-        clip: Log likelihood ratio that counts as sure.
+        least: Floor added to the prior.
+        clip: Log likelihood ratio at which evidence has full weight.
 
     Returns:
         (count, K) float32 shares; (count,) float32 weight of the evidence, 0 to 1.
     """
     count, kinds = prior.shape
-    share, sure = np.empty((count, kinds), np.float32), np.zeros(count, np.float32)
+    share, certainty = np.empty((count, kinds), np.float32), np.zeros(count, np.float32)
     each = np.empty(kinds)
     for c in range(count):
-        scale, told, highest = max(np.sqrt(number[c]), 1.0), number[c] > 0, -np.inf
+        scale, informed, highest = max(np.sqrt(number[c]), 1.0), number[c] > 0, -np.inf
         for k in range(kinds):
             each[k] = totals[c, k] / scale + more[c, k]
-            told |= more[c, k] != 0
+            informed |= more[c, k] != 0
             highest = max(highest, each[k])
         lowest, whole = 0.0, 0.0
         for k in range(kinds):
@@ -304,6 +304,6 @@ def bayes_shares(
             whole += each[k]
         for k in range(kinds):
             share[c, k] = each[k] / whole
-        if told:
-            sure[c] = min(-lowest, clip) / clip
-    return share, sure
+        if informed:
+            certainty[c] = min(-lowest, clip) / clip
+    return share, certainty

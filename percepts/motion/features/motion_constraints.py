@@ -1,4 +1,4 @@
-"""Sparse motion constraints: how points moved, and how surely, along each direction.
+"""Sparse motion constraints: how points moved, and how certainly in each direction.
 
 A corner fixes both components of its motion, an edge only the one across it (the aperture
 problem). Both are carried in one form: a displacement with a 2 x 2 information matrix, whose
@@ -25,9 +25,9 @@ Ints = NDArray[np.int64]
 WINDOW = 11
 MARGIN = 3  # pixels at the border of the image where no point is taken
 CORNER = 0.1  # least ratio of the eigenvalues of a corner's structure tensor
-STEPS_NEAR = 10, 0.03  # most steps of a search, and the step, in pixels, at which it is done: well
-STEPS_FAR = 30, 0.01  # below FLOOR; slow things, seen over long baselines, ask for more
-AGREED = 0.25  # pixels up to which dense flow and the search for a point say the same
+STEPS_NEAR = 10, 0.03  # most iterations of a search, and the step, pixels, at which it stops: well
+STEPS_FAR = 30, 0.01  # below FLOOR; slow motion over long baselines needs more of both
+AGREED = 0.25  # pixels up to which dense flow and the search for a point agree
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
 
@@ -79,7 +79,7 @@ class Constraints:
         return len(self.xy)
 
     def take(self, which: Ints) -> Constraints:
-        """Some of them, by (M,) place among these."""
+        """The constraints at (M,) indices."""
         return Constraints(
             self.lag,
             self.span_s,
@@ -91,7 +91,7 @@ class Constraints:
 
 
 def find_points(image: WorkImage, cell: int, noise: float, most: int = 2500) -> Points:
-    """The strongest gradient of each cell, where it stands out of the noise.
+    """The strongest gradient of each cell, where it exceeds the noise.
 
     Args:
         image: The working image.
@@ -161,18 +161,18 @@ def track_points(
         noise: Standard deviation of grey values.
 
     Returns:
-        Constraints of the points that were found again.
+        Constraints of the points that were tracked.
     """
     if not len(points):
         return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_no_constraints())
     start = points.xy.reshape(-1, 1, 2).copy()
     begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
-    # From one frame to the next dense flow tells where to begin: coarse images would only mislead.
+    # Between adjacent frames dense flow gives the starting point: coarse levels would only mislead.
     near = lag == 1
     there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 1 if near else 2, near)
     home, back = _back(points, begin, there, found, (old, new), near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
-    # What is said of points that were lost is not even finite.
+    # Results of lost points may not even be finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
     misfit = np.where(ok[:, None], misfit, 255.0)
     home, there = np.where(ok[:, None, None], home, 0), np.where(ok[:, None, None], there, 0)
@@ -195,25 +195,25 @@ def _back(
     images: tuple[WorkImage, WorkImage],
     near: bool,
 ) -> tuple[Floats, NDArray[np.uint8]]:
-    """Where points come out when they are followed back: (N, 1, 2), (N, 1).
+    """Positions of points tracked backward, (N, 1, 2), and their status, (N, 1).
 
-    The way back is nearly known: it needs no coarse images. It begins as far beside as the guess
-    was off, for a search that begins where it should end proves little. So nothing is asked where
-    dense flow had told the same before: two ways to find a point agree. Over a long baseline, where
-    guesses are poor, the search begins at home, and no more than that can be asked.
+    The backward track is nearly known, so it needs no coarse levels. It begins as far off as the guess
+    was, since a search that starts at its answer proves little. For the same reason points where dense
+    flow already agreed are not checked. Over a long baseline, where guesses are poor, the search begins
+    at the original point.
     """
     start = points.xy.reshape(-1, 1, 2)
     aside = there - begin if near else np.zeros_like(there)
     home, back = start.copy(), found.copy()
     off = np.hypot(aside[..., 0], aside[..., 1]).ravel()
-    asked = np.flatnonzero((found.ravel() > 0) & ~(near & (off < AGREED)))
-    if len(asked):
-        first = np.ascontiguousarray((start + aside)[asked])
+    checked = np.flatnonzero((found.ravel() > 0) & ~(near & (off < AGREED)))
+    if len(checked):
+        first = np.ascontiguousarray((start + aside)[checked])
         old, new = images
         ends, sound, _ = _follow(
-            old.grey, new.grey, np.ascontiguousarray(there[asked]), first, 0, near
+            old.grey, new.grey, np.ascontiguousarray(there[checked]), first, 0, near
         )
-        home[asked], back[asked] = ends, sound
+        home[checked], back[checked] = ends, sound
     return home, back
 
 
@@ -248,10 +248,10 @@ def _follow(
 def add_flow_constraints(
     c: Constraints, points: Points, flow: Floats, old: WorkImage, new: WorkImage, noise: float
 ) -> Constraints:
-    """Fill in, from a dense flow field, points that could not be followed one by one.
+    """Fill in, from a dense flow field, points that could not be tracked one by one.
 
-    Blurred and bending things are lost by tracking points, and are just what moves. The flow is
-    trusted less, and only where grey values fit.
+    Point tracking loses blurred and deforming objects, which are often what moves. The flow is trusted
+    less, and only where grey values fit.
 
     Args:
         c: Constraints over one frame.
@@ -262,7 +262,7 @@ def add_flow_constraints(
         noise: Standard deviation of grey values.
 
     Returns:
-        The constraints with those of the flow behind them.
+        The constraints, followed by those of the flow.
     """
     missing = np.ones(len(points), dtype=bool)
     missing[c.index] = False

@@ -1,4 +1,4 @@
-"""What can be set about seeing motion, with the defaults that suit any video."""
+"""Settings of motion segmentation, with defaults for any video."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Superpixels: small cells that follow image edges, and how alike neighbours are.
+"""Superpixels: small cells that follow image edges, and the affinity of neighbours.
 
-Watershed from a regular grid of seeds: cells keep to their place in flat parts and stop at edges,
-so a silhouette found on cells is as sharp as the image.
+A watershed from a regular grid of seeds: cells stay compact in flat regions and stop at edges, so a
+silhouette made of cells is as sharp as the image.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from visup.percepts.motion.features._superpixels_jit import (
 )
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 
-STIFF = 15.0  # flat cells of one tone are nearly one: a whole sky, a whole face of a box
+STIFF = 15.0  # affinity of flat cells of one tone, which are nearly one: a sky, a face of a box
 CALM = 1.0  # mean gradient up to which a cell is flat, grey levels per pixel
 LOOSE = 0.05
 FLAT = 3.0  # gradient, averaged over 3 x 3 pixels, below which there is no edge worth following
@@ -33,7 +33,7 @@ FLAT = 3.0  # gradient, averaged over 3 x 3 pixels, below which there is no edge
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Superpixels:
-    """A partition of the image.
+    """A partition of the image into cells.
 
     Attributes:
         labels: (h, w) int32, 0 to count - 1.
@@ -43,8 +43,8 @@ class Superpixels:
         tone: (count, 3) float32 mean tone.
         link: (count, count) sparse float32, symmetric, affinity of neighbours by the length of
             their common border and the likeness of their tones.
-        corners: (count, 4) int32 (left, top, right, bottom) of each cell, the latter two beyond
-            it; of a cell without pixels, right and bottom are 0, left and top the image's size.
+        corners: (count, 4) int32 (left, top, right, bottom) of each cell, the latter two exclusive;
+            of a cell without pixels, right and bottom are 0, left and top the image's size.
     """
 
     labels: NDArray[np.int32]
@@ -63,9 +63,9 @@ class Superpixels:
         )
 
     def mean(self, values: Floats) -> Floats:
-        """Mean of an (h, w) map in each cell, (count,) float32; that of a map asked again is kept.
+        """Mean of an (h, w) map in each cell, (count,) float32; cached per map.
 
-        Several steps of a frame ask for the same few maps, of what is hidden.
+        Several steps of a frame ask for the same few maps of hidden objects.
         """
         for known, found in self._known:
             if known is values:
@@ -116,10 +116,10 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
         The cells.
     """
     busy = np.abs(image.gx) + np.abs(image.gy)
-    # A seed sits on no edge, and the watershed has nothing to find in a cell that is flat all over.
+    # Seeds avoid edges, and the watershed has nothing to find in a cell that is flat throughout.
     seeds, count = flat_seeds(_smoothed(busy), cell, FLAT)
     watershed(*_edges(image.tone), seeds)
-    labels = _settled(seeds)
+    labels = _without_boundaries(seeds)
     number, sums, corners = cell_statistics(labels, image.tone, busy, count)
     area = np.maximum(number, 1)
     mean = np.asarray(sums / area[:, None], dtype=np.float32)
@@ -135,21 +135,21 @@ def _smoothed(busy: Floats) -> Floats:
 
 
 def _edges(tone: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """How far each pixel of (h, w, 3) differs from the next, (h, w), and from that below, (h - 1, w)."""
+    """Difference of each pixel of (h, w, 3) from the next, (h, w), and from that below, (h - 1, w)."""
     right = np.zeros(tone.shape[:2], dtype=np.uint8)
     right[:, :-1] = _unlike(tone[:, 1:], tone[:, :-1])
     return right, _unlike(tone[1:], tone[:-1])
 
 
 def _unlike(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """By how much the tones of two images differ, (h, w): the channel that differs most counts."""
+    """Largest difference over the channels of two images, (h, w)."""
     first, second, third = cv2.split(cv2.absdiff(one, other))
     return np.asarray(cv2.max(cv2.max(first, second), third), dtype=np.uint8)
 
 
-def _settled(found: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Cells from 0; the lines between them, -1, go to the later of the cells beside them."""
-    short = (found + 1).astype(np.uint16)  # on a line 0, what was not reached 1
+def _without_boundaries(found: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Cells numbered from 0; boundary pixels, -1, go to the adjacent cell of highest number."""
+    short = (found + 1).astype(np.uint16)  # 0 on a boundary, 1 where not reached
     grown = cv2.dilate(short, np.ones((3, 3), np.uint8))
     cv2.copyTo(grown, (short < 2).view(np.uint8), short)
     labels = short.astype(np.int32) - 2
@@ -161,7 +161,7 @@ def _links(
 ) -> sparse.csr_matrix:
     count = len(tone)
     i, j, pixels = cell_borders(labels, count)
-    # Maxima along short rows are slow, column by column they are not.
+    # Faster column by column than as maxima along short rows.
     gaps = np.abs(tone[i] - tone[j])
     unlike = np.maximum(np.maximum(gaps[:, 0], gaps[:, 1]), gaps[:, 2])
     stiff = 1 + STIFF * calm[i] * calm[j]

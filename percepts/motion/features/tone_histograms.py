@@ -1,4 +1,4 @@
-"""Appearance: how well a tone fits what each label has looked like, from smoothed histograms."""
+"""Appearance: likelihood of tones under each label, from smoothed histograms."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def tone_likelihood(cells: Superpixels, prior: Floats, least: float = 12.0) -> F
     Args:
         cells: The superpixels.
         prior: (count, K) float32 label shares; label 0 is the background, the last is unknown.
-        least: Cells that a label must have for its histogram to be trusted.
+        least: Fewest cells for a label's histogram to be trusted.
 
     Returns:
-        (count, K) float32, normalised over labels; even where a label is too small to tell.
+        (count, K) float32, normalised over labels; uniform where a label is too small.
     """
     bins = np.minimum((cells.tone / (256 / BINS)).astype(np.int64), BINS - 1)
     code = (bins[:, 0] * BINS + bins[:, 1]) * BINS + bins[:, 2]
@@ -44,6 +44,6 @@ def smoothed_histogram(histogram: NDArray[Any]) -> NDArray[Any]:
     """A flat histogram after a Gaussian along each of its three axes."""
     out = histogram
     for _ in range(3):
-        # Each product smooths the first axis and puts it last.
+        # Each product smooths the first axis and moves it last.
         out = (SMOOTHING @ out.reshape(BINS, -1)).T
     return out.ravel()

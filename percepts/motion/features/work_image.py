@@ -1,4 +1,4 @@
-"""The image that is worked on: reduced, grey, with its gradients; and the past that is kept."""
+"""The working image (reduced, grey, with gradients) and a history of past ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorkImage:
-    """One frame, made ready.
+    """One frame, preprocessed.
 
     Attributes:
         time: Seconds.
@@ -43,7 +43,7 @@ class WorkImage:
         return self.grey.shape[0], self.grey.shape[1]
 
 
-# A square root evens out photon noise and lifts shadows: harsh light leaves objects in both.
+# A square root evens out photon noise and lifts shadows: in harsh light objects lie in both.
 LIFT = np.clip(np.sqrt(np.arange(256) / 255.0) * 255.0, 0, 255).astype(np.uint8)
 
 
@@ -64,9 +64,9 @@ def prepare_image(frame: Frame, work_size: int) -> WorkImage:
     scale = min(1.0, work_size / max(height, width))
     if scale < 1.0:
         size = (max(8, round(width * scale)), max(8, round(height * scale)))
-        # Down to half the size, four neighbours hold nearly all of the area of a pixel.
-        way = cv2.INTER_LINEAR if scale >= 0.5 else cv2.INTER_AREA
-        image = np.asarray(cv2.resize(image, size, interpolation=way), dtype=np.uint8)
+        # Down to half the size, the four neighbours cover nearly all of a pixel's area.
+        interpolation = cv2.INTER_LINEAR if scale >= 0.5 else cv2.INTER_AREA
+        image = np.asarray(cv2.resize(image, size, interpolation=interpolation), dtype=np.uint8)
     image = np.asarray(cv2.GaussianBlur(image, (3, 3), 0.7), dtype=np.uint8)
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     gx = np.asarray(cv2.Scharr(grey, cv2.CV_32F, 1, 0, scale=1 / 32), dtype=np.float32)
@@ -80,7 +80,7 @@ def prepare_image(frame: Frame, work_size: int) -> WorkImage:
 
 
 class ImageHistory:
-    """Past working images, as far back as the longest baseline, so memory stays flat.
+    """Past working images, as far back as the longest baseline, so that memory stays bounded.
 
     Args:
         span_s: Seconds to keep.
@@ -95,19 +95,19 @@ class ImageHistory:
         return len(self._images)
 
     def push(self, image: WorkImage) -> None:
-        """Keep an image and forget those beyond the span; two are always kept."""
+        """Add an image and drop those beyond the span; at least two are retained."""
         self._images.append(image)
         while len(self._images) > 2 and image.time - self._images[1].time > self._span:
             self._images.popleft()
 
     def lags(self, wanted: Sequence[float]) -> tuple[int, ...]:
-        """Baselines in frames that come nearest to the wanted ones, shortest first.
+        """Baselines in frames nearest to the wanted ones, shortest first.
 
         Args:
             wanted: Seconds; 0 means one frame.
 
         Returns:
-            Frames back from the newest image, each at least 1 and within what is kept.
+            Frames back from the newest image, each at least 1 and within the history.
         """
         if len(self._images) < 2:
             return ()

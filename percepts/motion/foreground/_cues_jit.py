@@ -10,14 +10,14 @@ from visup.percepts.motion.features.work_image import Floats
 
 Labels = NDArray[np.int32]
 Grey = NDArray[np.uint8]
-EVERY = 2  # one pixel in so many, along x and y, is looked at
+EVERY = 2  # sampling step along x and y, pixels
 
 
 @compiled
 def flow_links(old: Labels, new: Labels, flow: Floats) -> tuple[Labels, Labels]:
-    """Which cell of the newer image comes from which of the older one, (M,) and (M,).
+    """Pairs of a cell of the newer image and the older cell it comes from, (M,) and (M,).
 
-    A pair for each pixel that is looked at and comes from within the image.
+    One pair for each sampled pixel that comes from within the image.
     """
     height, width = new.shape
     here = np.empty(((height + 1) // EVERY) * ((width + 1) // EVERY), np.int32)
@@ -35,13 +35,13 @@ def flow_links(old: Labels, new: Labels, flow: Floats) -> tuple[Labels, Labels]:
 
 @compiled
 def carried(here: Labels, there: Labels, values: Floats, looked: Floats) -> Floats:
-    """Values (old count, K) of the older cells as they come to the newer ones, (count, K).
+    """Values (old count, K) of the older cells carried to the newer ones, (count, K).
 
     Args:
         here: (M,) cells of the newer image.
-        there: (M,) cells of the older one that they come from.
+        there: (M,) the older cells they come from.
         values: Of the older cells.
-        looked: (count,) how many pixels of each newer cell were looked at; what came into view counts as 0.
+        looked: (count,) sampled pixels of each newer cell; those newly in view count as 0.
     """
     kinds = values.shape[1]
     out = np.zeros((len(looked), kinds), np.float32)
@@ -56,7 +56,7 @@ def carried(here: Labels, there: Labels, values: Floats, looked: Floats) -> Floa
 
 @compiled
 def flow_statistics(labels: Labels, flow: Floats, gx: Floats, gy: Floats, count: int) -> Floats:
-    """Means over each cell, (count, 5): flow along x and y, its steepness, texture; pixels looked at.
+    """Means over each cell, (count, 5): flow along x and y, its gradient, texture, sampled pixels.
 
     Args:
         labels: (h, w) cells.
@@ -88,7 +88,7 @@ def flow_statistics(labels: Labels, flow: Floats, gx: Floats, gy: Floats, count:
 
 @compiled
 def _sample(grey: Grey, x: float, y: float) -> float:
-    """A grey value between pixels; beyond the border that of the border."""
+    """A bilinearly interpolated grey value; clamped at the border."""
     height, width = grey.shape
     x, y = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
     u, v = int(x), int(y)
@@ -106,16 +106,16 @@ def warp_errors(
     flow: Floats,
     ground: Floats,
 ) -> Floats:
-    """Mean misfit of each cell, (count, 2), under the ground's motion and under the flow.
+    """Mean misfit of each cell, (count, 2), under the background's motion and under the flow.
 
-    In units of what noise and a small error of motion explain; at most 6 a pixel.
+    In units of what noise and a small motion error explain; at most 6 per pixel.
 
     Args:
         labels: (h, w) cells.
         images: The newest grey image and the one before.
         gradient: Of the newest image, along x and y.
         flow: (h, w, 2) from the newest image back to the one before.
-        ground: (count, 2) displacement of the ground since then, at each cell.
+        ground: (count, 2) displacement of the background at each cell.
     """
     height, width = labels.shape
     new, old = images
@@ -140,14 +140,14 @@ def warp_errors(
 def inside_share(edges: NDArray[np.bool_]) -> Floats:
     """Share of eight rays from each pixel to the border that cross edges an odd number of times, (h, w).
 
-    What is enclosed by edges is inside them along any ray (Papazoglou and Ferrari, Fast object segmentation
+    A pixel enclosed by edges is inside along any ray (Papazoglou and Ferrari, Fast object segmentation
     in unconstrained video, 2013). An edge several pixels wide is crossed once.
     """
     height, width = edges.shape
     out = np.zeros((height, width), np.float32)
     crossed = np.zeros((height, width), np.int32)
-    for way in range(9):
-        dx, dy = way % 3 - 1, way // 3 - 1
+    for ray in range(9):
+        dx, dy = ray % 3 - 1, ray // 3 - 1
         if dx == 0 and dy == 0:
             continue
         for j in range(height):
@@ -187,14 +187,14 @@ def settled(
     trust: Floats,
     sweeps: int,
 ) -> Floats:
-    """Values (count, K) after those that are little trusted have taken on those of alike neighbours.
+    """Values (count, K) after the less trusted were smoothed towards similar neighbours.
 
-    Each is its own value and its neighbours' results, by trust and by affinity: a linear system, of which so
-    many sweeps forth and back (Gauss and Seidel) are made; CSR as in `Superpixels`.
+    Each result balances its own value by trust and its neighbours' results by affinity: a linear system, for
+    which this many forward and backward Gauss-Seidel sweeps are made; CSR as in `Superpixels`.
 
     Args:
-        ends: Where the neighbours of each cell begin.
-        neighbours: Of all cells, in their order.
+        ends: CSR row starts.
+        neighbours: CSR columns.
         weights: Their affinities.
         values: Of the cells.
         trust: (count, K) weight of each value.

@@ -1,8 +1,8 @@
-"""The belief that superpixels show something that moves by itself, carried from frame to frame.
+"""The probability that each superpixel moves independently, filtered from frame to frame.
 
-Each frame's cues are judged twice: alone, and then in context, beside what the neighbours' cues say, what was
-believed of the place that the superpixel comes from, and whether its tone is that of what was believed to
-move or of the rest. What context is worth is learnt in the loop: from beliefs that the model itself held.
+Each frame's cues are classified twice: alone, then in context, with the neighbours' cues, the belief carried
+along the flow, and whether the tone is that of past foreground or background. The context classifier is
+trained in the loop: on beliefs that the model itself produced.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from visup.percepts.motion.foreground._cues_jit import neighbour_means, settled
 from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.perceptron import ForegroundModel
 
-FADING = 0.92  # weight of the tones of all frames before
-FEW = 200.0  # pixels of what moves below which its tones tell nothing
-RARE = 2e-4  # share of a tone that is assumed of either side
-NEVER = 0.003  # share of the image that counts as nothing at all
-DOUBT = 0.02  # share by which a carried belief is never quite sure
-FIRST = 0.1  # belief where there was no frame before
-MOST_OF = 50  # the log odds of one cell in so many are above those called the most of the frame
+FADING = 0.92  # weight of the tones of all earlier frames
+FEW = 200.0  # foreground pixels below which tones are uninformative
+RARE = 2e-4  # floor of a tone's share in either histogram
+NEVER = 0.003  # share of the image added before taking a logarithm
+DOUBT = 0.02  # distance that a carried belief keeps from 0 and 1
+FIRST = 0.1  # belief where there is no previous frame
+MOST_OF = 50  # one cell in 50 is above the frame's peak log odds
 ALONE_NEAR, PAST, TOGETHER = (len(NAMES) + k for k in (1, 4, 10))  # columns of the cues in context
 CUES_IN_CONTEXT = len(NAMES) + 17
 TEXTURE = NAMES.index("texture")
-CALM = 8.0  # texture, grey levels a pixel, at which a flow is half trusted
-TRUST = 1.0  # weight of a value that is fully trusted, beside affinities
+CALM = 8.0  # texture, grey levels per pixel, at which the flow is half trusted
+TRUST = 1.0  # weight of a fully trusted value, relative to affinities
 SWEEPS = 8
-SURE = 12.0  # log odds beyond which nothing is told apart
+SURE = 12.0  # log odds are clipped here
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
-    """What is believed after a frame.
+    """The belief after a frame.
 
     Attributes:
-        share: (count,) float32, probability that each superpixel shows something that moves by itself.
+        share: (count,) float32, probability that each superpixel moves independently.
         alone: (count,) float32, the same by the cues of each superpixel alone.
-        moving: (BINS ** 3,) float64, tones of what moves; older frames fade.
-        rest: (BINS ** 3,) float64, tones of all else.
+        moving: (BINS ** 3,) float64, tone histogram of the foreground; older frames fade.
+        rest: (BINS ** 3,) float64, tone histogram of the background.
     """
 
     share: Floats
@@ -53,7 +53,7 @@ class Belief:
 
 
 def unbiased() -> Belief:
-    """Before the first frame."""
+    """The belief before the first frame."""
     none = np.zeros(BINS**3)
     nowhere = np.zeros(0, np.float32)
     return Belief(nowhere, nowhere, none, none)
@@ -63,9 +63,9 @@ def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
     """The belief after a frame.
 
     Args:
-        belief: After the frame before, whose cells are those that `cues` come from.
-        cues: Of the frame.
-        model: What was learnt.
+        belief: After the previous frame, whose cells are those that `cues` come from.
+        cues: The cues of the frame.
+        model: The trained model.
     """
     alone = model.alone.log_odds(cues.values)
     context = context_cues(belief, cues, alone)
@@ -73,7 +73,7 @@ def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
 
 
 def believed(belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats) -> Belief:
-    """The belief when a frame's superpixels have these log odds alone and in context, (count,) each."""
+    """The belief given each superpixel's log odds alone and in context, (count,) each."""
     share = _share(log_odds)
     pixels = cues.area.astype(np.float64)
     return Belief(
@@ -85,11 +85,11 @@ def believed(belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats) -
 
 
 def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
-    """The cues of a frame with those that need more than one superpixel, (count, CUES_IN_CONTEXT) float32.
+    """A frame's cues extended by those of its context, (count, CUES_IN_CONTEXT) float32.
 
     Args:
-        belief: After the frame before.
-        cues: Of the frame.
+        belief: After the previous frame.
+        cues: The cues of the frame.
         alone: (count,) float32, log odds by the cues of each superpixel alone.
     """
     before, seen = _carried(belief, cues)
@@ -101,8 +101,8 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
     far = _near(cues, _near(cues, next_))
     share = _share(alone)
     most = np.partition(alone, -max(len(alone) // MOST_OF, 1))[-max(len(alone) // MOST_OF, 1)]
-    said = _extent(before, cues.area), _extent(share, cues.area), most
-    whole = [np.full(len(alone), value) for value in said]
+    frame_values = _extent(before, cues.area), _extent(share, cues.area), most
+    whole = [np.full(len(alone), value) for value in frame_values]
     columns = [
         cues.values,
         alone,
@@ -122,7 +122,7 @@ def _share(log_odds: Floats) -> NDArray[Any]:
 
 
 def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:
-    """The share believed of each cell by where it comes from, and how much of it was in view, (count,)."""
+    """Belief carried along the flow to each cell, and the share of it that was in view, (count,) each."""
     count = len(cues.area)
     if not len(cues.here):
         return np.full(count, FIRST, np.float32), np.zeros(count, np.float32)
@@ -132,7 +132,7 @@ def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:
 
 
 def _tone_odds(belief: Belief, tone: NDArray[np.int64]) -> Floats:
-    """Log odds of each cell's tone to be of what moves, (count,) float32; 0 while little of it is known."""
+    """Log odds that each cell's tone is foreground, (count,) float32; 0 while there is little data."""
     moving, rest = belief.moving.sum(), belief.rest.sum()
     if moving < FEW or rest < FEW:
         return np.zeros(len(tone), np.float32)
@@ -142,7 +142,7 @@ def _tone_odds(belief: Belief, tone: NDArray[np.int64]) -> Floats:
 
 
 def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
-    """Values (count, K) after superpixels without texture, whose flow is a guess, took on others'."""
+    """Values (count, K), smoothed over neighbours where a superpixel lacks texture."""
     texture = np.expm1(cues.values[:, TEXTURE : TEXTURE + 1])
     trust = np.broadcast_to(TRUST * texture / (texture + CALM), values.shape)
     return settled(
@@ -156,7 +156,7 @@ def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
 
 
 def _together(cues: FrameCues, values: NDArray[Any]) -> Floats:
-    """Means of values (count, K) over all cells of one motion, and its extent, (count, K + 1)."""
+    """Means of values (count, K) over all cells of the same motion, and its extent, (count, K + 1)."""
     areas = np.bincount(cues.part, cues.area)
     sums = [np.bincount(cues.part, cues.area * v) / np.maximum(areas, 1) for v in values.T]
     extent = np.log(NEVER + areas / cues.area.sum())
@@ -169,5 +169,5 @@ def _near(cues: FrameCues, values: Floats) -> Floats:
 
 
 def _extent(share: NDArray[Any], area: Floats) -> float:
-    """Logarithm of the share of the image that is believed to move."""
+    """Logarithm of the share of the image believed to move."""
     return float(np.log(NEVER + float(share @ area) / float(area.sum())))

@@ -1,8 +1,8 @@
-"""Cues: what one frame shows of each superpixel that tells things that move by themselves from the rest.
+"""Cues: features of each superpixel of a frame that separate independent motion from the rest.
 
-None decides anything. Each is a number for each superpixel, mostly in units of what the frame itself shows
-(its median residual, the residuals along its border), so that a calm view and a wild ride are told by the
-same numbers; what they mean together is learnt (`perceptron.py`).
+No cue decides alone. Each is a number per superpixel, mostly normalised by the frame itself (its median
+residual, the residuals along its border), so that a calm view and a wild ride give comparable values; a
+classifier learns how to combine them (`perceptron.py`).
 """
 
 from __future__ import annotations
@@ -34,31 +34,30 @@ NAMES = (
     *("median_residual", "most_residual", "ground_speed", "ground_scale", "wide_motion"),
     *("track", "candidate"),
 )
-"""What the columns of the cues are, in order."""
+"""Names of the cue columns, in order."""
 
-FRAME = 1 / 12  # share of the height of the image that its border is taken to be wide
-REACH = 0.5  # distance to the border, share of the image, beyond which it tells no more
-LASTING = 0.8  # weight of the way that came to a cell in the frame before
-EDGES = (0.3, 0.5, 0.7)  # strengths of a step of the flow from which it is an edge
+FRAME = 1 / 12  # width of the border, as a share of the image's height
+REACH = 0.5  # distance to the border, share of the image, at which the cue saturates
+LASTING = 0.8  # weight of the residuals accumulated up to the previous frame
+EDGES = (0.3, 0.5, 0.7)  # strengths from which a step of the flow is an edge
 BINS = 16  # of each tone channel, for appearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameCues:
-    """What one frame shows of its superpixels.
+    """The cues of one frame's superpixels, and what links them to the previous frame's.
 
     Attributes:
         values: (count, len(NAMES)) float32.
         area: (count,) float32 pixels.
         tone: (count,) int64, bin of the mean tone of each cell among BINS ** 3.
-        ends: CSR of neighbours: (count + 1,) int32,
-        neighbours: (M,) int32,
-        affinity: and (M,) float32.
-        here: (L,) int32, cells of this frame,
-        there: (L,) int32, and the cells of the frame before that they come from.
-        looked: (count,) float32, pixels of each cell of which it was asked where they come from.
-        part: (count,) int32, which motion each cell goes with: 0 the background's, else a track's, or one of
-            its own.
+        ends: (count + 1,) int32, CSR row starts of the neighbours.
+        neighbours: (M,) int32, CSR columns.
+        affinity: (M,) float32, CSR values.
+        here: (L,) int32, cells of this frame, one for each sampled pixel.
+        there: (L,) int32, the cells of the previous frame that they come from.
+        looked: (count,) float32, sampled pixels of each cell.
+        part: (count,) int32, the motion of each cell: 0 the background's, else a track's, or one of its own.
     """
 
     values: Floats
@@ -73,18 +72,18 @@ class FrameCues:
     part: Labels
 
     def carried(self, values: Floats) -> Floats:
-        """Values (count before, K) of the cells before, as they come to those of this frame."""
+        """Values (previous count, K) of the previous frame's cells, carried to those of this frame."""
         return carried(self.here, self.there, np.ascontiguousarray(values), self.looked)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CueMemory:
-    """What cues remember of the frame before.
+    """The state that cues carry from frame to frame.
 
     Attributes:
-        labels: (h, w) int32, its cells.
-        way: (count, 3) float32: sum of residuals along x and y, and of their lengths, in medians; older ones
-            fade.
+        labels: (h, w) int32, cells of the previous frame.
+        way: (count, 3) float32: sums of the residuals along x and y, and of their lengths, in medians; older
+            frames fade.
     """
 
     labels: Labels
@@ -93,7 +92,7 @@ class CueMemory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackCues:
-    """What tracks say of the superpixels of a frame.
+    """The tracks' evidence on the superpixels of a frame.
 
     Attributes:
         shares: (count, 2) float32, how far each cell belongs to tracks that are reported, and to candidates.
@@ -105,7 +104,7 @@ class TrackCues:
 
 
 def track_cues(posterior: Floats, confirmed: NDArray[np.bool_]) -> TrackCues:
-    """What tracks say of superpixels.
+    """The tracks' evidence on superpixels.
 
     Args:
         posterior: (count, K + 2), of background, K tracks and unknown motion.
@@ -118,7 +117,7 @@ def track_cues(posterior: Floats, confirmed: NDArray[np.bool_]) -> TrackCues:
 
 
 def with_tracks(cues: FrameCues, tracked: TrackCues) -> FrameCues:
-    """The cues of a frame with what tracks say of its superpixels, in place of nothing."""
+    """The cues of a frame with those of tracks filled in."""
     values = cues.values.copy()
     values[:, -tracked.shares.shape[1] :] = tracked.shares
     return replace(cues, values=values, part=tracked.part)
@@ -127,15 +126,15 @@ def with_tracks(cues: FrameCues, tracked: TrackCues) -> FrameCues:
 def flow_cues(
     scene: FrameMeasurements, old: WorkImage, memory: CueMemory | None
 ) -> tuple[FrameCues, CueMemory]:
-    """The cues of a frame that need no tracks, which are found meanwhile; those are 0.
+    """The cues of a frame that need no tracks (found in parallel); those of tracks are 0.
 
     Args:
         scene: The frame as measured.
-        old: The image before.
-        memory: Of the frame before; None when there is none of the same size.
+        old: The previous image.
+        memory: From the previous frame; None when there is none of the same size.
 
     Returns:
-        The cues, and what is to be remembered.
+        The cues, and the memory for the next frame.
     """
     cells, image, flow = scene.cells, scene.image, scene.flow
     labels = cells.labels
@@ -191,7 +190,7 @@ def tone_bins(tone: Floats) -> NDArray[np.int64]:
 def _residuals(
     cells: Superpixels, flow: Floats, background: BackgroundMotion
 ) -> tuple[Floats, Floats]:
-    """Displacement of the nearest background motion at each cell, and what flow has beside it, (count, 2)."""
+    """Displacement of the nearest background motion at each cell, and the residual flow, (count, 2) each."""
     moved = np.stack([model.at(cells.centre) for model in background.models])
     residual = -flow[None] - moved
     nearest = np.hypot(residual[..., 0], residual[..., 1]).argmin(axis=0)
@@ -205,7 +204,7 @@ def _residuals(
 def _residual_cues(
     cells: Superpixels, length: Floats, ground: Floats, median: float
 ) -> tuple[NDArray[Any], ...]:
-    """Lengths of residuals beside the ground's motion, the frame's residuals, and those of its border."""
+    """Residual lengths relative to the background's motion, the frame's residuals, and its border's."""
     height, width = cells.labels.shape
     wide = FRAME * height
     x, y = cells.centre.T
@@ -223,7 +222,7 @@ def _residual_cues(
 
 
 def _frame_cues(length: Floats, ground: Floats, median: float, scale: float) -> tuple[Floats, ...]:
-    """What is said of the frame as a whole, the same in each cell: how calm it is, how well explained."""
+    """Cues of the whole frame, the same in each cell: how calm it is, how well explained."""
     most = float(np.percentile(length, 98))
     wide = float(np.mean(length > 0.5 * most))
     speed = float(np.median(ground))
@@ -240,7 +239,7 @@ def _border_distance(cells: Superpixels) -> Floats:
 
 
 def _inside(flow: Floats, labels: Labels, median: float, looked: Floats) -> Floats:
-    """How far each cell is enclosed by steps of the flow, (count,) 0 to 1."""
+    """How far flow edges enclose each cell, (count,) 0 to 1."""
     coarse = flow[::4, ::4]
     right, down = (
         np.diff(coarse, axis=1, append=coarse[:, -1:]),

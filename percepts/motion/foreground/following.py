@@ -1,4 +1,4 @@
-"""The foreground of a video, frame by frame: cues, then the belief, then the objects."""
+"""The foreground of a video, frame by frame: cues, then belief, then objects."""
 
 from __future__ import annotations
 
@@ -27,22 +27,20 @@ from visup.percepts.motion.foreground.perceptron import ForegroundModel
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
-CALM_PX = (
-    0.25  # cameras at rest and in orbit: 0.00 in the median; those that travel or pan: 0.5 to 34
-)
+CALM_PX = 0.25  # medians: cameras at rest and in orbit 0.00; travelling or panning ones 0.5 to 34
 FOLLOW = 0.2  # weight of the newest frame in the running mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForegroundState:
-    """What is known of the foreground after a frame.
+    """The state of the foreground filter after a frame.
 
     Attributes:
-        memory: What the cues of the next frame need; None before the first.
-        belief: Of its superpixels.
-        objects: Those that it is made of.
-        ground_px: Running mean of how far the ground goes from frame to frame, working pixels; None before
-            it was seen to.
+        memory: State of the cues; None before the first frame.
+        belief: The belief in its superpixels.
+        objects: The objects formed from it.
+        ground_px: Running mean of the background's displacement per frame, working pixels; None before it
+            was measured.
     """
 
     memory: CueMemory | None
@@ -52,26 +50,26 @@ class ForegroundState:
 
     @property
     def calm(self) -> bool:
-        """Whether the ground hardly moves: then tracks, over long baselines, tell more than single frames."""
+        """Whether the background hardly moves: then tracks over long baselines beat single frames."""
         return self.ground_px is not None and self.ground_px < CALM_PX
 
 
 def resting(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
-    """The state after a frame in which nothing is asked of the belief: only the ground is looked at.
+    """The state after a frame in which only the background's motion is updated.
 
     Args:
-        state: After the frame before.
+        state: The state after the previous frame.
         scene: The frame as measured.
     """
     return replace(state, memory=None, ground_px=_ground_px(state, scene))
 
 
 def _ground_px(state: ForegroundState, scene: FrameMeasurements) -> float:
-    """The running mean of how far the ground goes, with a frame."""
+    """The running mean of the background's displacement, updated."""
     x, y = scene.cells.centre.astype(np.int64).T
     models = scene.measured[0].background.models
     ground = np.stack([model.at(scene.cells.centre) for model in models])
-    # Of several motions of the background, such as none, a cell goes with the one that flow is nearest to.
+    # Of several background motions, each cell takes the one nearest to its flow.
     nearest = np.linalg.norm(ground + scene.flow[y, x], axis=-1).argmin(axis=0)
     speed = float(np.median(np.linalg.norm(ground, axis=-1)[nearest, np.arange(len(nearest))]))
     return (
@@ -80,17 +78,17 @@ def _ground_px(state: ForegroundState, scene: FrameMeasurements) -> float:
 
 
 def no_foreground() -> ForegroundState:
-    """Before the first frame of a size."""
+    """The state before the first frame of a size."""
     return ForegroundState(None, unbiased(), no_objects())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackPosterior:
-    """The tracks of a frame, and which superpixels are theirs.
+    """The tracks of a frame and the posterior of its superpixels over them.
 
     Attributes:
-        tracks: After the frame.
-        keys: Of the K tracks that superpixels were shared among.
+        tracks: The tracks after the frame.
+        keys: Keys of the K tracks that superpixels were assigned to.
         posterior: (count, K + 2) float32, shares of background, tracks and unknown motion.
     """
 
@@ -99,7 +97,7 @@ class TrackPosterior:
     posterior: Floats
 
     def cells(self, now: float) -> TrackCells:
-        """The reported tracks that are seen at a time, seconds, and the cells where they prevail."""
+        """The reported tracks observed at `now`, seconds, and the cells where they prevail."""
         alive = [t for t in self.tracks if t.id > 0]
         seen = [t for t in alive if t.last_seen == now and t.key in self.keys]
         place = np.zeros(len(self.keys) + 2, dtype=np.int64)
@@ -110,7 +108,7 @@ class TrackPosterior:
         return TrackCells([t.id for t in seen], {t.id for t in alive}, winner, share)
 
     def cues(self) -> TrackCues:
-        """What they say of the superpixels."""
+        """Their evidence on the superpixels."""
         reported = {t.key for t in self.tracks if t.id > 0}
         confirmed = np.array([key in reported for key in self.keys], dtype=bool)
         return track_cues(self.posterior, confirmed)
@@ -127,12 +125,12 @@ def follow_foreground(
     """The foreground after a frame.
 
     Args:
-        state: After the frame before.
-        model: What was learnt.
+        state: The state after the previous frame.
+        model: The trained model.
         scene: The frame as measured.
-        shown: Its cues that need no tracks, and what is remembered of them (`flow_cues`).
+        shown: Its cues that need no tracks, and their memory (`flow_cues`).
         tracked: Its tracks.
-        admission: What is asked of an object.
+        admission: Conditions on objects.
 
     Returns:
         The cues of the frame, and the state.

@@ -1,8 +1,8 @@
-"""From the belief to objects: whose each superpixel is that is believed to move, under lasting ids.
+"""Foreground objects: superpixels believed to move, assigned to objects with persistent ids.
 
-The belief says what moves, tracks say what moves apart. A cell goes to the track that has it, else to the
-object that had the place it comes from, else to the nearest object that it hangs together with; what hangs
-together with none is a candidate, and an object once it has lasted.
+The belief says what moves, tracks say what moves separately. A cell goes to the track that owns it, else to
+the object that owned the place it comes from, else to the nearest connected object; connected cells near
+none are a candidate, which becomes an object once it has lasted.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 Keys = NDArray[np.int64]
 MOVES = 0.5  # belief from which a cell is part of an object
-CAME = 0.4  # share of a cell that comes from an object for it to be that object's still
-OWNED = 0.5  # share of a new track that is an object's already: then it is a part of that one
-EXISTS = 0.7  # running mean of the belief in what is reported: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
-STAYS = 0.6  # the same of what was told before, so that it does not flicker
-WHOLE = 0.9  # share of what is believed to move there that lies in a track which is the whole of it
+CAME = 0.4  # share of a cell carried from an object from which the cell remains that object's
+OWNED = 0.5  # share of a new track owned by an object from which the track is that object's
+EXISTS = 0.7  # least mean belief to report an object: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
+STAYS = 0.6  # the same for one reported before (hysteresis)
+WHOLE = 0.9  # share of an object's moving cells in a track from which the track is the object
 BORNE = 0.5  # mean belief in the cells of such a track
-EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # the same for what no track follows: both beliefs
-LEAST_PX = 0.25  # beside the ground, from frame to frame: twice what sampling and compression leave
+EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # without a track: least belief, and least by its own cues alone
+LEAST_PX = 0.25  # least residual motion, pixels per frame: twice the sampling error
 RESIDUAL = NAMES.index("residual")
-FOLLOW = 0.4  # weight of the newest frame in it
-LASTS = 3  # frames for which a candidate is seen before it is an object
-NEAR = 12  # steps from cell to cell over which an object is hung together with
-MISSED_S = 0.5  # seconds after which an object that is not seen is forgotten
+FOLLOW = 0.4  # weight of the newest frame in a running mean
+LASTS = 3  # frames before a candidate becomes an object
+NEAR = 12  # steps from cell to cell over which cells connect to an object
+MISSED_S = 0.5  # an unobserved object is deleted after this many seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +46,15 @@ class MovingObject:
     """One object of the foreground.
 
     Attributes:
-        key: Its number here, from 1.
+        key: Internal key, from 1.
         id: Public number; 0 for a candidate.
-        track: Public id of the track that follows it, seen or not; 0 when there is none.
-        frames: In how many frames it was seen.
+        track: Public id of its track, observed or not; 0 when there is none.
+        frames: In how many frames it was observed.
         last_seen: Seconds.
         existence: Running mean of the belief in its superpixels.
-        borne_out: The same by the cues of superpixels alone.
-        followed: Whether a track ever followed it.
-        told: Whether it was ever believed enough to be told.
+        borne_out: The same from the cues of superpixels alone.
+        followed: Whether it ever had a track.
+        told: Whether it was ever believed enough to be reported.
     """
 
     key: int
@@ -69,10 +69,10 @@ class MovingObject:
 
     @property
     def exists(self) -> bool:
-        """Whether it is to be reported: when a track bears it out, else when it is surely there.
+        """Whether to report it: the bar is higher when no track supports it.
 
-        Context may carry an object on, but not begin one: what looks like a mover and lies where one was
-        believed bears itself out for ever.
+        Context may sustain an object but not begin one: otherwise anything that resembles a mover and lies
+        where one was believed would confirm itself for ever.
         """
         if self.followed:
             return self.existence >= (STAYS if self.told else EXISTS)
@@ -85,7 +85,7 @@ class ForegroundObjects:
 
     Attributes:
         owner: (count,) int64, key of the object that has each superpixel, or 0.
-        share: (count,) float32, how surely each superpixel is a part of an object.
+        share: (count,) float32, probability that each superpixel belongs to an object.
         known: The objects by key.
         last_key: The greatest key given so far.
     """
@@ -96,19 +96,19 @@ class ForegroundObjects:
     last_key: int
 
     def reported(self, now: float) -> list[MovingObject]:
-        """Those that have a public id, are believed in and seen at a time, seconds, by id."""
+        """Objects with a public id that exist and were observed at `now`, seconds, sorted by id."""
         known = [o for o in self.known.values() if o.id and o.exists]
         seen = [o for o in known if o.last_seen == now]
         return sorted(seen, key=lambda o: o.id)
 
     def id_of_track(self, track: int) -> int:
-        """The public id of the object that a track follows; the track's own where there is none."""
+        """The public id of the object a track belongs to; the track's own where there is none."""
         owners = (o.id for o in self.known.values() if track > 0 and o.track == track)
         return next(owners, track)
 
 
 def no_objects() -> ForegroundObjects:
-    """Before the first frame."""
+    """The objects before the first frame."""
     return ForegroundObjects(
         np.zeros(0, np.int64), np.zeros(0, np.float32), MappingProxyType({}), 0
     )
@@ -116,13 +116,13 @@ def no_objects() -> ForegroundObjects:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackCells:
-    """The reported tracks, and which cells those have that are seen in a frame.
+    """The reported tracks, and the cells of those observed in a frame.
 
     Attributes:
-        seen: Public ids of K of them.
-        alive: Public ids of all that live, hidden ones too.
-        winner: (count,) int64, place among those seen, from 1, of the track that has each cell, or 0.
-        share: (count,) float32, how far that track has it; 0 where none has.
+        seen: Public ids of the K observed tracks.
+        alive: Public ids of all live tracks, hidden ones too.
+        winner: (count,) int64, index from 1 among those observed of the track that owns each cell, or 0.
+        share: (count,) float32, probability of that track; 0 where there is none.
     """
 
     seen: Sequence[int]
@@ -133,14 +133,14 @@ class TrackCells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Admission:
-    """What is asked of an object.
+    """Conditions for reporting an object.
 
     Attributes:
         least: Its least area, working pixels.
-        ids: Gives its public id.
-        stands: Whether cells, (count,) bool, go as a thing at rest that stands on the ground there: what
-            no track follows is not told then.
-        alone: Whether what no track follows may be told at all.
+        ids: Allocator of public ids.
+        stands: Whether cells, (count,) bool, move as an object at rest on the ground there would: without a
+            track those are not reported.
+        alone: Whether objects without a track may be reported at all.
     """
 
     least: float
@@ -160,12 +160,12 @@ def follow_objects(
     """The objects of a frame.
 
     Args:
-        before: After the frame before, whose cells are those that `cues` come from.
-        cues: Of the frame.
-        belief: What is believed of its superpixels.
-        tracks: Those that are reported and seen.
+        before: The objects after the previous frame, whose cells are those that `cues` come from.
+        cues: The cues of the frame.
+        belief: The belief in its superpixels.
+        tracks: The reported tracks that are observed.
         now: Seconds.
-        admission: What an object must be, and who names it.
+        admission: Conditions on objects.
     """
     moves = belief.share > MOVES
     came = _came_from(before, cues)
@@ -178,14 +178,14 @@ def follow_objects(
     last_key += len(fresh)
     known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
     objects = ForegroundObjects(owner, belief.share, known, last_key)
-    # What goes no further than sampling leaves from frame to frame does not bear itself out.
+    # Residual motion within the sampling error supports no object.
     moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
     belief = replace(belief, alone=belief.alone * moved)
     return _drawn_by_tracks(_seen(objects, belief, cues.area, now, admission), tracks, cues.area)
 
 
 def object_share(objects: ForegroundObjects, key: int) -> Floats:
-    """(count,) float32: how surely an object has each superpixel, less than a half where it has not."""
+    """(count,) float32: probability that each superpixel is the object's; below a half where it is not."""
     mine = objects.owner == key
     taken = (objects.owner > 0) & ~mine
     rest = np.where(taken, 0, np.minimum(objects.share, 0.49))
@@ -195,12 +195,12 @@ def object_share(objects: ForegroundObjects, key: int) -> Floats:
 def object_velocity(
     objects: ForegroundObjects, key: int, flow: Floats, cells: Superpixels, seconds: float
 ) -> tuple[float, float, float]:
-    """Median velocity of an object's cells and its standard error, (vx, vy, sigma), working pixels a second.
+    """Median velocity of an object's cells and its standard error, (vx, vy, sigma), pixels per second.
 
     Args:
-        objects: After the frame.
+        objects: The objects after the frame.
         key: Which of them.
-        flow: (h, w, 2) float32, from the newest image back to the one before.
+        flow: (h, w, 2) float32, from the newest image back to the previous one.
         cells: The superpixels.
         seconds: Between the two.
     """
@@ -214,10 +214,10 @@ def object_velocity(
 def _drawn_by_tracks(
     objects: ForegroundObjects, tracks: TrackCells, area: Floats
 ) -> ForegroundObjects:
-    """The objects with all cells of a track that is the whole of what moves there.
+    """The objects, with all cells of a track that covers the whole object.
 
-    What is rigid a track outlines better than single cells do. Of what is not it follows a part: then much
-    that is believed to move lies beside it.
+    A track outlines a rigid object better than single cells do. Of an articulated one it follows a part only:
+    then many moving cells lie outside it.
     """
     owner, share = objects.owner.copy(), objects.share.copy()
     key_of = {o.track: o.key for o in objects.known.values() if o.track}
@@ -235,7 +235,7 @@ def _drawn_by_tracks(
 
 
 def _came_from(before: ForegroundObjects, cues: FrameCues) -> Keys:
-    """(count,) the object before that most of each cell comes from, or 0."""
+    """(count,) the previous object that most of each cell comes from, or 0."""
     keys = np.unique(before.owner[before.owner > 0])
     count = len(cues.area)
     if not len(keys) or not len(cues.here):
@@ -247,7 +247,7 @@ def _came_from(before: ForegroundObjects, cues: FrameCues) -> Keys:
 def _with_tracks(
     before: ForegroundObjects, tracks: TrackCells, came: Keys, area: Floats
 ) -> tuple[dict[int, MovingObject], int]:
-    """The objects with those of new tracks: an object's that has no track, where it had most of the cells."""
+    """The objects with new tracks assigned: to a trackless object that owned most of the cells, or new."""
     known = {
         k: o if o.track in tracks.alive else replace(o, track=0) for k, o in before.known.items()
     }
@@ -266,7 +266,7 @@ def _with_tracks(
 
 
 def _host(came: Keys, area: Floats) -> int:
-    """The object that most of some cells were a part of, or 0."""
+    """The object that owned most of the cells, or 0."""
     if not len(came):
         return 0
     sums = np.bincount(came, area)
@@ -275,12 +275,12 @@ def _host(came: Keys, area: Floats) -> int:
 
 
 def _spread(owner: Keys, moves: NDArray[np.bool_], cues: FrameCues) -> Keys:
-    """Owners after cells that move and have none took that of the nearest that they hang together with."""
+    """Owners after moving cells without one took that of the nearest connected object."""
     rows = np.repeat(np.arange(len(owner)), np.diff(cues.ends))
     columns = cues.neighbours
     inside = moves[rows] & moves[columns]
     rows, columns, weight = rows[inside], columns[inside], cues.affinity[inside]
-    # The strongest link is written last, so that it stays.
+    # The strongest link is written last, so that it wins.
     order = np.argsort(weight, kind="stable")
     rows, columns = rows[order], columns[order]
     for _ in range(NEAR):
@@ -299,7 +299,7 @@ def _candidates(
     least: float,
     last_key: int,
 ) -> tuple[Keys, list[int]]:
-    """Owners with a new key for each large enough group of cells that move and have none, and those keys."""
+    """Owners, with a new key for each large enough group of unowned moving cells, and those keys."""
     free = np.flatnonzero(moves & (owner == 0))
     if not len(free):
         return owner, []
@@ -321,7 +321,7 @@ def _seen(
     now: float,
     admission: Admission,
 ) -> ForegroundObjects:
-    """The objects with what is seen of them; candidates that lasted confirmed, what is gone forgotten."""
+    """The objects updated from the frame: lasting candidates confirmed, missing ones deleted."""
     pixels = np.bincount(objects.owner, area, objects.last_key + 1)
     beliefs, alone = (
         np.bincount(objects.owner, area * share, objects.last_key + 1)

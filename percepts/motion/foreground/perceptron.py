@@ -17,7 +17,7 @@ from visup.agent.model.errors import SourceError
 from visup.percepts.motion.features.work_image import Floats
 
 FORMAT = 2
-FAR = 4.0  # standard deviations beyond which a cue tells no more
+FAR = 4.0  # standard deviations at which a cue is clipped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,12 +25,12 @@ class Perceptron:
     """Log odds from cues: w . tanh(W z + b) + c, with z the cues in standard deviations from their mean.
 
     Attributes:
-        mean: (D,) float32 of each cue.
-        deviation: (D,) float32 of each cue, above 0.
+        mean: (D,) float32 mean of each cue.
+        deviation: (D,) float32 standard deviation of each cue, above 0.
         hidden: (D, H) float32.
         offset: (H,) float32.
         out: (H,) float32.
-        bias: Log odds where all hidden units say nothing.
+        bias: Log odds when all hidden units are 0.
     """
 
     mean: Floats
@@ -48,11 +48,11 @@ class Perceptron:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForegroundModel:
-    """What was learnt.
+    """The trained classifiers.
 
     Attributes:
-        alone: From the cues of a superpixel alone.
-        context: From the same and what its neighbours, the past and appearance say.
+        alone: Classifies by the cues of a superpixel alone.
+        context: Classifies by those and the cues of neighbours, past and appearance.
     """
 
     alone: Perceptron
@@ -60,17 +60,17 @@ class ForegroundModel:
 
 
 def blank_model(alone: int, context: int) -> ForegroundModel:
-    """A model that knows nothing of so many cues: it says even odds of everything."""
+    """An untrained model for these numbers of cues: even odds for everything."""
     return ForegroundModel(_blank(alone), _blank(context))
 
 
 def write_model(model: ForegroundModel, path: Path, made: Mapping[str, Any]) -> None:
-    """Write a model, with what it was made of; the same model gives the same bytes."""
+    """Write a model and its provenance; the same model gives the same bytes."""
     record = {
         "format": FORMAT,
         "made": made,
-        "alone": _told(model.alone),
-        "context": _told(model.context),
+        "alone": _to_json(model.alone),
+        "context": _to_json(model.context),
     }
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
@@ -79,7 +79,7 @@ def read_model(path: Path) -> ForegroundModel:
     """Read a model.
 
     Raises:
-        SourceError: The file cannot be read, or is none.
+        SourceError: The file cannot be read or is not a model.
     """
     try:
         return _model(path.read_text(encoding="utf-8"))
@@ -111,8 +111,8 @@ def _model(text: str) -> ForegroundModel:
     return ForegroundModel(_perceptron(record["alone"]), _perceptron(record["context"]))
 
 
-def _told(p: Perceptron) -> dict[str, Any]:
-    """As JSON; five digits are more than training knows."""
+def _to_json(p: Perceptron) -> dict[str, Any]:
+    """As JSON; five digits exceed the accuracy of training."""
 
     def digits(values: NDArray[Any]) -> Any:
         return np.vectorize(lambda v: float(f"{v:.5g}"))(np.asarray(values, dtype=float)).tolist()
@@ -127,13 +127,13 @@ def _told(p: Perceptron) -> dict[str, Any]:
     }
 
 
-def _perceptron(told: Mapping[str, Any]) -> Perceptron:
+def _perceptron(data: Mapping[str, Any]) -> Perceptron:
     names = ("mean", "deviation", "hidden", "offset", "out")
-    mean, deviation, hidden, offset, out = (np.asarray(told[n], dtype=np.float32) for n in names)
+    mean, deviation, hidden, offset, out = (np.asarray(data[n], dtype=np.float32) for n in names)
     if (
         hidden.shape != (len(mean), len(out))
         or len(offset) != len(out)
         or not (deviation > 0).all()
     ):
         raise ValueError("shapes do not fit")
-    return Perceptron(mean, deviation, hidden, offset, out, float(told["bias"]))
+    return Perceptron(mean, deviation, hidden, offset, out, float(data["bias"]))

@@ -1,4 +1,4 @@
-"""The inner loops of fitting layers to constraints, compiled; `affine` says what they mean."""
+"""Compiled loops of `affine`: robust least-squares fits of layers to constraints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
 Doubles = NDArray[np.float64]
-SETTLED = 0.003  # pixels, far below what is measured: a fit that moves by less is done
+SETTLED = 0.003  # pixels: a fit that moves by less has converged; far below the measurement error
 
 
 @compiled
@@ -32,7 +32,7 @@ def displacements(xy: Floats, matrix: Doubles, bend: Doubles) -> Floats:
 def squared_misfits(
     xy: Floats, moved: Floats, information: Floats, matrix: Doubles, bend: Doubles, slack: float
 ) -> Floats:
-    """Squared Mahalanobis distance of N constraints to a motion that is known up to `slack`."""
+    """Squared Mahalanobis distance of N constraints to a motion known up to `slack`."""
     at = displacements(xy, matrix, bend)
     out = np.empty(len(xy), np.float32)
     v = slack * slack
@@ -82,7 +82,7 @@ def reweighted_least_squares(
         information: (N, 3) float32 inverse covariances.
         weight: (N,) float64.
         start: (N, 2) float32 displacements to begin with.
-        hold: (K,) float64, how strongly each coefficient is held at zero; more than nothing.
+        hold: (K,) float64, how strongly each coefficient is held at zero; positive.
         slack: Error of the model itself, pixels.
         cutoff: Mahalanobis distance beyond which a constraint hardly counts.
         rounds: Most iterations.
@@ -90,8 +90,8 @@ def reweighted_least_squares(
     Returns:
         (2, K) coefficients, the last (N,) weights, and the mean information of N under these.
 
-    Nine parameters, since a record costs more to unpack at each of hundreds of calls a frame than a fit
-    of few constraints does.
+    Nine parameters: unpacking a record at each of hundreds of calls per frame costs more than a fit to few
+    constraints.
     """
     count, k = phi.shape
     info = _with_slack(information, slack)
@@ -130,7 +130,7 @@ def _with_slack(information: Floats, slack: float) -> Doubles:
 def _reweight(
     moved: Floats, info: Doubles, weight: Doubles, now: Doubles, cutoff: float, out: Doubles
 ) -> None:
-    """Weights (N,) of constraints under the displacements (N, 2) as they are now."""
+    """Weights (N,) of constraints under the current displacements (N, 2)."""
     for n in range(len(moved)):
         a, b, c = info[n, 0], info[n, 1], info[n, 2]
         dx, dy = float(moved[n, 0]), float(moved[n, 1])
@@ -143,7 +143,7 @@ def _reweight(
 def _add_equations(
     phi: Doubles, moved: Floats, info: Doubles, w: Doubles, normal: Doubles, right: Doubles
 ) -> None:
-    """Add the weighted normal equations, (2K, 2K) of which the lower triangle is filled, and (2K,)."""
+    """Add the weighted normal equations, (2K, 2K), lower triangle only, and (2K,)."""
     count, k = phi.shape
     for n in range(count):
         a, b, c = info[n, 0], info[n, 1], info[n, 2]
@@ -161,7 +161,7 @@ def _add_equations(
 
 @compiled
 def _move(phi: Doubles, model: Doubles, now: Doubles) -> float:
-    """Bring displacements (N, 2) to what a model says; the longest step, pixels."""
+    """Set displacements (N, 2) to a model's; returns the longest step, pixels."""
     longest = 0.0
     for n in range(len(phi)):
         for i in range(2):
@@ -195,7 +195,7 @@ def _solve(normal: Doubles, right: Doubles) -> None:
 
 @compiled
 def median(values: Floats) -> float:
-    """The median of (N,) float32 with one or more, as `np.median` rounds it."""
+    """The median of (N,) float32, N > 0, rounded as `np.median` does."""
     half = len(values) // 2
     if len(values) % 2:
         return float(np.partition(values, half)[half])
@@ -205,7 +205,7 @@ def median(values: Floats) -> float:
 
 @compiled
 def quantile(values: Floats, share: float) -> float:
-    """What a share of (N,) float32 with one or more lie below, between two of them in proportion."""
+    """The quantile at `share` of (N,) float32, N > 0, linearly interpolated."""
     ordered, at = np.sort(values), share * (len(values) - 1)
     low = int(at)
     high = min(low + 1, len(values) - 1)

@@ -1,6 +1,6 @@
-"""Layers of motion: affine models fitted to constraints by robust EM, with an outlier class.
+"""Layers of motion: affine models fitted to constraints by robust EM with an outlier class.
 
-The background is not one layer but a few large ones: what covers most of the image, what is fixed
+The background is not one layer but a few large ones: the dominant motion, what is fixed
 to the camera (a sill, a bonnet, stars seen from a camera that keeps its attitude) and possibly a
 second wide layer (a planet that drifts behind). Everything else that moves is an object.
 """
@@ -55,7 +55,7 @@ class Affine:
         return matrix, bend
 
     def shift(self, where: tuple[float, float]) -> tuple[float, float]:
-        """(x, y) displacement of one position; what `at` says, without arrays."""
+        """(x, y) displacement of one position; as `at`, without arrays."""
         x, y = where
         (a, b, c), (d, e, f) = self.matrix.tolist()
         dx, dy = a * x + b * y + c, d * x + e * y + f
@@ -66,7 +66,7 @@ class Affine:
         return dx, dy
 
     def scaled(self, factor: float) -> Affine:
-        """The same motion over a baseline that is `factor` times as long."""
+        """The same motion over a baseline `factor` times as long."""
         bend = None if self.bend is None else self.bend * factor
         return Affine(self.matrix * factor, self.sigma * factor, self.support, bend)
 
@@ -183,14 +183,14 @@ def fit_affine(
     total = float(weight.sum())
     if total < 3.0:
         return Affine(guess.matrix, guess.sigma, 0.0)
-    # What has no weight has no say, and an object has few of the constraints.
+    # Most constraints have no weight: an object covers few of them.
     use = np.flatnonzero(weight > 0)
     xy, share = c.xy[use], weight[use]
     centre = (share @ xy) / total
     spread = float(np.sqrt((share @ ((xy - centre) ** 2).sum(1)) / total)) + 1.0
     phi = np.ones((len(use), 3))
     phi[:, :2] = (xy - centre) / spread
-    # Along an edge nothing is known: the least motion is taken there, not a drifting guess.
+    # Along an edge motion is unknown: regularise towards none, not towards a drifting guess.
     hold = np.array([rigidity, rigidity, 0.01]) / slack**2
     model, w, mean = reweighted_least_squares(
         phi,

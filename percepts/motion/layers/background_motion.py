@@ -1,4 +1,4 @@
-"""What is not an object: the few wide or camera-fixed motions that make up the background."""
+"""The background: the few image-wide or camera-fixed motions that are no object."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def background_slack(model: Affine, c: Constraints) -> float:
     """Error to allow for a background motion, pixels: a wide scene is not quite a plane."""
     if not len(c):
         return 0.1
-    # One in four tells the median well enough.
+    # Every fourth is enough for the median.
     return 0.1 + 0.03 * median(np.hypot(*model.at(c.xy[::4]).T))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrevalenceMap:
-    """Which of two background motions prevails where: the planet above, the sill below.
+    """Which of two background motions prevails where (a planet above, a sill below).
 
     Without it, an arm that pauses before a drifting planet would be taken for something fixed.
 
@@ -54,7 +54,7 @@ class PrevalenceMap:
     def with_votes(
         self, c: Constraints, outside: Floats, models: tuple[Affine, ...]
     ) -> PrevalenceMap:
-        """The same after more constraints of the background."""
+        """The map updated by more constraints of the background."""
         if len(models) != 2:
             return self
         fit = np.stack([distances(m, c, 0.1) for m in models])
@@ -73,7 +73,7 @@ class PrevalenceMap:
 
 
 def empty_prevalence(shape: tuple[int, int]) -> PrevalenceMap:
-    """Nothing known yet."""
+    """A map without votes."""
     return PrevalenceMap(np.zeros((2, 12, 16), dtype=np.float32), shape)
 
 
@@ -82,12 +82,12 @@ class BackgroundMotion:
     """The motions of the background over one baseline.
 
     Attributes:
-        models: The one that follows the camera last.
+        models: The motions; the camera's last.
         scale: How much wider than expected its errors are (parallax, a bent scene), at least 1.
-        fixed: Whether something is seen to be fixed to the camera while the rest moves; None when
+        fixed: Whether something is fixed to the camera while the rest moves; None when
             the baseline is too short to tell.
         prevalence: Which motion prevails where.
-        sure: Whether the camera's motion was seen across the view, or only predicted.
+        sure: Whether the camera's motion was measured across the view, not only predicted.
     """
 
     models: tuple[Affine, ...]
@@ -100,7 +100,7 @@ class BackgroundMotion:
     def distances(self, c: Constraints) -> Floats:
         """Squared distance of each constraint to the likeliest background motion, (N,) float32.
 
-        Every track asks for it with the same constraints, so the last answer is kept.
+        Cached, since every track asks for it with the same constraints.
         """
         if not self._known or self._known[0][0] is not c:
             self._known[:] = [(c, self._distances(c))]
@@ -127,7 +127,7 @@ class BackgroundMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpectedBackground:
-    """What is known of the background before a frame.
+    """The prediction of the background before a frame.
 
     Attributes:
         camera: The camera's motion over the baseline, as predicted.
@@ -153,7 +153,7 @@ def fit_background(
         c: N constraints over one baseline.
         outside: (N,) float32, how far each point is outside all objects, 0 to 1.
         shape: (h, w) of the image.
-        expected: What is known of it before.
+        expected: Its prediction.
         seed: For random samples.
 
     Returns:
@@ -162,10 +162,10 @@ def fit_background(
     weight, cell = balanced_weights(c.xy, shape, outside)
     still, guess = Affine(STILL), expected.camera
     to_still = distances(still, c, 0.1)
-    # Much that does not move in the image is no object, whatever else fills the view.
+    # A large part that does not move in the image is background, whatever else fills the view.
     rests = float(weight[to_still < 9].sum()) > 0.3 * float(weight.sum())
     if expected.fixed_too or rests:
-        # What is fixed comes first, or a bending fit would swallow it with what drifts.
+        # The fixed part is fitted first, or a quadratic fit would absorb it.
         moving = _image_wide_motion(c, outside * (to_still > 9), shape, seed)
         camera = moving or _camera_motion(c, outside, weight, (still, guess), shape, seed)
         models = [still, camera or guess]
@@ -199,7 +199,7 @@ def _camera_motion(
     shape: tuple[int, int],
     seed: int,
 ) -> Affine | None:
-    """The camera's motion; a motion that fills no more than a part of the view is not that."""
+    """The camera's motion; None when no motion fills enough of the view."""
     model = fit_dominant(c, weight, guesses, seed)
     if not _spans(c, model, outside, shape, 0.15):
         return None
@@ -210,7 +210,7 @@ def _camera_motion(
 def _image_wide_motion(
     c: Constraints, weight: Floats, shape: tuple[int, int], seed: int
 ) -> Affine | None:
-    """A motion that spans the image, such as a planet behind; objects are narrower than that."""
+    """A motion that spans the image, such as a planet behind; objects are narrower."""
     if np.count_nonzero(weight) < 30:
         return None
     balanced, _ = balanced_weights(c.xy, shape, weight)
@@ -232,7 +232,7 @@ def _spans(
 
 def _scale(m2: Floats, weight: Floats, cell: NDArray[np.int64]) -> float:
     """Robust width of the errors of the background, from their weighted 40 % quantile."""
-    # From a small part of the view nothing can be said of the whole.
+    # A small part of the view says nothing about the whole.
     if len(np.unique(cell[weight > 0])) < 0.25 * BALANCE_GRID[0] * BALANCE_GRID[1]:
         return 1.0
     order = np.argsort(m2, kind="stable")

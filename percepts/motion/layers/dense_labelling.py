@@ -1,9 +1,8 @@
-"""The dense posterior: which layer each superpixel belongs to, and how surely.
+"""The dense posterior of every superpixel over the layers.
 
-Evidence comes where the image has structure; between edges it is spread over alike neighbours by a
-random walk (a linear system), so the flat inside of an object takes the label of its outline while
-a dark sky, which is larger than its borders with objects, stays background. What is not settled by
-evidence stays between the labels.
+Evidence exists where the image has structure; between edges a random walk (a linear system) spreads it over
+similar neighbours, so the flat inside of an object takes the label of its outline while a dark sky, larger
+than its borders with objects, stays background. Cells without evidence keep a mixed posterior.
 """
 
 from __future__ import annotations
@@ -24,22 +23,22 @@ from visup.percepts.motion.features.work_image import Floats
 
 REACH = 2.0  # pixels on either side of a point: an edge may belong to either of its sides
 CLIP = 5.0
-STAY = 4.0  # weight of what was there before where an object rests
-STILL_TOLD = 0.9  # share of the evidence that is left out there
-DOUBT = 0.03  # weight of evidence for anything but background from which a cell is in doubt
-DOUBT_STEPS = 3  # how far it is felt: beyond, what is seen is background
-LEAST = 0.03  # no label is ever quite impossible before there is evidence
+STAY = 4.0  # weight of the previous posterior where an object rests
+STILL_DISCARDED = 0.9  # share of the motion evidence discarded there
+UNCERTAIN = 0.03  # weight of evidence for anything but background from which a cell is uncertain
+UNCERTAIN_STEPS = 3  # only cells this near to uncertain ones are solved for; the rest is background
+LEAST = 0.03  # floor of the prior: no label is impossible before there is evidence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointEvidence:
-    """What the motion of points says of the labels.
+    """Evidence for the labels from the motion of points.
 
     Attributes:
         points: N points.
         likelihood: (N, K) float32, log likelihood of each label.
-        informative: (N,) bool, whether a point says what is seen there: a corner whose motion was
-            measured.
+        informative: (N,) bool, whether a point is evidence for what is visible there: a corner whose motion
+            was measured.
     """
 
     points: Points
@@ -49,12 +48,12 @@ class PointEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelPrior:
-    """What is expected of the labels before the evidence of a frame.
+    """The prior of the labels before the evidence of a frame.
 
     Attributes:
-        shares: (count, K) float32, by where the tracks are predicted.
+        shares: (count, K) float32, from the predicted positions of the tracks.
         by_appearance: (count, K) float32, the same after the tones of the superpixels.
-        stationary: (count,) bool, where an object rests: motion tells nothing there.
+        stationary: (count,) bool, where an object rests: motion is no evidence there.
     """
 
     shares: Floats
@@ -82,7 +81,7 @@ def cell_evidence(
 
     Args:
         cells: The superpixels.
-        evidence: What points say.
+        evidence: Evidence of the points.
         dense: (count, K) float32, log likelihood by dense comparison.
         prior: (count, K) float32 label shares before.
 
@@ -115,17 +114,19 @@ def random_walk(
         cells: The superpixels.
         share: (count, K) label shares by evidence; label 0 is the background.
         weight: (count,) weight of the evidence.
-        prior: (count, K) posterior carried from the frame before.
+        prior: (count, K) posterior carried from the previous frame.
         persistence: (count,) weight of that prior.
         bias: (count,) weight of the belief that it is background.
 
     Returns:
         (count, K) float32 posterior; rows sum to 1.
     """
-    # Far from all that may not be background, nothing else can come out: the rest is solved for,
-    # with those cells as its border.
-    doubt = (share[:, 1:].sum(axis=1) * weight + prior[:, 1:].sum(axis=1) * persistence) > DOUBT
-    inside = np.flatnonzero(cells.dilated(doubt[:, None], DOUBT_STEPS)[:, 0])
+    # Far from any cell that may not be background the answer is background: only the rest is solved
+    # for, with those cells as its boundary.
+    uncertain = (
+        share[:, 1:].sum(axis=1) * weight + prior[:, 1:].sum(axis=1) * persistence
+    ) > UNCERTAIN
+    inside = np.flatnonzero(cells.dilated(uncertain[:, None], UNCERTAIN_STEPS)[:, 0])
     out = np.zeros(share.shape)
     out[:, 0] = 1.0
     if not len(inside):
@@ -138,7 +139,7 @@ def random_walk(
         system,
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
-        relax=1,  # cells have so few neighbours that there is nothing to gather in dense blocks
+        relax=1,  # cells have too few neighbours for dense blocks
         panel_size=1,
         options={"SymmetricMode": True},
     ).solve(right)
@@ -155,7 +156,7 @@ def _system(
     Args:
         link: (count, count) affinity of neighbours, symmetric.
         inside: (M,) numbers of the cells, ascending.
-        own: (M,) what else is on the diagonal.
+        own: (M,) additional terms of the diagonal.
 
     Returns:
         (M, M) float64, symmetric; and (M,) float64.
@@ -173,7 +174,7 @@ def _system(
     within = other >= 0
     one, other, value = one[within], other[within], value[within]
     ends = np.cumsum(np.bincount(one, minlength=m) + 1)
-    # The diagonal comes last in each column: nothing asks for another order.
+    # The diagonal comes last in each column, which the solver accepts.
     place = np.arange(len(one)) + one
     data, rows = np.empty(len(one) + m), np.empty(len(one) + m, dtype=np.int32)
     data[place], rows[place] = -value, other
@@ -184,7 +185,7 @@ def _system(
 
 
 def appearance_prior(cells: Superpixels, prior: Floats) -> Floats:
-    """Shares of the labels (count, K) that are expected, after the tones of the superpixels."""
+    """Shares of the labels (count, K) expected, weighted by the tones of the superpixels."""
     out = prior * tone_likelihood(cells, prior)
     return np.asarray(out / np.maximum(out.sum(axis=1, keepdims=True), 1e-6))
 
@@ -196,13 +197,13 @@ def label_cells(
     prior: LabelPrior,
     settings: MotionSettings,
 ) -> Labelling:
-    """The labels of the superpixels by motion, appearance and what was there before.
+    """The labels of the superpixels by motion, appearance and the previous frame.
 
     Args:
         cells: The superpixels.
-        evidence: What points say.
+        evidence: Evidence of the points.
         dense: (count, K) float32, log likelihood by dense comparison.
-        prior: What is expected.
+        prior: The prior.
         settings: Weights.
     """
     stay = prior.stationary
@@ -212,7 +213,7 @@ def label_cells(
     bias[_border(cells.labels)] *= 10
     bias *= np.where(prior.shares[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
     trust[stay], bias[stay] = STAY, 0.0
-    weight[stay] *= 1 - STILL_TOLD
+    weight[stay] *= 1 - STILL_DISCARDED
     posterior = random_walk(
         cells, share, settings.evidence * weight, prior.by_appearance, trust, bias
     )
@@ -220,5 +221,5 @@ def label_cells(
 
 
 def _border(labels: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Superpixels at the border of the image: what is seen there more often lies behind."""
+    """Superpixels at the border of the image, which are more often background."""
     return np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))

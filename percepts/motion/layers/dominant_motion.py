@@ -1,4 +1,4 @@
-"""The motion of the widest part of the image, found among random samples, whatever else moves."""
+"""The dominant motion: that of the widest part of the image, by random sampling."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ BALANCE_GRID = (6, 8)
 def balanced_weights(
     xy: Floats, shape: tuple[int, int], keep: Floats
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Weights with which each part of the image counts once, however many points it has.
+    """Weights that give each part of the image the same total, however many points it has.
 
     Args:
         xy: (N, 2) positions.
         shape: (h, w) of the image.
-        keep: (N,) weight of each point before that, 0 to 1.
+        keep: (N,) initial weight of each point, 0 to 1.
 
     Returns:
         (N,) float32 weights that sum to 1 in each occupied cell; (N,) int64 cell numbers.
@@ -68,13 +68,13 @@ def fit_dominant(
         first = int(scores.argmax())
         if scores[first] > best_score:
             best = samples[first]
-    # No ties to the guess: zoom and rotation of the camera must come out whole.
+    # Hardly regularised: zoom and rotation of the camera must not be damped.
     return fit_affine(c, weight * 20, best, rigidity=0.02, rounds=5, slack=slack, cutoff=2.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _UsableConstraints:
-    """The constraints that a dominant motion is sought for: (N, 2), (N, 2), (N, 3), (N,)."""
+    """The constraints to fit: (N, 2), (N, 2), (N, 3), (N,)."""
 
     xy: Floats
     moved: Floats
@@ -82,7 +82,7 @@ class _UsableConstraints:
     weight: Floats
 
     def scores(self, models: Sequence[Affine]) -> Floats:
-        """How much weight each of M motions explains, (M,) float32."""
+        """Total weight that each of M motions explains, (M,) float32."""
         if any(m.bend is not None for m in models):
             each = [mahalanobis(m.at(self.xy) - self.moved, self.info) for m in models]
             m2 = np.stack(each)
@@ -100,7 +100,7 @@ class _UsableConstraints:
 
 
 def _draw_samples(rng: np.random.Generator, weight: Floats, samples: int = 40) -> NDArray[np.int64]:
-    """Random samples of four, by weight: (samples, 4). A point drawn twice does no harm."""
+    """Random samples of four, by weight, (samples, 4). Repeated points are harmless."""
     heap = np.cumsum(weight, dtype=np.float64)
     at = np.searchsorted(heap, rng.random((samples, 4)) * heap[-1], side="right")
     return np.asarray(np.minimum(at, len(weight) - 1))

@@ -1,4 +1,4 @@
-"""New layers: groups of constraints that no known layer explains, and layers that prove to be one."""
+"""Discovery of layers in constraints that no known layer explains, and a test whether two are one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from visup.percepts.motion.layers.affine import Affine, distances, fit_affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 
 LEAST_POINTS = 8
-ALIKE = 6.0  # median squared Mahalanobis distance under which two motions are one
+ALIKE = 6.0  # median squared Mahalanobis distance below which two motions are the same
 
 
 def spatial_groups(xy: Floats, shape: tuple[int, int], cell: int) -> NDArray[np.int32]:
@@ -50,7 +50,7 @@ def discover_layers(
     number = spatial_groups(c.xy[index], shape, cell)
     for g in range(1, int(number.max()) + 1):
         left = index[number == g]
-        # A group may hold more than one motion: what the first does not explain is tried again.
+        # A group may hold several motions: constraints that the first does not explain are tried again.
         for _ in range(3):
             if len(left) < LEAST_POINTS:
                 break
@@ -68,11 +68,11 @@ def discover_layers(
 
 
 def layer_slack(model: Affine, where: tuple[float, float] = (0.0, 0.0)) -> float:
-    """Error to allow for a layer, pixels: what moves far seldom moves quite as a plane does.
+    """Error to allow for a layer, pixels: large motions are seldom quite planar.
 
     Args:
         model: The layer's displacement over a baseline.
-        where: (x, y) about which the layer lies, pixels.
+        where: (x, y) centre of the layer, pixels.
 
     Returns:
         Standard deviation, pixels.
@@ -112,6 +112,6 @@ def same_motion(
     """
     if min(np.count_nonzero(in_a), np.count_nonzero(in_b)) < 4:
         return None
-    both = fit_affine(c, (in_a | in_b).astype(np.float32), start, slack=slack)
-    m2 = distances(both, c, slack)
+    joint = fit_affine(c, (in_a | in_b).astype(np.float32), start, slack=slack)
+    m2 = distances(joint, c, slack)
     return median(m2[in_a]) < ALIKE and median(m2[in_b]) < ALIKE

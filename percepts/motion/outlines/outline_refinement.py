@@ -1,10 +1,10 @@
-"""Outlines drawn to where the tones change: each pixel beside one goes to the side that it resembles.
+"""Outline refinement: pixels near an outline are reassigned to the side whose tones they resemble.
 
-Cells are several pixels wide, and some lie across the border of an object: a dark sky, a gap
-between legs. Along the outline the tones inside and outside are described by their mean and variance
-in a window, and pixels there are given anew (after Lankton and Tannenbaum, Localizing region-based
-active contours, 2008, with local Gaussians as Wang, He, Mishra and Li have them, 2009). Where both
-sides look alike nothing changes.
+Cells are several pixels wide, and some lie across the border of an object: a dark sky, a gap between
+legs. Along the outline, the tones inside and outside are described by local mean and variance, and
+nearby pixels are reclassified (after Lankton and Tannenbaum, Localizing region-based active contours,
+2008, with local Gaussians as in Wang, He, Mishra and Li, 2009). Where both sides look alike nothing
+changes.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
 WINDOW = 21  # pixels: side of the window whose tones are compared
-SAMPLED = (WINDOW // 2 + 1, WINDOW // 2 + 1)  # the same of every other pixel
+SAMPLED = (WINDOW // 2 + 1, WINDOW // 2 + 1)  # the same in the image at half the size
 BAND = 5  # pixels from the outline within which pixels may change sides
 LEAST = 0.08  # share of the window that each side must fill
 NOISE = 6.0  # least standard deviation of tones
-STEEP = 0.7  # weight of the share that a pixel has already, per unit of log odds
-MOST = 3.0  # log odds that tones may give to a pixel
+STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
+MOST = 3.0  # log odds that tones may add to a pixel at most
 CONTEXT = WINDOW // 2 + BAND
-"""How much wider than the object a part of the image should be for it, pixels."""
+"""Margin around the object that a crop for refinement needs, pixels."""
 
 
 def refine_outline(share: Floats, tone: NDArray[np.uint8]) -> Floats:
-    """Shares after pixels near the outline have been given to the side that they resemble.
+    """Shares after pixels near the outline were assigned to the side they resemble.
 
     Args:
         share: (h, w) float32 probability of an object.
         tone: (h, w, 3) uint8.
 
     Returns:
-        (h, w) float32, on the sides of a half on which pixels are.
+        (h, w) float32; above one half inside.
     """
     odds = inside_log_odds(share, tone)
     if not odds.any():
@@ -55,12 +55,12 @@ def inside_log_odds(share: Floats, tone: NDArray[np.uint8]) -> Floats:
         tone: (h, w, 3) uint8.
 
     Returns:
-        (h, w) float32; 0 where nothing is told.
+        (h, w) float32; 0 away from the outline.
     """
     inside = (share > 0.5).view(np.uint8)
     kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
     beside = cv2.dilate(inside, kernel) != cv2.erode(inside, kernel)
-    # What is told by the means of a window every other pixel of it tells as well.
+    # For means over a window, every other pixel is enough.
     some = np.ascontiguousarray(inside[::2, ::2])
     full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
     tones = np.ascontiguousarray(tone[::2, ::2])
@@ -84,7 +84,7 @@ def _odds(
     inside: tuple[Floats, Floats],
     all_: tuple[Floats, Floats],
 ) -> Floats:
-    """Log odds of pixels beside an outline to be inside, by their tone, (h, w) float32; 0 elsewhere.
+    """Log odds, by tone, that pixels near an outline are inside, (h, w) float32; 0 elsewhere.
 
     Args:
         beside: (h, w) which pixels.
@@ -114,18 +114,18 @@ def _odds(
                 far = tone[y, x, i] - one
                 away += far * far / beyond - gap * gap / within
                 wide *= beyond / within
-            # The three planes of a grey world tell the same.
+            # The channels are strongly correlated: their mean, not their sum.
             out[y, x] = max(-MOST, min(MOST, 0.5 * (away + log(wide)) / 3))
     return out
 
 
 @compiled
-def _with_odds(share: Floats, told: Floats, odds: Floats) -> Floats:
-    """Shares after the (smoothed) odds of the pixels of which something is told."""
+def _with_odds(share: Floats, informative: Floats, odds: Floats) -> Floats:
+    """Shares updated by the smoothed log odds where they are informative."""
     out = share.copy()
     for y in range(share.shape[0]):
         for x in range(share.shape[1]):
-            if told[y, x]:
+            if informative[y, x]:
                 known = max(0.02, min(0.98, share[y, x]))
                 out[y, x] = 1 / (1 + exp(-odds[y, x] - STEEP * log(known / (1 - known))))
     return out

@@ -1,4 +1,4 @@
-"""From a probability map to a clean mask and its contour, at the full size of the frame."""
+"""Region outlines: from a probability map to a clean mask and its contour in frame pixels."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from visup.agent import Region
 from visup.percepts.motion.features.work_image import Floats
 
-HOLE = 0.08  # share of a region's area up to which a hole in it is filled
+HOLE = 0.08  # holes up to this share of the region's area are filled
 
-MARGIN = 3  # working pixels around a region that its smoothing looks at
+MARGIN = 3  # working pixels around a region that smoothing needs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegionOutline:
-    """A mask with what follows from it, in frame pixels.
+    """A mask and its properties, in frame pixels.
 
     Attributes:
         bbox: (x, y, width, height), half open.
@@ -75,7 +75,7 @@ def region_outline(
 
     Args:
         share: (h, w) float32 probability in a part of the working image, `MARGIN` wider than the
-            region where the image goes on.
+            region where the image allows.
         corner: (x, y) of that part, working pixels.
         shape: (height, width) of the working image.
         size: (width, height) of the frame.
@@ -85,7 +85,7 @@ def region_outline(
         The outline, or None when too little is left.
     """
     scale = size[0] / shape[1], size[1] / shape[0]
-    # Cleaned while it is small, then only the part around the region is enlarged.
+    # Cleaned at the small size; then only the part around the region is enlarged.
     mask = clean_mask(share > 0.5, least / (scale[0] * scale[1]))
     if mask is None:
         return None
@@ -103,7 +103,7 @@ def region_outline(
 
 
 def _soft(share: Floats, mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Shares in 255ths, on the side of a half on which the mask has them."""
+    """Shares in 255ths, forced to the mask's side of one half."""
     lifted = np.where(mask, np.where(share > 0.5, share, 1), np.minimum(share, 0.498))
     return np.asarray(lifted * np.float32(255) + np.float32(0.5), dtype=np.uint8)
 
@@ -127,13 +127,13 @@ def clean_mask(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | Non
         return None
     keep = np.ones(count, dtype=bool)
     keep[1:] = areas >= max(0.1 * largest, 0.25 * least)
-    # Most regions are of one piece without a hole: then there is nothing to repaint.
+    # Most regions are one piece without holes, and need no repainting.
     whole = mask if keep.all() else mask & keep[labels]
     return _filled(whole, HOLE * largest)
 
 
 def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
-    """Fill holes of up to `most` pixels: what is quite enclosed and small is seldom background."""
+    """Fill holes of up to `most` pixels: small enclosed parts are seldom background."""
     padded = np.ones((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
     np.logical_not(mask, out=padded[1:-1, 1:-1].view(bool))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)

@@ -1,7 +1,6 @@
-"""What is reported of tracks.
+"""Output: the regions reported for tracks.
 
-`region_report.py` makes regions of tracks and obeys directives; `backward_tracking.py` finds since when a
-region has been in view, by following its points back through older images; `cast_shadows.py` leaves out
-regions that are nothing but ground seen darker; `trace.py` holds the workings of the last step for those
-who want to see them.
+`region_report.py` turns tracks into regions and obeys directives; `backward_tracking.py` finds when a region
+came into view, by tracking its points back through older images; `cast_shadows.py` drops regions that are
+only shaded ground; `trace.py` exposes the intermediate results of the last step.
 """

@@ -1,10 +1,8 @@
-"""Looking back: since when something that is seen to move has been in view.
+"""Backward tracking: since when a moving region has been in view.
 
-Motion is seen only when something moves, so that a body which rested is told late. Whether it came
-into view or only began to move is told by the past: its points are followed back through older images
-until most of them are not found. What is kept of the past thins out with age,
-so that a minute costs little more than a second; a body that had been at rest is found again however far
-apart the images are.
+A body at rest is detected only once it moves. To tell whether it came into view or began to move, its
+points are tracked back through older images until most are lost. The history thins out with age, so that
+a minute costs little more than a second; a body at rest is found again however far apart the images are.
 """
 
 from __future__ import annotations
@@ -19,15 +17,15 @@ from visup.agent import Frame, Region
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats, WorkImage, prepare_image
 
-SIZE = 400  # longer side of what is kept, pixels
-EVERY_S = 0.16  # between images of the last second
-THINNING = 8.0  # images kept while their age grows e times
+SIZE = 400  # longer side of the images in the history, pixels
+EVERY_S = 0.16  # spacing of images of the last second
+THINNING = 8.0  # images per e-fold of age
 HORIZON_S = 120.0
 POINTS = 48
 LEAST_POINTS = 4
 REMEMBERED = 256  # ids of regions; the oldest are forgotten first
 FOUND = 0.4  # share of a region's points that must be found for it to be in view
-BACK_PX = 1.0  # how far from its start a point may end up when it is followed there and back
+BACK_PX = 1.0  # most forward-backward error of a point
 ALIKE = 0.5  # mean difference of a point's neighbourhood, as a share of its contrast
 WINDOW = 9
 
@@ -35,7 +33,7 @@ Grey = NDArray[np.uint8]
 
 
 class BackwardTracker:
-    """Remembers older images and finds in them what is new now; one per video."""
+    """Keeps older images and tracks new regions back through them; one per video."""
 
     def __init__(self) -> None:
         self._past: list[tuple[float, Grey]] = []
@@ -43,14 +41,14 @@ class BackwardTracker:
         self._shape: tuple[int, int] = (0, 0)
 
     def step(self, frame: Frame, regions: Sequence[Region]) -> tuple[Region, ...]:
-        """Say of each region since when it has been in view.
+        """Annotate each region with the time since which it has been in view.
 
         Args:
             frame: The next frame.
-            regions: Those found in it; one is looked back for when its id is first seen.
+            regions: Its regions; one is tracked back when its id first appears.
 
         Returns:
-            The same with `visible_since`.
+            The regions with `visible_since`.
         """
         self._since = dict(list(self._since.items())[-REMEMBERED:])
         due = not self._past or frame.time - self._past[-1][0] >= EVERY_S - 1e-6
@@ -71,7 +69,7 @@ class BackwardTracker:
     def _keep(self, image: WorkImage) -> None:
         self._past.append((image.time, image.grey))
         times = [t for t, _ in self._past]
-        # The first that is closer to its neighbours than its age allows goes; one for each that comes.
+        # For each new image, drop the first that is closer to its neighbours than its age allows.
         for k in range(1, len(times) - 1):
             if times[k + 1] - times[k - 1] < (image.time - times[k]) / THINNING:
                 del self._past[k]
@@ -80,7 +78,7 @@ class BackwardTracker:
             del self._past[0]
 
     def _found_since(self, image: WorkImage, region: Region, size: tuple[int, int]) -> float:
-        """The time of the oldest image to which a region can be followed."""
+        """The time of the oldest image to which a region can be tracked."""
         points = _points(image.grey, region, size)
         since, newer = image.time, image.grey
         needed = max(LEAST_POINTS, FOUND * len(points))
@@ -101,23 +99,23 @@ def _points(grey: Grey, region: Region, size: tuple[int, int]) -> Floats:
 
 
 def _followed(newer: Grey, older: Grey, points: Floats) -> tuple[Floats, int]:
-    """Where the points are in an older image, and how many of them are found there.
+    """Positions of the points in an older image, and how many were found.
 
-    Those that are not go along with the others, so that a plain body does not lose them one by one.
+    Lost points move with the rest, so that a plain body does not lose them one by one.
     """
     if not len(points):
         return points, 0
     there, found, misfit = _lucas_kanade(newer, older, points)
-    back, again, _ = _lucas_kanade(older, newer, there)
+    back, back_found, _ = _lucas_kanade(older, newer, there)
     off = np.linalg.norm((back - points)[:, 0], axis=1)
     inside = ((there[:, 0] >= 0) & (there[:, 0] < np.array(older.shape[::-1]))).all(axis=1)
-    alike = misfit < ALIKE * _contrast(newer, points)
-    kept = found & again & inside & alike & (off < BACK_PX)
-    if not kept.any():
+    similar = misfit < ALIKE * _contrast(newer, points)
+    tracked = found & back_found & inside & similar & (off < BACK_PX)
+    if not tracked.any():
         return points, 0
-    way = np.median((there - points)[kept], axis=0)
-    moved = np.where(kept[:, None, None], there, points + way).astype(np.float32)
-    return moved, int(kept.sum())
+    shift = np.median((there - points)[tracked], axis=0)
+    moved = np.where(tracked[:, None, None], there, points + shift).astype(np.float32)
+    return moved, int(tracked.sum())
 
 
 def _lucas_kanade(

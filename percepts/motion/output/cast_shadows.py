@@ -1,12 +1,12 @@
-"""Which regions are nothing but cast shadows: there the ground shows on, darker.
+"""Cast-shadow removal: regions where the ground is only darkened are not objects.
 
-A shadow dims what it falls on by about one factor, keeps its colour, and keeps its texture; a body hides
-all of that. So each region is compared with the ground as it was last seen bare, brought along with the
-camera: where the two differ, what is seen must be the ground times one factor. That tells of what the
-region covers only since it moved there, so evidence is gathered over frames, by region; once a region
-has been seen to hide the ground it takes much to make it a shadow. Ground without texture tells less: there
-the darkening must be quite even, and of the very same hue. (Colour after Horprasert, Harwood, Davis, 1999;
-texture after Leone, Distante, Shadow detection for moving objects based on texture analysis, 2007.)
+A shadow dims the ground by about one factor and keeps its colour and texture; a body hides them. So each
+region is compared with the ground as last seen bare, warped along with the camera: where the two differ,
+the image must be the ground times one factor. One frame says this only of ground that the region has just
+covered, so evidence is accumulated over frames; a region that was seen to hide the ground needs much to
+become a shadow. Untextured ground is weaker evidence: there the darkening must be uniform and of the same
+hue. (Colour after Horprasert, Harwood, Davis, 1999; texture after Leone, Distante, Shadow detection for
+moving objects based on texture analysis, 2007.)
 """
 
 from __future__ import annotations
@@ -25,35 +25,35 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements
 Mask = NDArray[np.bool_]
 Doubles = NDArray[np.float64]
 SIZE = 384  # longer side of the images that are compared, pixels
-DELAY_S = 0.3  # what is seen bare counts when it was bare so long before, too: outlines lag behind
+DELAY_S = 0.3  # ground must have been bare for this long to count: outlines lag behind
 HALO = 7  # pixels: a region's outline may be off by half as much
 DIMMED = (0.25, 0.93)  # brightness in a shadow, as a share of that of the ground
-CHANGED = 8.0  # grey levels by which a pixel must differ from the ground to tell anything
+CHANGED = 8.0  # grey levels by which a pixel must differ from the ground to be evidence
 LEAST, LEAST_SHARE = 25, 0.2  # pixels, and share of a region, that must differ
-HUE = 0.06  # how far colour may differ, as a share of brightness
-SHADED = 0.8  # share of what differs that must be darker ground
-OPAQUE = 0.5  # share below which it surely is not
-EVEN = 2.0  # how much brighter, relative to the ground, the bright parts of a shadow may be
-DETAIL = 1.5  # standard deviation of texture that can be compared, grey levels
-SAME_TEXTURE = 0.5  # correlation of textures from which the ground is seen through
-OTHER_TEXTURE = 0.2  # correlation below which it is not
+HUE = 0.06  # most difference of colour, as a share of brightness
+SHADED = 0.8  # share of the differing pixels that must be darker ground
+OPAQUE = 0.5  # share below which it is certainly no shadow
+EVEN = 2.0  # most ratio of the bright parts of a shadow to the dark ones, relative to the ground
+DETAIL = 1.5  # least standard deviation of comparable texture, grey levels
+SAME_TEXTURE = 0.5  # correlation of textures from which the ground shows through
+OTHER_TEXTURE = 0.2  # correlation below which it does not
 BARE_EVEN, BARE_HUE = 1.25, 0.03  # the same limits where the ground has no texture
 FOR, AGAINST = 1.0, 1.5  # weight of a frame
 BOUNDS = (-6.0, 3.0)
-SURE = 2.0  # evidence from which a region is a shadow
-STEP_PX = 0.5  # the ground is moved when it is off by so much: each time blurs it
-MOST = 256  # regions of which evidence is remembered
+SURE = 2.0  # evidence from which a region counts as a shadow
+STEP_PX = 0.5  # the ground is warped once it is off by this much: each warp blurs it
+MOST = 256  # most regions with stored evidence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BareGround:
-    """What was seen where nothing moved, brought along with the camera.
+    """The ground as seen where nothing moved, warped along with the camera.
 
     Attributes:
-        bare: (h, w, 3) float32, as seen when it was bare for some time; NaN where it never was.
-        latest: (h, w, 3) float32, as seen bare last.
+        bare: (h, w, 3) float32, seen bare for at least `DELAY_S`; NaN where it never was.
+        latest: (h, w, 3) float32, as last seen bare.
         since: Seconds when `latest` was taken.
-        off: (2, 3) float64, affine map by which both have to be moved yet, pixels.
+        off: (2, 3) float64, affine map still to be applied to both, pixels.
     """
 
     bare: Floats
@@ -63,7 +63,7 @@ class BareGround:
 
 
 class CastShadowFilter:
-    """Leaves out the regions that are cast shadows; one per video."""
+    """Removes regions that are cast shadows; one per video."""
 
     def __init__(self) -> None:
         self._ground: BareGround | None = None
@@ -82,13 +82,13 @@ class CastShadowFilter:
 
         Args:
             frame: The frame.
-            image: The same as `comparable_image` makes it.
-            scene: As measured; gives the camera's motion since the frame before.
+            image: The same, from `comparable_image`.
+            scene: Its measurements, for the camera's motion since the previous frame.
             regions: All that move, frame pixels.
             static: Whether the camera is known to be static.
 
         Returns:
-            Those that are left, in the same order.
+            The remaining regions, in the same order.
         """
         ground = self._ground
         if ground is None or ground.bare.shape != image.shape:
@@ -96,29 +96,31 @@ class CastShadowFilter:
             self._ground = BareGround(nowhere, nowhere, frame.time - DELAY_S)
             return tuple(regions)
         if not static:
-            ground = _followed(ground, scene)
+            ground = _aligned(ground, scene)
         for r in regions:
             self._weigh(r, image, ground, frame)
-        self._ground = _renewed(ground, image, _covered(regions, frame, image), frame.time)
+        self._ground = _updated(ground, image, _covered(regions, frame, image), frame.time)
         self._evidence = dict(list(self._evidence.items())[-MOST:])
         return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
 
     def _weigh(self, region: Region, image: Floats, ground: BareGround, frame: Frame) -> None:
-        before = self._evidence.pop(region.id, 0.0)  # what is weighed anew comes last
+        before = self._evidence.pop(
+            region.id, 0.0
+        )  # reinserted: the oldest entries are dropped first
         now = before + shadow_evidence(*_cut(region, image, ground, frame))
         self._evidence[region.id] = min(max(now, BOUNDS[0]), BOUNDS[1])
 
 
 def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
-    """What one frame says for (positive) or against (negative) a region's being a shadow.
+    """One frame's evidence for (positive) or against (negative) a region being a shadow.
 
     Args:
         now: (h, w, 3) float32, the image about the region.
-        ground: (h, w, 3) float32, the same as it was seen bare; NaN where it never was.
+        ground: (h, w, 3) float32, the ground there as seen bare; NaN where it never was.
         where: (h, w) bool, the region.
 
     Returns:
-        The weight; 0 when nothing can be told.
+        The evidence; 0 when there is none.
     """
     known = where & np.isfinite(ground[..., 0])
     rest = np.where(known[..., None], ground, 0)
@@ -148,7 +150,7 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
 
 
 def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None:
-    """Correlation of the detail of two images within a mask; None where there is none to compare."""
+    """Correlation of the detail of two images within a mask; None without texture to compare."""
     inside = cv2.erode(where.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
     if inside.sum() < LEAST:
         return None
@@ -159,14 +161,14 @@ def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None
 
 
 def _detail(image: Floats, where: Mask) -> Floats:
-    """What differs from the mean around, within a mask, (h, w)."""
+    """Difference from the local mean within a mask, (h, w)."""
     grey = np.where(where, image.mean(axis=2), 0).astype(np.float32)
     count = cv2.blur(where.astype(np.float32), (7, 7))
     return np.asarray(grey - cv2.blur(grey, (7, 7)) / np.maximum(count, 1e-3), dtype=np.float32)
 
 
 def comparable_image(frame: Frame) -> Floats:
-    """A frame as it is compared with the ground, (h, w, 3) float32, at most SIZE pixels long."""
+    """A frame prepared for comparison with the ground, (h, w, 3) float32, at most SIZE pixels long."""
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
@@ -175,14 +177,14 @@ def comparable_image(frame: Frame) -> Floats:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
-def _followed(ground: BareGround, scene: FrameMeasurements) -> BareGround:
-    """The ground where it lies in the newest image."""
+def _aligned(ground: BareGround, scene: FrameMeasurements) -> BareGround:
+    """The ground aligned with the newest image."""
     if not scene.measured:
         return ground
     height, width = ground.bare.shape[:2]
     step = -np.asarray(scene.measured[0].background.models[-1].matrix, dtype=np.float64)
     step[:, 2] *= width / scene.image.shape[1]
-    # From the newest image back to the one before, and on to the one that the ground was moved to last.
+    # From the newest image to the previous one, composed with the map not yet applied.
     back = np.vstack([step + np.eye(2, 3), [0.0, 0.0, 1.0]])
     off = ground.off @ back
     corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]]).T
@@ -192,7 +194,7 @@ def _followed(ground: BareGround, scene: FrameMeasurements) -> BareGround:
 
 
 def _moved(image: Floats, back: Doubles) -> Floats:
-    """An image moved by an affine map from new places to old ones; NaN where nothing was seen."""
+    """An image warped by an affine map from new to old positions; NaN outside the old image."""
     size, flags = image.shape[1::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     nothing = (np.nan, np.nan, np.nan)
     return np.asarray(
@@ -200,8 +202,8 @@ def _moved(image: Floats, back: Doubles) -> Floats:
     )
 
 
-def _renewed(ground: BareGround, image: Floats, covered: Mask, now: float) -> BareGround:
-    """The ground after one more image."""
+def _updated(ground: BareGround, image: Floats, covered: Mask, now: float) -> BareGround:
+    """The ground updated by one more image."""
     if now - ground.since < DELAY_S:
         return ground
     bare = ~covered[..., None]

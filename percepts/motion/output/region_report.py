@@ -1,4 +1,4 @@
-"""What is reported of the tracks, and how directives are obeyed."""
+"""The regions reported for tracks and foreground objects, with directives applied."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ T = TypeVar("T")
 def apply_ignore(
     directives: Sequence[Directive], scene: FrameMeasurements, evidence: PointEvidence
 ) -> PointEvidence:
-    """Forbid motion where cogitation asks to ignore it.
+    """Suppress motion evidence inside 'ignore' boxes.
 
     Args:
         directives: Their boxes are in frame pixels.
         scene: The frame.
-        evidence: What points say of the labels.
+        evidence: Evidence of the points.
 
     Returns:
-        The evidence, all for the background in such boxes.
+        The evidence, entirely for the background inside the boxes.
     """
     out = evidence.likelihood
     for box in _boxes(directives, "ignore"):
@@ -49,7 +49,7 @@ def apply_ignore(
 def looked_at(
     directives: Sequence[Directive], tracks: Sequence[Track], scene: FrameMeasurements
 ) -> tuple[bool, ...]:
-    """Which tracks lie where cogitation asks to look.
+    """Which tracks lie inside 'look_at' boxes.
 
     Args:
         directives: Those of kind 'look_at' count; their boxes are in frame pixels.
@@ -68,15 +68,15 @@ def looked_at(
 def motion_evidence(
     scene: FrameMeasurements, winner: Indices, evidence: PointEvidence
 ) -> MotionEvidence:
-    """Which points tell of the motion of a track, and how surely.
+    """The points that are evidence for the motion of a track, with their weights.
 
     Args:
         scene: The frame.
         winner: (count,) label of each superpixel; label k is track k - 1.
-        evidence: What points say of the labels.
+        evidence: Evidence of the points.
 
     Returns:
-        Those in tracks, in frame pixels.
+        The points in tracks, in frame pixels.
     """
     at, likelihood = winner[scene.at], evidence.likelihood
     use = np.flatnonzero(evidence.informative & (at > 0) & (at < likelihood.shape[1] - 1))
@@ -106,20 +106,22 @@ def report_regions(
         scene: The frame.
         size: (width, height) of the frame.
         settings: Gives the least area.
-        beside: Draws every other outline meanwhile.
+        beside: Computes every other outline in parallel.
 
     Returns:
         Regions by id.
     """
     scale = scene.image.scale
     least = min_region_area(scene, settings) / scale**2
-    told = [t for t in tracks if t.id > 0]
+    reported = [t for t in tracks if t.id > 0]
 
     def drawn(t: Track) -> RegionOutline | None:
-        return _share_outline(t.share, [o.share for o in told if o is not t], scene, size, least)
+        return _share_outline(
+            t.share, [o.share for o in reported if o is not t], scene, size, least
+        )
 
-    told_now = [t for t in told if t.last_seen == scene.time]
-    out = [_region(t, shape, scale) for t, shape in _outlined(told_now, drawn, beside)]
+    visible = [t for t in reported if t.last_seen == scene.time]
+    out = [_region(t, shape, scale) for t, shape in _outlined(visible, drawn, beside)]
     return tuple(sorted(out, key=lambda r: r.id))
 
 
@@ -135,18 +137,18 @@ def report_objects(
 
     Args:
         state: The foreground after the frame.
-        tracks: All tracks: an object that one follows has its velocity.
+        tracks: All tracks: an object with a track takes its velocity.
         scene: The frame.
         size: (width, height) of the frame.
         settings: Gives the least area.
-        beside: Draws every other outline meanwhile.
+        beside: Computes every other outline in parallel.
 
     Returns:
         Regions by id.
     """
     least = min_region_area(scene, settings) / scene.image.scale**2
     by_id = {t.id: t for t in tracks if t.id > 0}
-    told = state.objects.reported(scene.time)
+    reported = state.objects.reported(scene.time)
 
     def drawn(o: MovingObject) -> RegionOutline | None:
         share = object_share(state.objects, o.key)
@@ -154,14 +156,14 @@ def report_objects(
 
     return tuple(
         _object_region(o, shape, by_id.get(o.track), state, scene)
-        for o, shape in _outlined(told, drawn, beside)
+        for o, shape in _outlined(reported, drawn, beside)
     )
 
 
 def _outlined(
     things: Sequence[T], drawn: Callable[[T], RegionOutline | None], beside: Executor
 ) -> list[tuple[T, RegionOutline]]:
-    """Things with their outlines, every other one drawn beside; those without one are left out."""
+    """Items with their outlines, every other one computed in parallel; those without one are dropped."""
     later = [beside.submit(drawn, thing) for thing in things[1::2]]
     shapes: list[RegionOutline | None] = [None] * len(things)
     shapes[::2] = [drawn(thing) for thing in things[::2]]
@@ -177,7 +179,7 @@ def _object_region(
     state: ForegroundState,
     scene: FrameMeasurements,
 ) -> Region:
-    """The region of an object: as its track moves, or else as its cells do."""
+    """The region of an object: with the velocity of its track, or else of its cells."""
     scale = scene.image.scale
     if t is not None:
         return replace(_region(t, shape, scale), id=o.id)
@@ -202,7 +204,7 @@ def _share_outline(
     share = share_of_cells[labels]
     drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]))
     if others:
-        # What another object shows is not taken from it.
+        # Cells of another object are not taken from it.
         taken = (np.max(others, axis=0) > 0.5)[labels]
         drawn = np.where(taken, share, drawn)
     return region_outline(drawn, (left, top), scene.image.shape, size, least)
@@ -211,11 +213,11 @@ def _share_outline(
 def select_regions(
     regions: Sequence[Region], directives: Sequence[Directive]
 ) -> tuple[Region, ...]:
-    """Regions that cogitation wants to be told of.
+    """The regions that the directives allow.
 
     Args:
-        regions: All that were found.
-        directives: 'expect_regions' keeps the surest, 'ignore' leaves out what lies in its box.
+        regions: All detected regions.
+        directives: 'expect_regions' keeps the most certain, 'ignore' drops those inside its box.
 
     Returns:
         Regions by id.

@@ -1,4 +1,4 @@
-"""What the segmenter made of a frame, for those who want to see how it came to its regions."""
+"""Intermediate results of the segmenter for one frame, for inspection."""
 
 from __future__ import annotations
 
@@ -12,18 +12,16 @@ from visup.percepts.motion.tracks.track import Track
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentationTrace:
-    """The workings of one step; for reading only.
+    """The intermediate results of one step; read-only.
 
     Attributes:
-        scene: What was measured.
+        scene: The measurements of the frame.
         tracks: The tracks after the step, reported or not.
-        keys: Of the K tracks that superpixels were shared among; some may have ended since.
+        keys: Keys of the K tracks that superpixels were assigned to; some may have ended since.
         posterior: (count, K + 2) float32, share of background, tracks and unknown motion in each
             superpixel.
-        cues: What the frame shows of each superpixel, by which foreground is believed; None when
-            that is not done.
-        belief: (count,) float32, probability that each superpixel shows something that moves by itself; or
-            None.
+        cues: The foreground cues of each superpixel; None when the foreground model is not used.
+        belief: (count,) float32, probability that each superpixel moves independently; or None.
     """
 
     scene: FrameMeasurements

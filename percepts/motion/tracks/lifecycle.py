@@ -1,4 +1,4 @@
-"""The lifecycle of tracks: initiated, updated, confirmed, deleted."""
+"""The lifecycle of tracks: initiation, update, confirmation, deletion."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from visup.percepts.motion.tracks.track import PartMotion, Track, Tracks, new_tr
 from visup.percepts.motion.tracks.track_fitting import moves_like
 from visup.percepts.motion.tracks.track_update import update_track
 
-LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
-SURE = 200.0  # the same for one that has only just appeared
-BEHIND = 0.3  # share of a cell in which an object is expected behind another
-SLIVER = 3.5  # length over width of a strip that is no object
+LIKELY = 60.0  # log likelihood ratio at which a track that has lasted is confirmed
+SURE = 200.0  # the same for a track that has just appeared
+BEHIND = 0.3  # share of a cell from which an object is expected there behind another
+SLIVER = 3.5  # ratio of length to width beyond which a thin track is no object
 
 
 def initiate(
@@ -38,10 +38,10 @@ def initiate(
     """Add tracks for groups of constraints that no layer explains.
 
     Args:
-        tracks: Those known.
+        tracks: The known tracks.
         scene: The frame.
-        settings: Gives the most tracks.
-        last_key: The greatest key given so far.
+        settings: Its `max_regions` bounds the number of tracks.
+        last_key: The greatest key allocated so far.
 
     Returns:
         The known tracks, then the new ones.
@@ -73,7 +73,7 @@ def initiate(
 def _former_owner(
     tracks: Sequence[Track], where: NDArray[np.bool_], motion: PartMotion, scene: FrameMeasurements
 ) -> int | None:
-    """The track that is hidden in most of these cells, or else was of late in most of them."""
+    """The track hidden in most of these cells, or else recently present in most of them."""
     if not where.any():
         return None
     for i, t in enumerate(tracks):
@@ -87,7 +87,7 @@ def _former_owner(
     for i, t in enumerate(tracks):
         if not t.id or t.recent_share is None:
             continue
-        # What comes out from behind an object is not a part of it.
+        # What emerges from behind an object is not a part of it.
         others = [
             o.predicted_share > BEHIND
             for o in tracks
@@ -107,9 +107,9 @@ def _uncovered(
     motion: PartMotion,
     scene: FrameMeasurements,
 ) -> int | None:
-    """Whose part it is that turned up where a track was: the track's, unless another moves so.
+    """Owner of a part that turned up where a track was: the track, unless another moves like the part.
 
-    What an occluder uncovers moves as what it hid, and lies beside the rest of that.
+    What an occluder uncovers moves like the hidden object and lies beside the rest of it.
     """
     near = scene.cells.dilated(where[:, None], NEAR_STEPS)[:, 0]
     best, most = host, 0
@@ -151,14 +151,14 @@ def update(
     likelihood: Floats,
     settings: MotionSettings,
 ) -> Tracks:
-    """Bring each track's shape and evidence up to date with the posterior.
+    """Update each track's shape and evidence from the posterior.
 
     Args:
         tracks: K tracks, predicted.
         scene: The frame.
         labelling: Labels of its superpixels.
         likelihood: (N, K + 2) float32, log likelihood of the labels at the points.
-        settings: Gives the least area of a region.
+        settings: Settings, for the least area of a region.
     """
     least = 0.3 * min_region_area(scene, settings)
     at = labelling.winner[scene.at]
@@ -171,7 +171,7 @@ def update(
 
 
 def delete(tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings) -> Tracks:
-    """Drop what was never confirmed and is gone, and what has been hidden too long."""
+    """Drop lost candidates, tracks hidden for too long, and tracks that became background."""
     out = []
     for t in tracks:
         gone = scene.time - t.last_seen
@@ -179,16 +179,16 @@ def delete(tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings) -
             keep = gone <= 0.2 and t.evidence > -20
         else:
             keep = gone <= (settings.memory_s if t.occluded is not None else 0.5)
-            # As surely the background as it had to be something else to be reported.
+            # As certainly background as it had to be an object to be reported.
             keep = keep and t.evidence > -LIKELY and not has_absorbed_background(t, scene)
         if keep:
             out.append(t)
     keys = {t.key for t in out}
-    return tuple(_without_keys_of_deleted(t, keys) for t in out)
+    return tuple(_without_deleted_keys(t, keys) for t in out)
 
 
-def _without_keys_of_deleted(t: Track, keys: set[int]) -> Track:
-    """A track that has forgotten how it stood to others than these: keys never come back."""
+def _without_deleted_keys(t: Track, keys: set[int]) -> Track:
+    """A track without the pairwise statistics of deleted tracks, whose keys are never reused."""
     if t.separate_s.keys() <= keys and t.merge_votes.keys() <= keys:
         return t
 
@@ -199,7 +199,7 @@ def _without_keys_of_deleted(t: Track, keys: set[int]) -> Track:
 
 
 def _is_thin(t: Track, scene: FrameMeasurements) -> bool:
-    """Whether no cell of a track lies inside it: such a one must move more surely to be reported."""
+    """Whether a track has no interior cell; such a track needs more evidence to be reported."""
     rest = t.share <= 0.5
     return bool(scene.cells.dilated(rest[:, None], 1)[:, 0].all())
 
@@ -207,8 +207,8 @@ def _is_thin(t: Track, scene: FrameMeasurements) -> bool:
 def _is_sliver(t: Track, scene: FrameMeasurements) -> bool:
     """Whether a thin track is a long strip.
 
-    Where two backgrounds meet, and along a straight edge that tells of one component of motion
-    only, such strips turn up; objects so thin are given up for that.
+    Such strips arise where two backgrounds meet, and along a straight edge, which shows one component of
+    motion only; truly thin objects are sacrificed for that.
     """
     mine = t.share > 0.5
     if not mine.any():
@@ -225,14 +225,14 @@ def confirm(
     settings: MotionSettings,
     sought: Sequence[bool],
 ) -> Tracks:
-    """Give public ids to tracks that have lasted and surely move.
+    """Give public ids to tracks that have lasted and clearly move.
 
     Args:
         tracks: All tracks.
         scene: The frame.
-        ids: Gives them.
-        settings: Says how long is lasting.
-        sought: Which tracks lie where cogitation asked to look: half as much will do for those.
+        ids: Allocator of public ids.
+        settings: Its `confirm_s` is how long a track must last.
+        sought: Which tracks lie inside a 'look_at' box: those need half as much.
     """
     out = []
     for t, wanted in zip(tracks, sought, strict=True):
@@ -246,7 +246,7 @@ def confirm(
 def _is_confirmed(
     t: Track, scene: FrameMeasurements, settings: MotionSettings, need: float
 ) -> bool:
-    """Whether a track is to be reported: at first sight when its motion is clear, else once it lasts."""
+    """Whether to report a track: at once when its motion is clear, else once it has lasted."""
     thin = _is_thin(t, scene)
     if t.frames < 2 or t.evidence < need * (2 if thin else 1) * LIKELY:
         return False

@@ -1,4 +1,4 @@
-"""What one frame shows: points, superpixels, and motions measured over several baselines."""
+"""The measurements of one frame: points, superpixels, and motion over several baselines."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class BaselineMotion:
     """Motion over one baseline.
 
     Attributes:
-        constraints: Where it was measured.
+        constraints: The measured constraints.
         background: The motions of the background.
     """
 
@@ -43,8 +43,8 @@ class FrameMeasurements:
         points: Points with structure.
         cells: Superpixels.
         owner: (count,) label that each superpixel is expected to have; 0 is background.
-        seconds: Since the frame before.
-        flow: (h, w, 2) float32, dense flow from the newest image back to the one before, pixels.
+        seconds: Since the previous frame.
+        flow: (h, w, 2) float32, dense flow from the newest image back to the previous one, pixels.
         measured: Motions, the shortest baseline first.
     """
 
@@ -87,7 +87,7 @@ def background_weights(scene: FrameMeasurements) -> Floats:
 def predicted_positions(
     scene: FrameMeasurements, tracks: tuple[Track, ...], camera: Affine, lag: int, span: float
 ) -> Floats:
-    """Where each point is expected in an older image, (N, 2) float32."""
+    """The predicted position of each point in an older image, (N, 2) float32."""
     at = scene.owner[scene.at]
     moved = camera.at(scene.points.xy)
     for k, t in enumerate(tracks, 1):
@@ -101,7 +101,7 @@ def predicted_positions(
 def claimable_cells(
     scene: FrameMeasurements, tracks: tuple[Track, ...], prior: Floats
 ) -> NDArray[np.bool_]:
-    """Which cells each track may claim, (count, K) bool: its own, their neighbours, its hidden."""
+    """Which cells each track may claim, (count, K) bool: its own, their neighbours, where it is hidden."""
     members = prior[:, 1:-1] > 0.3
     for k, t in enumerate(tracks):
         if t.occluded is not None:
@@ -121,11 +121,11 @@ def point_likelihoods(
         scene: The frame.
         tracks: K tracks.
         reach: (count, K) bool, which cells each track may claim.
-        settings: Gives the distance at which a motion no longer explains.
+        settings: Its `outlier` is the distance beyond which a motion no longer explains a point.
 
     Returns:
-        For background, tracks and unknown motion. Corners alone say what is seen there: edges help
-        to fit layers; as evidence for labels they make silhouettes worse (docs/benchmarks.md).
+        For background, tracks and unknown motion. Only corners count as evidence for what is visible there:
+        edges help to fit layers, but as evidence for labels they worsen silhouettes (docs/benchmarks.md).
     """
     n = len(scene.points)
     out = np.zeros((n, len(tracks) + 2), dtype=np.float32)

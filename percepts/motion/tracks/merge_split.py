@@ -1,4 +1,4 @@
-"""Which tracks are one object: parts are absorbed, pieces joined, what was hidden is released."""
+"""Merging and splitting of tracks: parts are absorbed, pieces joined, occluded tracks released."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ NEAR_STEPS = 4  # cells between tracks that touch
 APART_S = 1.5
 VOTES = 3.0
 MOST_PARTS = 3
-LIMB = 0.5  # how large, as a share of its object, a part may be that is taken for a limb of it
-SURROUNDED = 0.75  # share of what is around a track that is one other, of which it is a part
-CONTACT = 5.0  # affinity of two cells that are flat and of one tone
+LIMB = 0.5  # largest limb, as a share of its object's area
+SURROUNDED = 0.75  # share of a track's surroundings that one other covers when it is a part of that
+CONTACT = 5.0  # affinity of two flat cells of one tone
 
 
 def assign_unknown(
@@ -44,9 +44,9 @@ def assign_unknown(
     settings: MotionSettings,
     last_key: int,
 ) -> Tracks:
-    """Give parts that move as no layer does to the track that they touch, or make them tracks.
+    """Assign cells that move as no layer does to the track they touch, or make new tracks of them.
 
-    Limbs, wheels and shadows join their object; what stands alone is something new.
+    Limbs, wheels and shadows join their object; isolated parts are new objects.
     """
     unknown = np.flatnonzero(winner == len(tracks) + 1)
     if not len(unknown):
@@ -57,7 +57,7 @@ def assign_unknown(
         part = np.zeros(scene.cells.count, dtype=bool)
         part[unknown[number == i]] = True
         ring = scene.cells.dilated(part[:, None], 1)[:, 0] & ~part
-        # Whose place it was counts first, then whom it touches.
+        # The expected owner comes first, then the neighbour.
         k = _majority(scene.owner[part], len(tracks), 0.3)
         k = _majority(winner[ring], len(tracks), 0.25) if k is None else k
         size = scene.cells.area[part].sum()
@@ -73,7 +73,7 @@ def assign_unknown(
 
 
 def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: FrameMeasurements) -> bool:
-    """Whether a part is too large, and reaches too far beyond the image, for a limb of its host."""
+    """Whether a part is too large and covers too much of the image border for a limb of its host."""
     area = scene.cells.area
     return bool(
         area[part].sum() > LIMB * area[host].sum()
@@ -82,7 +82,7 @@ def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: FrameMea
 
 
 def _majority(labels: Indices, count: int, share: float) -> int | None:
-    """The track, from 0, that has more than a share of some labels and more than any other."""
+    """The track, from 0, with the most of these labels, if more than a share of them."""
     if not count or not len(labels):
         return None
     numbers = np.bincount(labels, minlength=count + 2)[1 : count + 1]
@@ -91,7 +91,7 @@ def _majority(labels: Indices, count: int, share: float) -> int | None:
 
 
 def _unknown_track(part: NDArray[np.bool_], scene: FrameMeasurements, key: int) -> Track | None:
-    """A new track for cells that move as no layer does; None when there is too little to go by."""
+    """A new track for cells that move as no layer does; None when there are too few constraints."""
     c = scene.measured[0].constraints
     inside = np.flatnonzero(part[scene.cell_of(c)])
     if len(inside) < 6:
@@ -106,10 +106,10 @@ def _unknown_track(part: NDArray[np.bool_], scene: FrameMeasurements, key: int) 
 
 
 def split_occluded(tracks: Tracks, scene: FrameMeasurements, winner: Indices) -> Tracks:
-    """Give back to a hidden track what its occluder holds but what moves as the hidden one did.
+    """Return to a hidden track those cells of its occluder that move as the hidden one did.
 
-    The occluder has gone on: where points move as the track did when it was last in view, and not
-    as the occluder does, the track is in view again.
+    The occluder has moved on: where points move as the track did when it was last in view, and not as the
+    occluder does, the track is in view again.
     """
     out = list(tracks)
     for j, t in enumerate(tracks):
@@ -117,14 +117,16 @@ def split_occluded(tracks: Tracks, scene: FrameMeasurements, winner: Indices) ->
             continue
         there = scene.cells.mean(t.occluded) > 0.5
         for k, o in enumerate(tracks):
-            held = there & (winner == k + 1)
-            if k != j and held.any() and _moves_as(t, o, held, scene):
-                out[j] = replace(out[j], share=np.where(held, 1, out[j].share).astype(np.float32))
-                kept = tuple(m for m in out[k].motions if not moves_like(m, t))
+            claimed = there & (winner == k + 1)
+            if k != j and claimed.any() and _moves_as(t, o, claimed, scene):
+                out[j] = replace(
+                    out[j], share=np.where(claimed, 1, out[j].share).astype(np.float32)
+                )
+                remaining = tuple(m for m in out[k].motions if not moves_like(m, t))
                 out[k] = replace(
                     out[k],
-                    share=np.where(held, 0, out[k].share).astype(np.float32),
-                    motions=kept or out[k].motions[:1],
+                    share=np.where(claimed, 0, out[k].share).astype(np.float32),
+                    motions=remaining or out[k].motions[:1],
                 )
     return tuple(out)
 
@@ -152,10 +154,10 @@ def _moves_as(
 def merge_tracks(
     tracks: Tracks, scene: FrameMeasurements, winner: Indices, settings: MotionSettings
 ) -> Tracks:
-    """Join tracks that were never seen apart and again and again move as one.
+    """Merge tracks that were never observed apart and repeatedly move as one.
 
-    Two objects that came together stay two, however rigidly they are coupled: they have been seen
-    apart. Pieces of one object, born side by side, become one.
+    Two objects that came together stay two, however rigidly coupled: they have been observed apart. Pieces
+    of one object, initiated side by side, become one.
     """
     if len(tracks) < 2:
         return tracks
@@ -177,7 +179,7 @@ def merge_tracks(
             if apart > APART_S or not _may_merge(a, b, members[:, i], members[:, j], scene):
                 continue
             votes = a.merge_votes.get(b.key, 0.0)
-            # One all but surrounded by the other is a part of it.
+            # A track mostly surrounded by the other is a part of it.
             if grown[i, j] or inside[i, j] or inside[j, i]:
                 votes += 1.0
             else:
@@ -195,14 +197,14 @@ def merge_tracks(
 def _may_merge(
     a: Track, b: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], scene: FrameMeasurements
 ) -> bool:
-    """Whether one is not the ground on which the other goes; what was told is no ground.
+    """Whether neither is the ground on which the other moves; a reported track is no ground.
 
-    What goes behind another is surrounded by it at last, and is no part of it for that.
+    A track that goes behind another is finally surrounded by it, without being a part of it.
     """
     if bool(a.id) == bool(b.id):
         return not (a.id and (a.mostly_occluded or b.mostly_occluded))
-    told, other = (in_a, in_b) if a.id else (in_b, in_a)
-    return not _is_ground(other, told, scene)
+    reported, other = (in_a, in_b) if a.id else (in_b, in_a)
+    return not _is_ground(other, reported, scene)
 
 
 def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, float]:
@@ -210,7 +212,7 @@ def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, f
 
 
 def _with_separation_time(tracks: Tracks, apart: NDArray[np.bool_], seconds: float) -> list[Track]:
-    """The tracks with the time for which each was seen apart from those behind it."""
+    """The tracks, with the time for which each was observed apart from later ones."""
     out = []
     for i, t in enumerate(tracks):
         others = [tracks[j].key for j in np.flatnonzero(apart[i]) if j > i]
@@ -246,7 +248,7 @@ def _vote(
 def _without_edge_between(
     scene: FrameMeasurements, winner: Indices, count: int
 ) -> NDArray[np.bool_]:
-    """(count, count): whether no image edge parts two tracks where they touch, as links of an arm."""
+    """(count, count): whether no image edge separates two tracks where they touch, as in an arm."""
     link = scene.cells.link
     strong = np.flatnonzero(link.data > CONTACT)
     a = winner[np.searchsorted(link.indptr, strong, side="right") - 1] - 1
@@ -258,7 +260,7 @@ def _without_edge_between(
 
 
 def _moving(scene: FrameMeasurements, members: NDArray[np.bool_]) -> list[list[bool]]:
-    """Which of K tracks with (count, K) members are told to move, over each baseline."""
+    """Which of K tracks with (count, K) members move measurably, over each baseline."""
     return [
         [_moves(m, mine) for mine in members[scene.cell_of(m.constraints)].T]
         for m in scene.measured
@@ -266,18 +268,18 @@ def _moving(scene: FrameMeasurements, members: NDArray[np.bool_]) -> list[list[b
 
 
 def _moves(m: BaselineMotion, which: NDArray[np.bool_]) -> bool:
-    """Whether these constraints tell that something moves against the background."""
+    """Whether these constraints show motion against the background."""
     if np.count_nonzero(which) < 4:
         return False
     return quantile(m.background.distances(m.constraints)[which], 0.7) > 9
 
 
 def merged(a: Track, b: Track) -> Track:
-    """Two tracks as one.
+    """Merge two tracks.
 
     Args:
-        a: The one that goes on, under the older of their public ids.
-        b: The one that becomes a part of it.
+        a: The track that survives, under the older of their public ids.
+        b: The track that becomes a part of it.
 
     Returns:
         The first with the cells and motions of both.
@@ -300,6 +302,6 @@ def merged(a: Track, b: Track) -> Track:
 
 
 def _parts(motions: tuple[PartMotion, ...]) -> tuple[PartMotion, ...]:
-    """The best supported motions, few enough that they do not explain everything."""
+    """The best supported motions, few enough not to explain everything."""
     keep = sorted(range(len(motions)), key=lambda i: -motions[i].support)[:MOST_PARTS]
     return tuple(motions[i] for i in sorted(keep))

@@ -1,11 +1,10 @@
-"""Salient motion: whether a track goes somewhere by itself, or is a part of what surrounds it.
+"""Salient motion: whether a track moves independently or belongs to its surroundings.
 
-Leaves, water and the errors of a background that is no plane move at every moment and get nowhere:
-over a longer baseline the background explains them again, or their way step by step does not show.
-Objects leave their place, and keep a course while they do (Wixson, Detecting salient motion by
-accumulating directionally-consistent flow, 2000). The ground near a moving camera drifts from any
-one model of the background, but not from its own surroundings: so a track is compared with a motion
-fitted to the ring around it.
+Leaves, water and the errors of a non-planar background move at every moment and get nowhere: over a longer
+baseline the background explains them again, or the motion summed step by step does not show. Objects leave
+their place and keep a course (Wixson, Detecting salient motion by accumulating directionally-consistent
+flow, 2000). The ground near a moving camera departs from any single background model, but not from its own
+surroundings: so a track is also compared with a motion fitted to the ring around it.
 """
 
 from __future__ import annotations
@@ -25,46 +24,46 @@ from visup.percepts.motion.layers.layer_discovery import median_motion
 from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
 from visup.percepts.motion.tracks.track import Indices, Track
 
-LEAST_GONE = 1.0  # pixels against the background: less is told of leaves as well
-FAR_GONE = 4.0  # pixels, for a track too young to have swung back yet
+LEAST_GONE = 1.0  # least displacement against the background, pixels: leaves reach less
+FAR_GONE = 4.0  # pixels, the same for a track too young to have swung back
 SWING_S = 0.4
-STRAIGHT = 0.7  # net way as a share of the way
-EXPLAINED = 0.35  # share of points that fit the background over the baseline that tells most
-CLEAR = 0.25  # the same for a track that is told at first sight
+STRAIGHT = 0.7  # net displacement as a share of path length
+EXPLAINED = 0.35  # most share of points that fit the background, over the most telling baseline
+CLEAR = 0.25  # the same for a track reported at once
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
 FOLLOW = 0.3  # weight of the newest frame in running means
 RESTS = 0.7  # share of points that fit the background when a track rests
-GROWN = 2.0  # how much larger than when it last moved an object that rests may not be
+GROWN = 2.0  # growth since it last moved from which a resting object has absorbed background
 FEWEST = 4
-NEAR_GONE = 3.0  # pixels, for a track that is told at first sight: further than leaves swing
-RING_STEPS = 5  # cells around a track in which its surroundings are looked for
+NEAR_GONE = 3.0  # pixels, least displacement of a track reported at once: further than leaves swing
+RING_STEPS = 5  # width of the surrounding ring, cells
 FEWEST_AROUND = 8
-MOST_BORDER = 0.2  # share of the image border that an object may take up when it is first told
-LITTLE_BORDER = 0.04  # the same for one told at first sight: there parallax is greatest
-FOOT = 0.15  # share of the height of a region that is its foot
-LEAST_OWN = 0.25  # pixels from frame to frame: twice what sampling and compression leave
-SWAYS = 0.15  # share of the ground's motion that counts as none: where a foot is, is not seen to a pixel
-AHEAD = 0.4  # how much faster than the background, the same way, a near thing that rests may go
+MOST_BORDER = 0.2  # most share of the image border that an object may cover when first reported
+LITTLE_BORDER = 0.04  # the same for one reported at once: parallax is greatest at the border
+FOOT = 0.15  # height of a region's foot, as a share of its own
+LEAST_OWN = 0.25  # least motion of its own, pixels per frame: twice the sampling error
+SWAYS = 0.15  # share of the ground's motion that counts as none: the foot is not located to a pixel
+AHEAD = 0.4  # how much faster than the background, in its direction, a near object at rest may move
 
 
 def update_salience(
     tracks: Sequence[Track], scene: FrameMeasurements, winner: Indices
 ) -> tuple[Track, ...]:
-    """Add up how far each track has gone from its surroundings, and how well they explain it.
+    """Accumulate each track's displacement from its surroundings and how well they explain it.
 
     Args:
         tracks: K tracks, updated.
         scene: The frame.
-        winner: (count,) the label that has each superpixel; label k is track k - 1.
+        winner: (count,) label of each superpixel; label k is track k - 1.
 
     Returns:
-        The tracks.
+        The updated tracks.
     """
     young = [k for k, t in enumerate(tracks, 1) if not t.id]
     members = winner[:, None] == np.asarray(young, dtype=winner.dtype)
-    # Points of its own outline may lie in the cells right beside it.
-    beside = scene.cells.dilated(members, 1)
-    rings = scene.cells.dilated(beside, RING_STEPS - 1) & ~beside & (winner == 0)[:, None]
+    # Points of a track's own outline may lie in adjacent cells, which are therefore excluded.
+    adjacent = scene.cells.dilated(members, 1)
+    rings = scene.cells.dilated(adjacent, RING_STEPS - 1) & ~adjacent & (winner == 0)[:, None]
     ring_of = dict(zip(young, rings.T, strict=True))
     return tuple(
         _confirmed_updated(t, k, scene, winner)
@@ -77,8 +76,8 @@ def update_salience(
 def is_stationary(t: Track, scene: FrameMeasurements) -> bool:
     """Whether an object does not move against the background over the baselines of this frame.
 
-    Then motion tells nothing of where it ends: slow objects show over the longer baselines, and one
-    that has stopped stays as it was.
+    Then motion does not show where it ends. Slow objects show over the longer baselines; one that has
+    stopped keeps its shape.
     """
     seen = [t.background_fit.get(_octave(m), 0.0) for m in scene.measured]
     return bool(t.id) and min(seen) > RESTS
@@ -96,7 +95,7 @@ def stationary_cells(tracks: Sequence[Track], scene: FrameMeasurements) -> NDArr
 def has_absorbed_background(t: Track, scene: FrameMeasurements) -> bool:
     """Whether an object has grown over the background until that explains all of it.
 
-    What has stopped is explained as well, but has not grown since it moved.
+    The background also explains an object that stopped, but that has not grown since it moved.
     """
     area = float(scene.cells.area[t.share > 0.5].sum())
     rests_always = bool(t.id) and min(t.background_fit.values(), default=0.0) > RESTS
@@ -104,7 +103,7 @@ def has_absorbed_background(t: Track, scene: FrameMeasurements) -> bool:
 
 
 def _confirmed_updated(t: Track, k: int, scene: FrameMeasurements, winner: Indices) -> Track:
-    """Note how well the background explains an object, over each baseline."""
+    """Record how well the background explains an object, over each baseline."""
     explained = dict(t.background_fit)
     for m in scene.measured:
         mine = winner[scene.cell_of(m.constraints)] == k
@@ -142,12 +141,12 @@ def _candidate_updated(
 def _with_step(
     t: Track, m: BaselineMotion, local: Sequence[Affine], scene: FrameMeasurements
 ) -> Track:
-    """Add the step of a frame, if it was seen: what was not measured again has gone nowhere."""
+    """Add the displacement of a frame, if it was measured in it."""
     if not any(rate.time == scene.time for rate in t.motions[0].rates.values()):
         return t
     step = _displacement_from_background(t.instant_velocity() * scene.seconds, t, m, local)
-    gone = t.displacement[0] + float(step[0]), t.displacement[1] + float(step[1])
-    return replace(t, displacement=gone, path_length=t.path_length + float(np.hypot(*step)))
+    travelled = t.displacement[0] + float(step[0]), t.displacement[1] + float(step[1])
+    return replace(t, displacement=travelled, path_length=t.path_length + float(np.hypot(*step)))
 
 
 def _note_course(
@@ -157,7 +156,7 @@ def _note_course(
     local: Sequence[Affine],
     scene: FrameMeasurements,
 ) -> None:
-    """Note how much of the way gone step by step shows over a baseline longer than a swing."""
+    """Record how much of the path length shows over a baseline longer than a swing."""
     rate = t.motions[0].rates.get(m.constraints.lag)
     if m.constraints.span_s < SWING_S or rate is None or rate.time != scene.time:
         return
@@ -168,26 +167,26 @@ def _note_course(
 
 
 def _note(explained: dict[int, float], m: BaselineMotion, misfit: NDArray[np.float32]) -> None:
-    """Bring the running share of points that are explained over a baseline up to date."""
+    """Update the running share of explained points over a baseline."""
     share = float(np.mean(misfit < FITS))
     before = explained.get(_octave(m), share)
     explained[_octave(m)] = before + FOLLOW * (share - before)
 
 
 def _octave(m: BaselineMotion) -> int:
-    """Number of a baseline: those of nearly one length, as a video begins, are one."""
+    """Octave of a baseline; baselines of similar length, as when a video starts, share one."""
     return round(float(np.log2(m.constraints.lag)))
 
 
 def surrounding_motion(m: BaselineMotion, around: NDArray[np.bool_]) -> Affine | None:
-    """The motion of what surrounds a region over one baseline; None when too little is seen of it.
+    """The motion of a region's surroundings over one baseline; None with too few constraints.
 
     Args:
         m: Motion over the baseline.
         around: (N,) bool, which constraints lie around the region.
 
     Returns:
-        An affine motion fitted to those.
+        An affine motion fitted to them.
     """
     index = np.flatnonzero(around)
     if len(index) < FEWEST_AROUND:
@@ -199,7 +198,7 @@ def surrounding_motion(m: BaselineMotion, around: NDArray[np.bool_]) -> Affine |
 
 
 def foot_point(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, float] | None:
-    """(x, y) of the lowest part of a region; None when it is empty or the image cuts it there.
+    """(x, y) of the lowest part of a region; None when it is empty or cut off by the image there.
 
     Args:
         mine: (count,) bool, its cells.
@@ -216,10 +215,10 @@ def foot_point(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, floa
 
 
 def upright_motion(m: BaselineMotion, foot: tuple[float, float] | None) -> Affine | None:
-    """The motion of a thing at rest that stands upright on the ground, seen by a camera that travels.
+    """The motion of an upright object at rest on the ground, seen by a moving camera.
 
-    It is as far away as the ground at its foot, so all of it goes as the background does there:
-    it has parallax against all that is behind it, and none against that place.
+    It is as far away as the ground at its foot, so all of it moves as the background does there: it has
+    parallax against everything behind it, and none against that place.
     """
     if foot is None:
         return None
@@ -229,7 +228,7 @@ def upright_motion(m: BaselineMotion, foot: tuple[float, float] | None) -> Affin
 
 
 def stands_there(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
-    """Whether cells go, from one frame to the next, as a thing at rest that stands upright there does.
+    """Whether cells move, between two frames, as an upright object at rest there would.
 
     Args:
         scene: The frame.
@@ -245,7 +244,7 @@ def stands_there(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
 
 
 def _misfit(m: BaselineMotion, local: Sequence[Affine]) -> NDArray[np.float32]:
-    """Squared distance of each constraint to the background or the surroundings, what fits best."""
+    """Squared distance of each constraint to the background or the surroundings, whichever fits best."""
     out, c = m.background.distances(m.constraints), m.constraints
     for model in local:
         out = np.minimum(out, distances(model, c, background_slack(model, c)))
@@ -255,39 +254,39 @@ def _misfit(m: BaselineMotion, local: Sequence[Affine]) -> NDArray[np.float32]:
 def is_salient(
     t: Track, scene: FrameMeasurements, *, at_once: bool = False, need: float = 1.0
 ) -> bool:
-    """Whether a track has left its place, on a course, over some baseline clearly.
+    """Whether a track has clearly left its place, on a course, over some baseline.
 
-    What takes up much of the image border is not surrounded by a ground, it is one: a near wall,
-    the rocks in front.
+    What covers much of the image border is ground rather than surrounded by it: a near wall, rocks in
+    front.
 
     Args:
         t: The track.
         scene: The frame.
-        at_once: Whether it is to be told at first sight: then its motion must be clearer, and must
-            not be one that a thing at rest near a moving camera may show.
-        need: How far it must have gone, and how little be explained, as a share of the usual.
+        at_once: Whether to report it at once: then its motion must be clearer, and not one that an
+            object at rest near a moving camera may show.
+        need: Scale of the required displacement and of the allowed explained share; 1 is usual.
 
     Returns:
-        Whether it surely moves by itself.
+        Whether it certainly moves independently.
     """
     if border_share(t.share, scene.cells) > (LITTLE_BORDER if at_once else MOST_BORDER):
         return False
-    gone = float(np.hypot(*t.displacement))
+    travelled = float(np.hypot(*t.displacement))
     explained = min(t.background_fit.values(), default=0.0)
-    straight, borne = gone >= STRAIGHT * t.path_length, _is_borne_out(t)
+    straight, borne = travelled >= STRAIGHT * t.path_length, _is_borne_out(t)
     if at_once:
-        # Steps of slow things are half noise: a longer baseline tells better of their course.
+        # Steps of slow objects are half noise: a longer baseline shows their course better.
         course = straight if borne is None else borne
-        clear = explained < CLEAR / need and gone >= need * NEAR_GONE
+        clear = explained < CLEAR / need and travelled >= need * NEAR_GONE
         return clear and course and not _runs_ahead(t, scene)
     least = LEAST_GONE if scene.time - t.initiated >= need * SWING_S else FAR_GONE
-    # Leaves that happen to swing one way feed a track, step after step, and then others do.
+    # A track may be fed by leaf after leaf that happens to swing the same way.
     course = straight and borne is not False
-    return explained < EXPLAINED / need and gone >= need * least and course
+    return explained < EXPLAINED / need and travelled >= need * least and course
 
 
 def _is_borne_out(t: Track) -> bool | None:
-    """Whether the longest baseline shows the way gone step by step; None if none is long enough."""
+    """Whether the longest baseline confirms the path length; None if none is long enough."""
     return (
         t.long_baseline_course[max(t.long_baseline_course)] >= STRAIGHT
         if t.long_baseline_course
@@ -296,14 +295,14 @@ def _is_borne_out(t: Track) -> bool | None:
 
 
 def border_share(share: Floats, cells: Superpixels) -> float:
-    """Share of the image border that a track (count,) takes up, 0 to 1."""
+    """Share of the image border that a track (count,) covers, 0 to 1."""
     labels = cells.labels
     border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     return float(np.mean(share[border] > 0.5))
 
 
 def _runs_ahead(t: Track, scene: FrameMeasurements) -> bool:
-    """Whether a track moves as the background does, only faster: as near things at rest do."""
+    """Whether a track moves like the background, only faster, as near objects at rest do."""
     ground = np.asarray(scene.measured[0].background.models[-1].shift(t.centre))
     speed = float(np.hypot(*ground))
     if speed < 1.0:
@@ -317,7 +316,7 @@ def _runs_ahead(t: Track, scene: FrameMeasurements) -> bool:
 def _displacement_from_background(
     moved: Doubles, t: Track, m: BaselineMotion, local: Sequence[Affine]
 ) -> Doubles:
-    """(x, y) pixels that a track moved against the background nearest to its motion."""
+    """(x, y) displacement of a track, pixels, against the background motion nearest to its own."""
     models = (*m.background.models, *local)
-    ways = [moved - np.asarray(b.shift(t.centre)) for b in models]
-    return min(ways, key=lambda way: float(np.hypot(*way)))
+    displacements = [moved - np.asarray(b.shift(t.centre)) for b in models]
+    return min(displacements, key=lambda way: float(np.hypot(*way)))

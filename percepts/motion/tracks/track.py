@@ -1,7 +1,7 @@
-"""What is remembered of each moving object between frames: identity, motion, shape, what hides it.
+"""The state of a moving object between frames: identity, motion, shape, occlusion.
 
-Masks are kept as one share for each superpixel; what another object hides is kept as a map, since
-it moves with its own motion under an occluder that moves with another.
+A mask is stored as one share per superpixel; the occluded part is stored as a pixel map, since it moves
+with its own motion under an occluder that moves with another.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from visup.percepts.motion.layers.affine import Affine, Doubles
 from visup.percepts.motion.layers.affine_rate import AffineRate
 
 Indices = NDArray[np.int64]
-BRISK_S = 0.25  # baselines up to which a velocity is that of the moment, seconds
-SMOOTH_S = 0.2  # time over which a velocity seen from frame to frame is averaged, seconds
+BRISK_S = 0.25  # longest baseline of an instantaneous velocity, seconds
+SMOOTH_S = 0.2  # averaging time of frame-to-frame velocities, seconds
 
 
 def _nothing() -> Mapping[int, float]:
@@ -39,14 +39,14 @@ class PartMotion:
 
     Attributes:
         rates: By baseline in frames.
-        support: How many constraints it rested on last.
+        support: Number of constraints it last rested on.
     """
 
     rates: Mapping[int, AffineRate] = field(default_factory=_no_rates)
     support: float = 0.0
 
     def predicted(self, lag: int, span_s: float, where: tuple[float, float]) -> Affine:
-        """Its displacement over a baseline, from the best rate that is known."""
+        """Its displacement over a baseline, from the best known rate."""
         best = self.best_rate(where)
         if best is None:
             return Affine(np.zeros((2, 3)))
@@ -56,7 +56,7 @@ class PartMotion:
         return Affine(rate.matrix * span_s, rate.sigma * span_s)
 
     def best_rate(self, where: tuple[float, float]) -> AffineRate | None:
-        """The surest rate that agrees with those over shorter baselines at a position."""
+        """The most certain rate that agrees with those over shorter baselines at a position."""
         if not self.rates:
             return None
         newest = max(r.time for r in self.rates.values())
@@ -70,7 +70,7 @@ class PartMotion:
         return best
 
     def with_rate(self, lag: int, rate: AffineRate, support: float) -> PartMotion:
-        """The same motion with one rate renewed."""
+        """The same motion with one rate replaced."""
         return PartMotion(MappingProxyType({**self.rates, lag: rate}), support)
 
 
@@ -79,32 +79,32 @@ class Track:
     """One moving object.
 
     Attributes:
-        key: Number within the segmenter, from 1, in order of birth.
+        key: Number within the segmenter, from 1, in order of initiation.
         id: Public number from 1, 0 until confirmed.
         initiated: Seconds.
         last_seen: Seconds when it was last visible.
-        share: (count,) float32, probability that each superpixel shows it.
+        share: (count,) float32, probability of each superpixel.
         occluded: (h, w) float32, where others hide it; None when they do not.
-        motions: Of its rigid parts; an arm has several.
-        whole_rate: The one motion that suits all parts best.
-        recent_share: (count,) float32, where it was of late: parts that turn up there are its own.
-        evidence: How much better its own motion explains it than the background's did (log
-            likelihood, running sum).
+        motions: The motions of its rigid parts; an arm has several.
+        whole_rate: The single motion that fits all parts best.
+        recent_share: (count,) float32, where it was recently: parts that appear there are its own.
+        evidence: How much better its own motion explains it than the background's (log likelihood,
+            running sum).
         frames: In how many frames it was visible.
         centre: (x, y) centroid when last visible, working pixels.
-        mostly_occluded: Whether others hide a third of it or more.
+        mostly_occluded: Whether others hide at least a third of it.
         unoccluded_velocity: (vx, vy) when it was last in full view, pixels per second.
         pending_shift: (x, y) of motion not yet applied to `occluded`, pixels.
         predicted_share: (count,) float32, where it would be by its own motion alone.
         predicted_map: (h, w) float32, the same by pixels while others hide a part of it, or None.
-        core: (count,) bool, where it prevails, if by less than half, and objects are surer than the
-            background; None before that was seen.
-        path: (time, x, y) of its displacement since birth, over the longest baseline.
-        separate_s: Seconds for which it was seen apart from other tracks, by key.
+        core: (count,) bool, where it prevails, even by less than half, and objects are more certain than the
+            background; None before the first update.
+        path: (time, x, y) of its displacement since initiation, over the longest baseline.
+        separate_s: Seconds for which it was observed apart from other tracks, by key.
         merge_votes: Votes that it is one with another track, by key.
-        displacement: (x, y) of its displacement since birth against the background, pixels.
-        path_length: Length of the way it took to get there, pixels.
-        long_baseline_course: Displacement over a longer baseline as a share of the way it took meanwhile, by
+        displacement: (x, y) of its displacement since initiation against the background, pixels.
+        path_length: Length of the path of that displacement, pixels.
+        long_baseline_course: Displacement over a longer baseline as a share of the path length meanwhile, by
             octave of the baseline.
         background_fit: Share of its points that the background explains, by octave of the baseline.
         moving_area: Its area when the background last did not explain it, working pixels.
@@ -140,8 +140,8 @@ class Track:
     def predicted(self, lag: int, span_s: float) -> tuple[Affine, ...]:
         """The displacement of each part over a baseline.
 
-        An object that stopped or turned within the baseline has not moved by its rate times the
-        time: then the way that it was seen to go is taken.
+        The rate times the span overestimates an object that stopped or turned within the baseline: then
+        its recorded path is used.
         """
         parts = [m.predicted(lag, span_s, self.centre) for m in self.motions]
         own = self.motions[0].rates.get(lag)
@@ -155,7 +155,7 @@ class Track:
         return tuple(parts)
 
     def _went(self, span_s: float) -> tuple[float, float]:
-        """Displacement over the last so many seconds, (x, y) pixels; at its rate before birth."""
+        """Displacement over the last `span_s` seconds, (x, y) pixels; extrapolated before initiation."""
         now, sought = self.path[-1], self.path[-1][0] - span_s
         after = bisect_left(self.path, (sought,))
         around = self.path[max(after - 1, 0) : after + 1]
@@ -180,7 +180,7 @@ class Track:
     def velocity(self, where: tuple[float, float]) -> Doubles:
         """(vx, vy) at a position, pixels per second.
 
-        What was measured from one frame to the next is averaged over the last few.
+        Frame-to-frame measurements are averaged over the last few.
         """
         rate = self.best_rate()
         if rate is None:
@@ -192,7 +192,7 @@ class Track:
         return now - self.instant_velocity() + np.asarray(self._went(span)) / span
 
     def best_rate(self) -> AffineRate | None:
-        """The rate of the whole, or of the only part."""
+        """The rate of the whole track, or of its only part."""
         if not self.motions:
             return None
         if len(self.motions) > 1 and self.whole_rate is not None:
@@ -217,10 +217,10 @@ def new_track(
     Args:
         key: Its number within the segmenter.
         now: Seconds.
-        share: (count,), probability that each superpixel shows it.
-        motion: Of its only part.
+        share: (count,), probability of each superpixel.
+        motion: The motion of its only part.
         centre: (2,) x, y, working pixels.
-        evidence: Log likelihood to begin with.
+        evidence: Initial log likelihood.
     """
     middle = (float(centre[0]), float(centre[1]))
     cells = share.astype(np.float32)

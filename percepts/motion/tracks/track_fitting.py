@@ -1,4 +1,4 @@
-"""The motions of tracks, fitted to the constraints inside their outlines (the M step)."""
+"""The M step: motions of tracks fitted to the constraints inside their outlines."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from visup.percepts.motion.layers.layer_discovery import affine_rate, layer_slac
 from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
 from visup.percepts.motion.tracks.track import Indices, PartMotion, Track
 
-ALIKE_PX_S = 12.0  # pixels per second within which a part moves like what is hidden
+ALIKE_PX_S = 12.0  # pixels per second within which a part moves like a hidden track
 UNLIKE_PX_S = 8.0  # pixels per second by which a part may differ between baselines
-SHORT_S = 0.1  # baselines up to which noise on a few edges passes for motion, seconds
+SHORT_S = 0.1  # longest baseline at which noise on a few edges passes for motion, seconds
 PART_COST = 4.0  # squared distance that a further part of a track must save
 
 
 def fit_tracks(tracks: tuple[Track, ...], scene: FrameMeasurements) -> tuple[Track, ...]:
-    """Renew each track's motion from the constraints inside its outline."""
+    """Refit each track's motion to the constraints inside its outline."""
     for m in scene.measured:
         c = m.constraints
         at = scene.owner[scene.cell_of(c)]
@@ -47,9 +47,9 @@ class _PartFit:
     """A motion fitted to the constraints of one part.
 
     Attributes:
-        model: Over the baseline of the constraints.
+        model: The motion over the baseline of the constraints.
         rate: The same per second.
-        constraints: N, those in the outline of the track.
+        constraints: The N constraints in the outline of the track.
         weight: (N,) float32, 1 for those of the part.
     """
 
@@ -59,7 +59,7 @@ class _PartFit:
     weight: Floats
 
     def renewed(self, part: PartMotion, least_share: float) -> PartMotion | None:
-        """The part with this rate; None when it rests on too few constraints to tell."""
+        """The part with this rate; None when it rests on too few constraints."""
         if self.model.support < max(5.0, least_share * part.support):
             return None
         support = max(self.model.support, 0.99 * part.support)
@@ -67,7 +67,7 @@ class _PartFit:
 
 
 def _fitted(t: Track, m: BaselineMotion, mine: NDArray[np.bool_], now: float) -> Track:
-    """A track whose parts each take the constraints that they explain best, and are fitted to them.
+    """A track with each part fitted to the constraints it explains best.
 
     Args:
         t: The track.
@@ -80,7 +80,7 @@ def _fitted(t: Track, m: BaselineMotion, mine: NDArray[np.bool_], now: float) ->
     c = m.constraints.take(np.flatnonzero(mine))
     models = t.predicted(c.lag, c.span_s)
     own, nearest = _assigned(t, models, c, m.background.distances(m.constraints)[mine])
-    # Of a part that is nearly occluded little is told: what was known is kept.
+    # A mostly occluded part has few constraints: its known rate is retained.
     least_share = 0.6 if t.mostly_occluded else 0.0
     parts: list[PartMotion] = []
     for i, (part, start) in enumerate(zip(t.motions, models, strict=True)):
@@ -97,12 +97,12 @@ def _fitted(t: Track, m: BaselineMotion, mine: NDArray[np.bool_], now: float) ->
 def _assigned(
     t: Track, models: Sequence[Affine], c: Constraints, to_background: Floats
 ) -> tuple[NDArray[np.bool_], Indices]:
-    """Which of N constraints may draw a track after them, (N,) bool; the part nearest to each, (N,)."""
+    """Which of N constraints a track may be fitted to, (N,) bool; the nearest part of each, (N,)."""
     off = np.stack([distances(model, c, layer_slack(model, t.centre)) for model in models])
-    # The first part comes first: an edge along the motion fits any part, and must not feed them.
+    # The first part is preferred: an edge along the motion fits any part and must not feed others.
     off[1:] += PART_COST
-    # What the background explains, and no part does, must not draw the track after it.
-    # When that holds for most of it, it has stopped instead.
+    # Constraints that the background explains, and no part does, must not pull the track along.
+    # When that holds for most of the track, it has stopped instead.
     own = (off.min(axis=0) < 9) | (to_background > 4)
     own = own if np.count_nonzero(own) > 0.5 * len(own) else np.ones_like(own)
     return own, off.argmin(axis=0)
@@ -119,7 +119,7 @@ def _fit_part(
 ) -> _PartFit:
     fit = fit_affine(c, weight, start, slack=layer_slack(start, centre))
     if first and fit.support < 0.5 * weight.sum():
-        # It may have stopped or turned: what most of its points do is tried as well.
+        # It may have stopped or turned: the median motion of its points is tried as well.
         other = fit_affine(c, weight, median_motion(c, np.flatnonzero(weight)), slack=0.3)
         fit = other if other.support > fit.support else fit
     return _PartFit(fit, affine_rate(fit, c, now), c, weight)
@@ -128,9 +128,9 @@ def _fit_part(
 def _further_part(
     t: Track, part: PartMotion, fit: _PartFit, background: BackgroundMotion, least_share: float
 ) -> PartMotion | None:
-    """A part besides the first, renewed or faded; None when it is given up.
+    """A part besides the first, refitted or faded; None when it is dropped.
 
-    One that has come to move as the background does is given up, lest the background be swallowed.
+    A part that has come to move like the background is dropped, lest it absorb the background.
     """
     if _is_momentary(part, t.motions[0], fit.rate.time):
         return None
@@ -149,19 +149,19 @@ def _further_part(
 def _whole_rate(
     c: Constraints, own: NDArray[np.bool_], start: Affine, now: float
 ) -> AffineRate | None:
-    """One shift for all parts together: what the edges of one leave open, those of others close."""
+    """One shift for all parts together: edges of one constrain what those of another leave open."""
     fit = fit_affine(c, own.astype(np.float32), start, rigidity=1e4, slack=0.5)
     return affine_rate(fit, c, now) if fit.support >= 5 else None
 
 
 def _middle_of(c: Constraints, weight: Floats) -> tuple[float, float]:
-    """Where a part lies: a motion fitted there says little of other places."""
+    """Centre of a part; a motion fitted there says little about other places."""
     x, y = c.xy[weight > 0].mean(axis=0)
     return float(x), float(y)
 
 
 def _is_momentary(part: PartMotion, first: PartMotion, now: float) -> bool:
-    """Whether a part is seen from frame to frame only, while the first is seen over longer too."""
+    """Whether a part is measured between frames only, the first over longer baselines too."""
     longer = [r for r in first.rates.values() if r.span_s > SHORT_S and now - r.time < r.span_s]
     return bool(longer) and all(r.span_s < SHORT_S for r in part.rates.values())
 
@@ -171,7 +171,7 @@ def _agrees_across_baselines(
 ) -> bool:
     """Whether a part moves over one baseline about as it does over the others.
 
-    A few edges fit any motion for a moment; a part that follows them explains whatever it meets.
+    A few edges fit any motion for a moment; a part that follows them would explain whatever it meets.
     """
     rest = [r for r in motion.rates.values() if r.span_s != rate.span_s]
     fresh = [r for r in rest if rate.time - r.time < 0.5 + 0.25 * r.span_s]

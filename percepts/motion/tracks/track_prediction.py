@@ -1,4 +1,4 @@
-"""Tracks brought to the next frame: where they are expected, and the label shares that follow."""
+"""Prediction of tracks to the next frame, and the label priors that follow."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.tracks.track import Track, Tracks
 
 PATH_S = 2.8  # how long the path of a track is remembered, seconds
-EVERY = 4  # of the pixels of a cell, one in so many is asked where it comes from
-FADE = 0.4  # share of the memory of where a track was that is left after a second
+EVERY = 4  # every how many pixels of a cell are traced back along the flow
+FADE = 0.4  # share of `recent_share` that remains after a second
 
 
 def predict_tracks(
     tracks: Tracks, flow: Floats, old: Superpixels, new: Superpixels, seconds: float
 ) -> Tracks:
-    """Bring tracks to the next frame.
+    """Predict tracks in the next frame.
 
-    What is visible goes with the flow. Where it would be by its own motion is kept as well: if
-    another object turns up there, the track is hidden behind it. That map is moved by whole pixels,
-    so that it is not blurred by many small moves.
+    Visible parts move with the flow. The position predicted by the track's own motion is stored as well: if
+    another object appears there, the track is hidden behind it. That map is moved by whole pixels, so that
+    repeated small moves do not blur it.
 
     Args:
-        tracks: The tracks as of the frame before.
+        tracks: The tracks as of the previous frame.
         flow: (h, w, 2) float32, from the newest image back to the last.
-        old: Superpixels of the frame before.
+        old: Superpixels of the previous frame.
         new: Superpixels of the newest frame.
         seconds: Between the two frames.
 
@@ -55,7 +55,7 @@ def predict_tracks(
 def _predicted(
     track: Track, share: Floats, recent: Floats, old: Superpixels, new: Superpixels, seconds: float
 ) -> Track:
-    """A track where it is expected, given what of it and of its past comes to each superpixel."""
+    """A predicted track, given its share and recent share carried to each superpixel."""
     drift = np.asarray(track.pending_shift) + np.asarray(track.unoccluded_velocity) * seconds
     pixels = np.round(drift)
     rest = drift - pixels
@@ -64,7 +64,7 @@ def _predicted(
     here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
     path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
     by = int(pixels[0]), int(pixels[1])
-    # Where an occluder comes, an object fades before it is hidden: what it still has counts.
+    # An object fades before an occluder hides it: what it still covers counts.
     body = track.share > 0.5
     if track.core is not None:
         body = body | track.core
@@ -88,7 +88,7 @@ def _predicted(
 
 
 def shift_map(image: Floats, dx: int, dy: int) -> Floats:
-    """An image moved by whole pixels, zeros coming in."""
+    """An image shifted by whole pixels, filled with zeros."""
     if dx == 0 and dy == 0:
         return image
     matrix = np.array([[1, 0, dx], [0, 1, dy]], dtype=np.float64)
@@ -111,7 +111,7 @@ def label_priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
         out[:, k] = track.share
     for track in tracks:
         if track.occluded is not None:
-            # An occluder is expected no further than its own motion takes it.
+            # An occluder is expected only where its own motion takes it.
             there = cells.mean(track.occluded) > 0.3
             for k, other in enumerate(tracks, 1):
                 if other is not track and other.predicted_share is not None:
@@ -119,7 +119,7 @@ def label_priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
     free = np.clip(1 - out.sum(axis=1), 0, 1)
     for k, track in enumerate(tracks, 1):
         if track.occluded is not None:
-            # What was hidden is expected back where its occluder has gone.
+            # A hidden track is expected back where its occluder has left.
             out[:, k] += free * np.maximum(cells.mean(track.occluded) - out[:, k], 0)
     out /= np.maximum(out.sum(axis=1, keepdims=True), 1)
     out[:, 0] = np.clip(1 - out.sum(axis=1), 0, 1)
@@ -127,6 +127,6 @@ def label_priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
 
 
 def sharpen(shares: Floats) -> Floats:
-    """Push label shares (count, K) towards their winner, lest beliefs fade by being carried."""
+    """Push label shares (count, K) towards their winner, so that carried beliefs do not fade."""
     squared = shares * shares
     return np.asarray(squared / np.maximum(squared.sum(axis=1, keepdims=True), 1e-6))

@@ -1,4 +1,4 @@
-"""Tracks after the posterior of a frame is known: where they are, how they move, what hides them."""
+"""Update of tracks from the posterior of a frame: position, velocity, occlusion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FOLLOW_S = 1.0  # time over which the unoccluded velocity follows the measured o
 def update_track(
     track: Track, label: int, labelling: Labelling, cells: Superpixels, now: float, least: float
 ) -> Track:
-    """Update a track after the posterior is known.
+    """Update a track from the posterior.
 
     Args:
         track: The predicted track.
@@ -25,10 +25,10 @@ def update_track(
         labelling: Labels of the superpixels.
         cells: The superpixels.
         now: Seconds.
-        least: Least visible area to count as seen, working pixels.
+        least: Least visible area to count as observed, working pixels.
 
     Returns:
-        The track; what others took over is occluded, what is seen to be background is forgotten.
+        The track; cells taken by others become occluded, background cells are dropped.
     """
     mine = labelling.winner == label
     taken = (labelling.winner > 0) & ~mine
@@ -63,11 +63,11 @@ def _centroid(cells: Superpixels, mine: NDArray[np.bool_], area: float) -> tuple
 def _unoccluded_velocity(
     track: Track, centre: tuple[float, float], now: float
 ) -> tuple[float, float]:
-    """(vx, vy) of a track that is seen, pixels per second; what was known while others hide it."""
+    """(vx, vy) of a visible track, pixels per second; the last known one while it is hidden."""
     rate = track.best_rate()
     if track.mostly_occluded or rate is None:
         return track.unoccluded_velocity
-    # Slowly, lest the first signs of an occluder be taken for the object's own motion.
+    # Slowly, so that a beginning occlusion is not taken for the object's own motion.
     follow = 1.0 if track.frames < 15 else min(1.0, (now - track.last_seen) / FOLLOW_S)
     velocity = np.asarray(track.unoccluded_velocity) * (1 - follow) + rate.velocity(centre) * follow
     return float(velocity[0]), float(velocity[1])
@@ -76,22 +76,22 @@ def _unoccluded_velocity(
 def _occluded(
     track: Track, taken: NDArray[np.bool_], area: float, cells: Superpixels, least: float
 ) -> tuple[Floats | None, float]:
-    """(h, w) float32, where others hide a track, or None; and how much of it they hide, pixels.
+    """(h, w) float32, where others hide a track, or None; and the hidden area, pixels.
 
     Args:
         track: The predicted track.
-        taken: (count,) bool, cells that others have.
+        taken: (count,) bool, cells owned by others.
         area: Its visible area, working pixels.
         cells: The superpixels.
-        least: Least visible area to count as seen, working pixels.
+        least: Least visible area to count as observed, working pixels.
     """
     own = track.predicted_share
     covered = taken & (own > 0.5 if own is not None else False)
     lost = cells.area[covered].sum()
-    # A cell or two beside another object is no occlusion; nor is what was never reported remembered.
+    # A cell or two beside another object is no occlusion; candidates are not remembered.
     if track.id <= 0 or lost <= max(0.05 * area, 0.3 * least):
         return None, lost
     if track.predicted_map is not None and own is not None:
-        # By pixels, for cells are others in each frame: by those it would wear away at its edges.
+        # By pixels: cells change in each frame, and its edges would wear away.
         return track.predicted_map * cells.paint(taken & (own > 0)), lost
     return cells.paint(covered), lost

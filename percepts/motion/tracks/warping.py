@@ -1,4 +1,4 @@
-"""Dense comparison: the older image, brought along by each layer's motion, beside the newest one."""
+"""Dense comparison of the newest image with an older one warped by each layer's motion."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def warp_likelihood(
     box: tuple[int, int, int, int],
     precision: Floats,
 ) -> Floats:
-    """Log likelihood of pixels when the old image is warped by a layer's motions (the best counts).
+    """Log likelihood of pixels when the old image is warped by a layer's motions (best of them).
 
-    At half the size: what is asked is which cells fit, and each is several pixels wide.
+    Half the size suffices: the question is which cells fit, and each is several pixels wide.
 
     Args:
         new: The newest image.
@@ -54,10 +54,10 @@ def warp_likelihood(
 
 
 def grey_precision(image: WorkImage, noise: float, box: tuple[int, int, int, int]) -> Floats:
-    """Inverse variance to expect of a warped image's grey values, (h, w) float32.
+    """Expected inverse variance of a warped image's grey values, (h, w) float32.
 
-    Where the image is steep, a small error of the motion makes a large one of the grey value.
-    The box is of pixels at half the size.
+    On a steep gradient a small motion error causes a large error of the grey value. The box is in pixels at
+    half the size.
     """
     x, y, w, h = box
     every = np.s_[2 * y : 2 * (y + h) : 2, 2 * x : 2 * (x + w) : 2]
@@ -67,9 +67,9 @@ def grey_precision(image: WorkImage, noise: float, box: tuple[int, int, int, int
 
 
 def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]) -> NDArray[Any]:
-    """An old image, at half the size, as a layer's motion brings it to a part of the newest one.
+    """An old image, at half the size, warped by a layer's motion to a part of the newest one.
 
-    The middle of pixel u lies at 2 u + 1/2 in the working image, to which motions refer.
+    The centre of pixel u is at 2 u + 1/2 in the working image, to which motions refer.
     """
     x, y, w, h = box
     if model.bend is not None:
@@ -93,7 +93,7 @@ def dense_likelihood(
     near: NDArray[np.bool_],
     noise: float,
 ) -> Floats:
-    """Dense evidence: which motion brings the older image to look like the newest one.
+    """Dense evidence: which motion maps the older image onto the newest one.
 
     Args:
         scene: The frame; its longest baseline is used.
@@ -137,7 +137,7 @@ def _was_hidden(
 ) -> NDArray[np.bool_]:
     """Which of some cells, were they background, the track would have hidden in the older image.
 
-    There the background need not look as it does now, so a poor comparison says nothing against it.
+    There the background may look different now, so a poor match is no evidence against it.
     """
     cells, background = scene.cells, scene.measured[-1].background.models
     height, width = cells.labels.shape
@@ -162,5 +162,5 @@ def _halved(box: tuple[int, int, int, int], cells: Superpixels) -> tuple[int, in
 
 
 def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
-    """Mean of a map of a box, at half the size, in each cell; 0 where none of its pixels is seen."""
+    """Mean of a map of a box, at half the size, in each cell; 0 where the box has none of its pixels."""
     return half_size_means(cells.labels, np.ascontiguousarray(values), box, cells.count)
