@@ -117,7 +117,7 @@ def test_a_lake_in_a_bucket(bucket: str, tmp_path: Path, machine: Machine, whole
 def test_wherever_a_writer_stops_there_are_whole_runs_and_the_rest_comes(
     tmp_path: Path, machine: Machine, whole: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    send, expected, seen = lake_store._send, without_places(whole), set[int]()
+    send, expected, seen = lake_store._upload, without_places(whole), set[int]()
     for allowed in (16, 24):
         machine(f"writer-{allowed}")
         place, left = f"memory://{uuid4().hex}", iter(range(allowed))
@@ -127,10 +127,10 @@ def test_wherever_a_writer_stops_there_are_whole_runs_and_the_rest_comes(
                 raise ConnectionResetError("the network is gone")
             send(*given)
 
-        monkeypatch.setattr(lake_store, "_send", failing)
+        monkeypatch.setattr(lake_store, "_upload", failing)
         with pytest.raises(OutputError, match="the network is gone"):
             filled(place, tmp_path)
-        monkeypatch.setattr(lake_store, "_send", send)
+        monkeypatch.setattr(lake_store, "_upload", send)
         machine(f"reader-{allowed}")
         there = set(open_lake(place).runs()) if LakeStore(place).exists() else set[str]()
         seen.add(len(there))

@@ -19,15 +19,15 @@ from visup.runs.resume import recorded_settings
 def add_run(lake: Lake, run: Path, labels: Mapping[str, str] | None = None) -> tuple[str, bool]:
     """Add a finished run to a lake.
 
-    The video may be gone, or another by now, and so may the models: what was recorded tells the run apart.
+    The run is identified by its recording, since the video and the models may be gone or changed by now.
 
     Args:
-        lake: Where to.
+        lake: The lake.
         run: A run folder, or the journal in it.
-        labels: What else is known of it.
+        labels: Labels of the run.
 
     Returns:
-        Its key, and whether it was added; False when the same was there already.
+        Its key, and whether it was added; False if the lake has it already.
 
     Raises:
         VisupError: It has not ended, is damaged, or a file that its settings name is gone.
@@ -41,15 +41,15 @@ def add_run(lake: Lake, run: Path, labels: Mapping[str, str] | None = None) -> t
     if lake.has(key):
         return key, False
     taken = source.stat().st_mtime if source.exists() else None
-    given = Provenance(key, recorded, by, taken, labels or {})
+    provenance = Provenance(key, recorded, by, taken, labels or {})
     notes = BeliefNotes()
-    tables = run_tables(recording, settings, given, notes)
+    tables = run_tables(recording, settings, provenance, notes)
     return key, lake.commit(tables, recording, run_inputs(settings), notes.content())
 
 
 def recording_hash(recording: Recording) -> str:
-    """SHA-256 of what was believed and told in a run, step by step."""
-    whole = hashlib.sha256()
+    """SHA-256 of the beliefs and events of a run, step by step."""
+    digest = hashlib.sha256()
     for line in chain(recording.events(), recording.summaries()):
-        whole.update(event_text(line).encode(errors="surrogateescape"))
-    return whole.hexdigest()
+        digest.update(event_text(line).encode(errors="surrogateescape"))
+    return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""What the extra `visup[cluster]` brings, imported when it is needed and not before."""
+"""Libraries of the extra `visup[cluster]`, imported on demand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tells runs apart: what was watched, the settings with all that they name, visup's version."""
+"""The identity of a run: source, settings with the files they name, and version of visup."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from visup.archive.inputs import run_inputs
 from visup.runs.settings import WatchSettings
 from visup.version import __version__
 
-_NOT_WHAT_IS_BELIEVED = ("source", "tasks", "rules", "zones", "patience_s")
-"""Settings that are told otherwise (by content), or change nothing of what a file gives."""
+_NO_EFFECT = ("source", "tasks", "rules", "zones", "patience_s")
+"""Settings that enter by content, or do not affect the result for a file."""
 
 
 def run_key(source_hash: str, settings_hash: str, visup: str = __version__) -> str:
@@ -37,37 +37,37 @@ def content_hash(path: Path) -> str:
     try:
         if not path.is_dir():
             return _file_hash(path)
-        whole = hashlib.sha256()
+        digest = hashlib.sha256()
         for name, file in _files(path):
-            whole.update(f"{name}\n{_file_hash(file)}\n".encode(errors="surrogateescape"))
-        return whole.hexdigest()
+            digest.update(f"{name}\n{_file_hash(file)}\n".encode(errors="surrogateescape"))
+        return digest.hexdigest()
     except OSError as fault:
-        said = fault.strerror or str(fault)
-        raise SourceError(f"it cannot be read ({said})", where=str(path)) from fault
+        reason = fault.strerror or str(fault)
+        raise SourceError(f"it cannot be read ({reason})", where=str(path)) from fault
 
 
 def settings_hash(settings: WatchSettings) -> str:
-    """SHA-256 of settings: files that they name count by their content, and the source not at all.
+    """SHA-256 of settings: the files they name enter by content, and the source not at all.
 
     Raises:
         VisupError: A file that they name cannot be read.
     """
-    return hashlib.sha256(_canonical(_told(settings)).encode()).hexdigest()
+    return hashlib.sha256(_canonical(_described(settings)).encode()).hexdigest()
 
 
-def _told(settings: WatchSettings) -> dict[str, Any]:
+def _described(settings: WatchSettings) -> dict[str, Any]:
     inputs = run_inputs(settings)
-    told: dict[str, Any] = {
+    described: dict[str, Any] = {
         f.name: _value(getattr(settings, f.name))
         for f in fields(settings)
-        if f.name not in _NOT_WHAT_IS_BELIEVED
+        if f.name not in _NO_EFFECT
     }
-    places = {"tasks": inputs.tasks, "rules": inputs.rules, "zones": inputs.zones}
-    return {**told, **places, "texts": dict(inputs.texts)}
+    named_files = {"tasks": inputs.tasks, "rules": inputs.rules, "zones": inputs.zones}
+    return {**described, **named_files, "texts": dict(inputs.texts)}
 
 
 def _value(value: Any) -> Any:
-    """A setting as JSON; a file that there is, as the hash of its content."""
+    """A setting as JSON; an existing file as the hash of its content."""
     if isinstance(value, tuple):
         return [_value(v) for v in value]
     if isinstance(value, Mapping):

@@ -1,7 +1,7 @@
-"""The files that a run was reasoned with, kept beside it: tasks with what they include, rules, zones.
+"""The input files of a run, saved with it: tasks with their includes, rules, zones.
 
-A lake outlives the folders from which it was filled: so that a run can be reasoned about again years later,
-with just the tasks and rules that it had, their texts are kept with it.
+A lake outlives the folders from which it was filled. The texts are saved so that the reasoning of a run can
+be replayed years later with the same tasks and rules.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _INCLUDE = re.compile(r'^[ \t]*include[ \t]+"([^"\n]+)"', re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class RunInputs:
-    """The files of a run by their place beside it, and how its settings name them there.
+    """The files saved with a run, and how its settings name them.
 
     Attributes:
         texts: Relative path -> text.
@@ -38,14 +38,14 @@ class RunInputs:
     zones: str | None = None
 
     def files(self) -> dict[str, bytes]:
-        """What is to be written: relative path -> content, with the index of it all."""
-        told = {"tasks": self.tasks, "rules": self.rules, "zones": self.zones}
-        index = json.dumps(told, indent=1, sort_keys=True) + "\n"
+        """The files to write: relative path -> content, including the index."""
+        index_fields = {"tasks": self.tasks, "rules": self.rules, "zones": self.zones}
+        index = json.dumps(index_fields, indent=1, sort_keys=True) + "\n"
         return {INDEX: index.encode(), **{k: v.encode() for k, v in self.texts.items()}}
 
 
 def run_inputs(settings: WatchSettings) -> RunInputs:
-    """The files that some settings name and that reasoning depends on.
+    """The files named by the settings that reasoning depends on.
 
     Raises:
         VisupError: One cannot be read.
@@ -58,18 +58,18 @@ def run_inputs(settings: WatchSettings) -> RunInputs:
 
 
 def with_inputs(settings: WatchSettings, folder: Path) -> WatchSettings:
-    """The settings of a run with the files that stand beside it in place of those that it was given.
+    """The settings of a run with its saved files in place of the original ones.
 
     Args:
-        settings: As they were recorded.
-        folder: Where the files of `RunInputs.files` were written to.
+        settings: The recorded settings.
+        folder: Folder with the files of `RunInputs.files`.
 
     Raises:
-        OutputError: They are not there.
+        OutputError: The files are missing.
     """
     try:
-        told = json.loads(read_text_file(folder / INDEX))
-        tasks, rules, zones = told["tasks"], told["rules"], told["zones"]
+        index_fields = json.loads(read_text_file(folder / INDEX))
+        tasks, rules, zones = index_fields["tasks"], index_fields["rules"], index_fields["zones"]
         return replace(
             settings,
             tasks=tuple(str(folder / t) for t in tasks),
@@ -82,16 +82,16 @@ def with_inputs(settings: WatchSettings, folder: Path) -> WatchSettings:
 
 
 def _task(name: str, place: str, texts: dict[str, str]) -> str:
-    path, wanted = name, ""
+    path, task_name = name, ""
     if not _is_task(name):
-        path, _, wanted = name.rpartition(":")
+        path, _, task_name = name.rpartition(":")
     file = f"{path}.task" if path in shipped_tasks() and not Path(path).exists() else path
     root = f"inputs/{place}"
     texts[f"{root}/{Path(file).name}"] = text = read_text(path)
     for relative, included in _included(Path(file).parent, PurePosixPath(), text, {Path(file)}):
         texts[f"{root}/{relative}"] = included
-    kept = f"{root}/{Path(file).name}"
-    return f"{kept}:{wanted}" if wanted else kept
+    saved = f"{root}/{Path(file).name}"
+    return f"{saved}:{task_name}" if task_name else saved
 
 
 def _is_task(name: str) -> bool:
@@ -99,25 +99,25 @@ def _is_task(name: str) -> bool:
 
 
 def _included(
-    root: Path, folder: PurePosixPath, text: str, known: set[Path]
+    root: Path, folder: PurePosixPath, text: str, visited: set[Path]
 ) -> Iterator[tuple[str, str]]:
-    """The files that a task includes, with those that they include, by their path from its folder."""
-    for named in _INCLUDE.findall(text):
-        relative = folder / named
+    """The files that a task includes, recursively, by their path from its folder."""
+    for include in _INCLUDE.findall(text):
+        relative = folder / include
         path = root / relative
-        if path in known or not path.is_file():  # a shipped task is there wherever visup is
+        if path in visited or not path.is_file():  # shipped tasks are part of visup
             continue
-        known.add(path)
+        visited.add(path)
         found = read_text(path)
         yield str(relative), found
-        yield from _included(root, relative.parent, found, known)
+        yield from _included(root, relative.parent, found, visited)
 
 
 def _copied(path: Path, place: str, texts: dict[str, str]) -> str:
-    kept = f"inputs/{place}/{path.name}"
+    saved = f"inputs/{place}/{path.name}"
     try:
-        texts[kept] = read_text_file(path)
+        texts[saved] = read_text_file(path)
     except (OSError, UnicodeDecodeError) as fault:
-        said = getattr(fault, "strerror", None) or fault
-        raise OutputError(f"the file cannot be read ({said})", where=str(path)) from fault
-    return kept
+        reason = getattr(fault, "strerror", None) or fault
+        raise OutputError(f"the file cannot be read ({reason})", where=str(path)) from fault
+    return saved

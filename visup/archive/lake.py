@@ -1,9 +1,8 @@
 """A lake: a folder with the tables of many runs, and their journals.
 
-A run is committed by the file of its row in `runs`, which is written last. Whatever else is there of a run
-without that row (its writer was killed, the disk was full) is not part of the lake: readers pass it over, and
-writing the run again puts the same files in the same places. So nothing is lost and nothing is there twice,
-wherever a writer stops.
+A run is committed by the file of its row in `runs`, which is written last. Any other file of a run
+without that row (its writer was killed, the disk was full) is not part of the lake: readers ignore it, and
+writing the run again replaces the same files. So nothing is lost or duplicated, wherever a writer stops.
 """
 
 from __future__ import annotations
@@ -33,20 +32,20 @@ MARK = "lake.json"
 TABLES_FOLDER = "tables"
 RECORDINGS = "recordings"
 BELIEFS = "beliefs.npz"
-"""Beside the journal of a run: what conditions about relations depend on, so that they are judged at once."""
+"""Next to the journal of a run: saved beliefs for fast evaluation of conditions about relations."""
 SCHEMA_FILE = "schema.parquet"
-"""Beside the runs' files of a table: one without rows, so that a table is there before its first row."""
+"""In the folder of a table: a file without rows, so that the table exists before its first row."""
 
 
 @dataclass(frozen=True, slots=True)
 class LakeSnapshot:
-    """Which runs a lake has at a time, and in which files.
+    """The runs of a lake at one time, and their files.
 
     Attributes:
         path: Folder of the lake.
-        partitions: Those whose runs are joined.
-        loose: Keys of runs with files of their own, sorted.
-        files: Table -> all its files; there is at least one, perhaps without rows.
+        partitions: The active partitions.
+        loose: Keys of the unjoined runs, sorted.
+        files: Table -> its files, at least one, perhaps without rows.
     """
 
     path: Path
@@ -55,11 +54,11 @@ class LakeSnapshot:
     files: Mapping[str, Sequence[Path]]
 
     def index_files(self, name: str) -> list[Path]:
-        """The files of the index of that name, one for each partition."""
+        """The index files of that name, one per partition."""
         return [self.path / FOLDER / part.name / f"{name}.parquet" for part in self.partitions]
 
     def numbered(self) -> Iterator[tuple[tuple[str, ...], int, bool]]:
-        """Runs whose numbers in the index follow each other, from which, and whether their files are own."""
+        """Runs with consecutive numbers in the index, the first number, and whether they are unjoined."""
         yield from ((part.runs, part.run_number(0), False) for part in self.partitions)
         first = max((part.run_number(MOST_RUNS) for part in self.partitions), default=0)
         yield self.loose, first, True
@@ -71,7 +70,7 @@ class Lake:
 
     Attributes:
         path: Its folder.
-        fetch: Brings the journal of a run into its folder, of a lake that is kept elsewhere; or None.
+        fetch: Downloads the journal of a run into its folder, for a lake in a store; or None.
     """
 
     path: Path
@@ -79,14 +78,14 @@ class Lake:
 
     @classmethod
     def open(cls, path: Path) -> Lake:
-        """A lake that there is.
+        """Open an existing lake.
 
         Raises:
             OutputError: There is none, or it is of another version.
         """
         try:
-            told = json.loads((path / MARK).read_text(encoding="utf-8"))
-            version = told["version"]
+            mark = json.loads((path / MARK).read_text(encoding="utf-8"))
+            version = mark["version"]
         except FileNotFoundError:
             raise OutputError(
                 "there is no lake here",
@@ -106,7 +105,7 @@ class Lake:
 
     @classmethod
     def create(cls, path: Path) -> Lake:
-        """A lake that there is, or a new one in a folder that is new or empty.
+        """Open a lake, or create one in a new or empty folder.
 
         Raises:
             OutputError: The folder holds something else, or cannot be written.
@@ -114,7 +113,11 @@ class Lake:
         if (path / MARK).exists():
             return cls.open(path)
         lake = cls(path)
-        begun = (TABLES_FOLDER, RECORDINGS, f".{MARK}")  # of one killed before it set its mark
+        begun = (
+            TABLES_FOLDER,
+            RECORDINGS,
+            f".{MARK}",
+        )  # left by a process killed before it wrote the mark
         try:
             if path.exists() and any(not p.name.startswith(begun) for p in path.iterdir()):
                 raise OutputError(
@@ -136,14 +139,16 @@ class Lake:
 
     def runs(self) -> list[str]:
         """The keys of all committed runs, sorted."""
-        own = {f.stem for f in self._own_files("runs")}
-        return sorted(own | read_manifest(self.path).runs)
+        unjoined = {f.stem for f in self._unjoined_files("runs")}
+        return sorted(unjoined | read_manifest(self.path).runs)
 
     def snapshot(self) -> LakeSnapshot:
-        """Which runs there are now, and in which files; what comes later is not in it."""
-        own = {f.stem for f in self._own_files("runs")}  # before the manifest: none falls between
+        """The present runs and their files; later changes do not affect it."""
+        unjoined = {
+            f.stem for f in self._unjoined_files("runs")
+        }  # before the manifest, so that no run is missed between the two
         manifest = read_manifest(self.path)
-        loose = own - manifest.runs
+        loose = unjoined - manifest.runs
         return LakeSnapshot(
             self.path,
             manifest.partitions,
@@ -152,7 +157,7 @@ class Lake:
                 table: [
                     self._table_folder(table) / SCHEMA_FILE,
                     *(self._joined_file(part, table) for part in manifest.partitions),
-                    *(f for f in (self._own_files(table) if loose else ()) if f.stem in loose),
+                    *(f for f in (self._unjoined_files(table) if loose else ()) if f.stem in loose),
                 ]
                 for table in TABLES
             },
@@ -161,16 +166,16 @@ class Lake:
     def commit(
         self, tables: RunTables, recording: Recording, inputs: RunInputs, beliefs: bytes = b""
     ) -> bool:
-        """Add a run whole, or nothing of it.
+        """Add a run atomically.
 
         Args:
-            tables: Its rows, as of `run_tables`.
+            tables: Its rows, from `run_tables`.
             recording: Its journal.
-            inputs: The files that it was reasoned with.
-            beliefs: What `BeliefNotes` gives of it, or nothing.
+            inputs: Its input files.
+            beliefs: Content of `BeliefNotes`, or empty.
 
         Returns:
-            Whether it was added; False when it was there already.
+            Whether it was added; False if the lake has it already.
 
         Raises:
             OutputError: It cannot be written, or the journal cannot be read.
@@ -179,10 +184,10 @@ class Lake:
         if self.has(run):
             return False
         try:
-            self._keep(self.folder_of(run), recording, inputs)
+            self._save(self.folder_of(run), recording, inputs)
             if beliefs:
                 write_whole(self.folder_of(run) / BELIEFS, beliefs)
-            for table in sorted(TABLES, key=lambda name: name == "runs"):  # it commits the others
+            for table in sorted(TABLES, key=lambda name: name == "runs"):  # `runs` last: it commits
                 if tables[table]:
                     self._write_table(self.table_file(table, run), table, tables[table])
         except (OSError, sqlite3.Error) as fault:
@@ -190,14 +195,14 @@ class Lake:
         return True
 
     def folder_of(self, run: str) -> Path:
-        """Where the journal of a run is kept, with the files that it was reasoned with."""
+        """The folder with the journal and the input files of a run."""
         return self.path / RECORDINGS / run[:2] / run
 
     def recorded(self, run: str) -> tuple[Recording, WatchSettings]:
-        """The journal of a run, and its settings with the files that are kept beside it.
+        """The journal of a run, and its settings with the saved input files.
 
         Raises:
-            OutputError: They are not there, or damaged.
+            OutputError: They are missing or damaged.
         """
         folder = self.folder_of(run)
         if self.fetch:
@@ -207,11 +212,11 @@ class Lake:
         return recording, with_inputs(settings, folder)
 
     def files(self, table: str) -> list[Path]:
-        """The files of a table, those of runs that are not committed among them."""
+        """The files of a table, including those of uncommitted runs."""
         return sorted(self._table_folder(table).rglob("*.parquet"))
 
     def rows(self, table: str) -> Iterator[Mapping[str, Any]]:
-        """All rows of a table, run by run, by their keys.
+        """All rows of a table, sorted by the keys of their runs.
 
         Raises:
             OutputError: A file is damaged.
@@ -220,19 +225,19 @@ class Lake:
         found = self.snapshot()
         joined = (self._read(self._joined_file(part, table)) for part in found.partitions)
         files = (self.table_file(table, run) for run in found.loose)
-        own = (row for file in files if file.is_file() for row in self._read(file))
-        # Sorting keeps the order of the rows of a run.
+        unjoined = (row for file in files if file.is_file() for row in self._read(file))
+        # Sorting is stable: the rows of a run keep their order.
         parts = (iter(sorted(rows, key=lambda row: str(row["run"]))) for rows in joined)
-        yield from heapq.merge(*parts, own, key=lambda row: str(row["run"]))
+        yield from heapq.merge(*parts, unjoined, key=lambda row: str(row["run"]))
 
     def table_file(self, table: str, run: str) -> Path:
-        """The file of a run's own in a table, where there is one."""
+        """The path of a run's own file of a table."""
         return self._table_folder(table) / run[:2] / f"{run}.parquet"
 
     def _joined_file(self, part: Partition, table: str) -> Path:
         return self.path / FOLDER / part.name / f"{table}.parquet"
 
-    def _own_files(self, table: str) -> Iterator[Path]:
+    def _unjoined_files(self, table: str) -> Iterator[Path]:
         return self._table_folder(table).glob("??/*.parquet")
 
     def _read(self, file: Path) -> list[dict[str, Any]]:
@@ -242,8 +247,8 @@ class Lake:
             )
             return rows
         except (OSError, imported("pyarrow").ArrowInvalid) as fault:
-            what = f"the table cannot be read ({fault})"
-            raise OutputError(what, where=str(file)) from fault
+            message = f"the table cannot be read ({fault})"
+            raise OutputError(message, where=str(file)) from fault
 
     def _table_folder(self, table: str) -> Path:
         return self.path / TABLES_FOLDER / table
@@ -262,7 +267,7 @@ class Lake:
                 arrow.Table.from_arrays(arrays, schema=schema), draft, compression="zstd"
             )
 
-    def _keep(self, folder: Path, recording: Recording, inputs: RunInputs) -> None:
+    def _save(self, folder: Path, recording: Recording, inputs: RunInputs) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in inputs.files().items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -274,7 +279,7 @@ class Lake:
 
 
 def _copy_database(source: Path, target: Path) -> None:
-    """Copy a journal with what its log holds."""
+    """Copy a journal including its write-ahead log."""
     with (
         closing(opened_readonly(source)) as old,
         closing(sqlite3.connect(target)) as new,
@@ -289,9 +294,9 @@ def _seconds(column: tuple[Any, ...]) -> list[int | None]:
 
 
 def _unwritable(path: Path, fault: Exception) -> OutputError:
-    said = getattr(fault, "strerror", None) or str(fault)
+    reason = getattr(fault, "strerror", None) or str(fault)
     return OutputError(
-        f"the lake cannot be written ({said})",
+        f"the lake cannot be written ({reason})",
         where=str(path),
         hint="check that the folder may be written and has room",
     )

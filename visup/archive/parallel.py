@@ -1,4 +1,4 @@
-"""Many runs looked into by several processes, in the order in which they were asked for."""
+"""Maps a function over many runs in several processes, in order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Annotated, TypeVar
 from visup.runs.settings import Option
 
 WORTH_IT = 8
-"""Fewer runs are done before other processes have begun."""
+"""Fewer runs are done before worker processes would have started."""
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 Workers = Annotated[
@@ -23,26 +23,26 @@ Workers = Annotated[
 def each_run(
     work: Callable[[Item], Found], items: Sequence[Item], workers: int | None = None
 ) -> Iterator[Found]:
-    """What is made of each item, in their order.
+    """The result of each item, in order.
 
     Args:
-        work: A function of a module; it is sent to other processes.
-        items: What to do.
-        workers: Processes; None for one for each core, where it is worth it.
+        work: A module-level function, which is pickled.
+        items: Its arguments.
+        workers: Worker processes; None for one per core if there are enough items.
     """
-    wanted = (os.cpu_count() or 1) if workers is None else workers
-    if wanted <= 1 or (workers is None and len(items) < WORTH_IT):
+    count = (os.cpu_count() or 1) if workers is None else workers
+    if count <= 1 or (workers is None and len(items) < WORTH_IT):
         yield from map(work, items)
         return
-    with ProcessPoolExecutor(wanted, get_context("spawn"), _alone) as pool:
+    with ProcessPoolExecutor(count, get_context("spawn"), _single_threaded) as pool:
         try:
             yield from pool.map(work, items)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _alone() -> None:
-    """One thread for each process: the processes share the cores already."""
+def _single_threaded() -> None:
+    """Limit each process to one thread: the processes share the cores already."""
     import cv2
 
     cv2.setNumThreads(1)

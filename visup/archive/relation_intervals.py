@@ -1,7 +1,7 @@
-"""Relations of all pairs, step by step, as the intervals in which they held or were unknown.
+"""Converts the relations of all pairs, step by step, to the intervals in which they held or were unknown.
 
-Everything is done for all pairs at once, since a step of twenty objects has 190 of them: what has changed
-since the step before is found in one comparison, and only that is looked at.
+All pairs are processed at once, since a step of twenty objects has 190 of them: one comparison finds the
+changes since the previous step, and only those are processed further.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from visup.archive.stretches import StepTime, Stretches, stretch_columns
 Floats = NDArray[np.float64]
 Pair = tuple[int, int]
 Row = tuple[Any, ...]
-"""Relation, a, b, truth, the five columns of a stretch, confidence, least, most."""
+"""Relation, a, b, truth, the five columns of an interval, confidence, minimum, maximum."""
 
 
 @dataclass(frozen=True, eq=False)
 class _LayoutRows:
-    """The rows of a layout's states: which names they have, and where their numbers stand."""
+    """The state rows of a layout: their names, and the rows of their numbers."""
 
     layout: ColumnLayout
 
     @cached_property
     def rows(self) -> tuple[tuple[int, bool, tuple[str, ...], int, int], ...]:
-        """State row, whether it is of the turned pair, names, row of confidence, of value or -1."""
+        """State row, whether it is of the reversed pair, names, row of confidence, row of value or -1."""
         return tuple(
             (at, turned == 1, q.names, q.confidence, -1 if q.value is None else q.value)
             for q in self.layout.each
@@ -41,7 +41,7 @@ class _LayoutRows:
         )
 
     def values(self, block: RelationBlock) -> tuple[NDArray[np.int8], Floats, Floats]:
-        """(L, P) states, confidences and values; NaN where there is no value."""
+        """(L, P) states, confidences and values for L rows and P pairs; NaN without a value."""
         state = block.state[[r[0] for r in self.rows]]
         confidence = block.numbers[[r[3] for r in self.rows]]
         confidence = np.where(state == UNKNOWN_CODE, 0.0, confidence)
@@ -52,7 +52,7 @@ class _LayoutRows:
 
 @dataclass(slots=True)
 class _OpenPairs:
-    """What goes on between some pairs: (L, P) each."""
+    """The open intervals of P pairs: (L, P) each."""
 
     pairs: tuple[Pair, ...]
     state: NDArray[np.int8]
@@ -62,7 +62,7 @@ class _OpenPairs:
     most: Floats
 
     def take(self, numbers: list[int], pairs: tuple[Pair, ...]) -> _OpenPairs:
-        """The same of some of its pairs."""
+        """Select some of the pairs."""
         return _OpenPairs(
             pairs,
             self.state[:, numbers],
@@ -74,21 +74,23 @@ class _OpenPairs:
 
 
 class RelationIntervals:
-    """Takes the relations of each step and gives the rows of the table `relations`."""
+    """Collects the relations of each step into the rows of the table `relations`."""
 
     def __init__(self) -> None:
         self._times: list[StepTime] = []
         self._open: dict[int, tuple[_LayoutRows, _OpenPairs]] = {}
-        self._given: Stretches[tuple[str, Pair], tuple[str, float]] = Stretches()
+        self._plugin_stretches: Stretches[tuple[str, Pair], tuple[str, float]] = Stretches()
         self._rows: list[Row] = []
 
     def add(self, at: StepTime, relations: RelationTable | tuple[Relation, ...]) -> None:
-        """Take what holds after one step."""
+        """Add the relations of one step."""
         table = (
             relations if isinstance(relations, RelationTable) else RelationTable(extra=relations)
         )
         self._times.append(at)
-        self._given.add(at, {(r.name, _pair(r)): _told(r) for r in table.extra if _is_kept(r)})
+        self._plugin_stretches.add(
+            at, {(r.name, _pair(r)): _truth_and_value(r) for r in table.extra if _is_binary(r)}
+        )
         pairs = tuple(combinations(table.ids, 2))
         blocks = {id(part.columns): part for part in table.parts}
         for key in [k for k in self._open if k not in blocks]:
@@ -105,7 +107,7 @@ class RelationIntervals:
             last = self._times[-1]
             for layout, held in self._open.values():
                 self._close(layout, held, np.ones(held.state.shape, bool), last, True)
-            for s in self._given.finish(last):
+            for s in self._plugin_stretches.finish(last):
                 (name, pair), (truth, confidence) = s.key, s.value
                 self._rows.append((name, *pair, truth, *s.columns, confidence, None, None))
         self._open = {}
@@ -118,24 +120,24 @@ class RelationIntervals:
         block: RelationBlock,
         pairs: tuple[Pair, ...],
     ) -> _OpenPairs:
-        """What goes on after a step; what it ends becomes rows."""
+        """The open intervals after a step; those that end become rows."""
         state, confidence, value = layout.values(block)
         number = len(self._times) - 1
-        fresh = _OpenPairs(
+        new = _OpenPairs(
             pairs, state, np.full(state.shape, number, np.int64), confidence, value, value
         )
         if held is None:
-            return fresh
+            return new
         if held.pairs != pairs:
-            held, known = self._realigned(layout, held, pairs)
+            held, existed = self._realigned(layout, held, pairs)
         else:
-            known = np.ones(len(pairs), bool)
-        same = (held.state == state) & known
-        self._close(layout, held, ~same & known, self._times[-1], False)
+            existed = np.ones(len(pairs), bool)
+        same = (held.state == state) & existed
+        self._close(layout, held, ~same & existed, self._times[-1], False)
         return _OpenPairs(
             pairs,
             state,
-            np.where(same, held.begin, fresh.begin),
+            np.where(same, held.begin, new.begin),
             np.where(same, np.minimum(held.confidence, confidence), confidence),
             np.where(same, np.fmin(held.least, value), value),
             np.where(same, np.fmax(held.most, value), value),
@@ -144,19 +146,19 @@ class RelationIntervals:
     def _realigned(
         self, layout: _LayoutRows, held: _OpenPairs, pairs: tuple[Pair, ...]
     ) -> tuple[_OpenPairs, NDArray[np.bool_]]:
-        """The same of other pairs, and which of them were there; those that have gone are closed."""
+        """Realign to other pairs; returns which existed before. Those of missing pairs are closed."""
         place = {pair: k for k, pair in enumerate(held.pairs)}
-        wanted = set(pairs)
-        gone = np.array([p not in wanted for p in held.pairs], bool)
-        ended = np.broadcast_to(gone, held.state.shape)
+        current = set(pairs)
+        missing = np.array([p not in current for p in held.pairs], bool)
+        ended = np.broadcast_to(missing, held.state.shape)
         self._close(layout, held, ended, self._times[-1], False)
-        known = np.array([p in place for p in pairs], bool)
-        if not held.pairs:  # nobody to take the place of those who were not there
+        existed = np.array([p in place for p in pairs], bool)
+        if not held.pairs:  # no previous pairs to realign
             rows = len(layout.rows)
-            nobody = np.zeros((rows, len(pairs)))
-            none = nobody.astype(np.int64)
-            return _OpenPairs(pairs, none.astype(np.int8), none, nobody, nobody, nobody), known
-        return held.take([place.get(p, 0) for p in pairs], pairs), known
+            zeros = np.zeros((rows, len(pairs)))
+            none = zeros.astype(np.int64)
+            return _OpenPairs(pairs, none.astype(np.int8), none, zeros, zeros, zeros), existed
+        return held.take([place.get(p, 0) for p in pairs], pairs), existed
 
     def _close(
         self,
@@ -164,23 +166,23 @@ class RelationIntervals:
         held: _OpenPairs,
         ended: NDArray[np.bool_],
         at: StepTime,
-        still: bool,
+        open_end: bool,
     ) -> None:
         for line, k in zip(*(n.tolist() for n in np.nonzero(ended)), strict=True):
             _, turned, names, _, _ = layout.rows[line]
             pair = held.pairs[k][::-1] if turned else held.pairs[k]
-            stretch = stretch_columns(self._times[int(held.begin[line, k])], at, still)
+            stretch = stretch_columns(self._times[int(held.begin[line, k])], at, open_end)
             numbers = (
                 round(float(held.confidence[line, k]), 6),
                 _number(held.least[line, k]),
                 _number(held.most[line, k]),
             )
-            for name, truth in _named(names, int(held.state[line, k])):
+            for name, truth in _names_of_state(names, int(held.state[line, k])):
                 self._rows.append((name, *pair, truth, *stretch, *numbers))
 
 
-def _named(names: tuple[str, ...], code: int) -> Iterator[tuple[str, str]]:
-    """The relations that a state tells of: the one that holds, or all that are unknown."""
+def _names_of_state(names: tuple[str, ...], code: int) -> Iterator[tuple[str, str]]:
+    """The relations of a state code: the one that holds, or all that are unknown."""
     if code == UNKNOWN_CODE:
         yield from ((name, Truth.UNKNOWN.value) for name in names if name)
     elif names[code]:
@@ -191,8 +193,8 @@ def _number(value: np.float64) -> float | None:
     return None if np.isnan(value) else round(float(value), 6)
 
 
-def _is_kept(r: Relation) -> bool:
-    """Relations of plug-ins are kept where they are of two objects."""
+def _is_binary(r: Relation) -> bool:
+    """Whether a plug-in's relation is recorded: only relations of two objects are."""
     return len(r.objects) == 2 and r.truth is not Truth.FALSE
 
 
@@ -200,5 +202,5 @@ def _pair(r: Relation) -> Pair:
     return r.objects[0], r.objects[1]
 
 
-def _told(r: Relation) -> tuple[str, float]:
+def _truth_and_value(r: Relation) -> tuple[str, float]:
     return r.truth.value, round(0.0 if r.truth is Truth.UNKNOWN else r.confidence, 2)

@@ -1,4 +1,4 @@
-"""Other rules and tasks on the past: what they would have changed, run by run."""
+"""Replays recorded runs with other rules and tasks, and reports what they would have changed."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ ALERT = "alert"
 
 @dataclass(frozen=True, slots=True)
 class RunChanges:
-    """What changes of a run.
+    """The changes in a run.
 
     Attributes:
         run: Its key.
-        clip: What was watched.
-        folder: Where it can be opened.
-        diff: What is told otherwise.
+        clip: Its source.
+        folder: Its folder.
+        diff: Difference of the transcripts.
     """
 
     run: str
@@ -40,23 +40,23 @@ class RunChanges:
 
     @property
     def alerts(self) -> tuple[Mapping[str, int], Mapping[str, int]]:
-        """How many alerts of each kind are lost, and gained; another number makes no other alert."""
-        gone, new = _alerts(self.diff.gone), _alerts(self.diff.new)
-        return Counter(k for k, *_ in (gone - new).elements()), Counter(
-            k for k, *_ in (new - gone).elements()
+        """Counts of lost and gained alerts by kind; a changed number alone makes no different alert."""
+        lost, new = _alerts(self.diff.gone), _alerts(self.diff.new)
+        return Counter(k for k, *_ in (lost - new).elements()), Counter(
+            k for k, *_ in (new - lost).elements()
         )
 
 
 @dataclass(slots=True)
 class ChangeSummary:
-    """What changes in all runs.
+    """The changes in all runs.
 
     Attributes:
-        runs: How many were looked into.
-        changed: How many of them tell anything otherwise.
-        lost: Kind of alert -> how many are no longer raised.
-        gained: Kind of alert -> how many are raised that were not.
-        verdicts: (before, after) -> runs whose verdict changes so.
+        runs: Number of runs replayed.
+        changed: Number of runs with any difference.
+        lost: Kind of alert -> count of alerts no longer raised.
+        gained: Kind of alert -> count of new alerts.
+        verdicts: (before, after) -> number of runs.
     """
 
     runs: int = 0
@@ -66,7 +66,7 @@ class ChangeSummary:
     verdicts: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def take(self, changes: RunChanges) -> None:
-        """Count one run."""
+        """Add one run."""
         self.runs += 1
         self.changed += bool(changes.diff)
         lost, gained = changes.alerts
@@ -88,27 +88,27 @@ class ChangeSummary:
 def changes(
     lake: Lake, runs: Iterable[str], workers: int | None = 0, **changed: Any
 ) -> Iterator[RunChanges]:
-    """Reason again about runs of a lake, with other settings.
+    """Replay the reasoning of runs with other settings.
 
     Args:
         lake: The lake.
-        runs: Their keys.
-        workers: Processes that share them; None for one for each core.
-        changed: Tasks, rules, actors or zones, as of `changed_settings`.
+        runs: Keys of the runs.
+        workers: Worker processes; None for one per core.
+        changed: Tasks, rules, actors or zones, as in `changed_settings`.
 
     Yields:
-        What changes of each run; also of those of which nothing does.
+        The changes in each run, including runs without any.
 
     Raises:
-        VisupError: A run is damaged, or a file is not as it should be.
+        VisupError: A run is damaged, or a file is not valid.
     """
     yield from each_run(partial(_run_changes, lake, changed), list(runs), workers)
 
 
 def _run_changes(lake: Lake, changed: Mapping[str, Any], run: str) -> RunChanges:
     recording, settings = lake.recorded(run)
-    told = replay(recording, changed_settings(settings, **changed))
-    diff = transcript_diff(recorded_transcript(recording), told)
+    replayed = replay(recording, changed_settings(settings, **changed))
+    diff = transcript_diff(recorded_transcript(recording), replayed)
     return RunChanges(run, settings.source, lake.folder_of(run), diff)
 
 

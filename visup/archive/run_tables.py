@@ -1,7 +1,7 @@
-"""From a finished run's journal to the rows of all tables of a lake: one function, always the same rows.
+"""Converts the journal of a finished run to the rows of all tables of a lake, deterministically.
 
-Events, alerts and the verdict are those that were told. Relations, the stages' probabilities and identities
-are not in a journal: the run is reasoned about again, which gives exactly what was believed then.
+Events, alerts and the verdict are taken from the journal. Relations, stage probabilities and identities are
+not in it: the reasoning is replayed, which reproduces the beliefs of the run exactly.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from visup.runs.settings import WatchSettings
 
 Rows = list[tuple[Any, ...]]
 RunTables = Mapping[str, Rows]
-"""Table -> rows, in the order of its columns."""
+"""Table -> rows in column order."""
 
 PERCEPT_BUCKET_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a run comes from.
+    """The provenance of a run.
 
     Attributes:
         run: Its key in the lake.
-        source_hash: SHA-256 of the content of what was watched.
+        source_hash: SHA-256 of the content of the source.
         settings_hash: SHA-256 of the settings.
-        taken: When the video was made, seconds since the epoch, or None.
-        labels: What the manifest says of the clip.
+        taken: When the video was recorded, seconds since the epoch, or None.
+        labels: Manifest labels of the clip.
     """
 
     run: str
@@ -58,12 +58,12 @@ def run_tables(
 
     Args:
         recording: Its journal; the run has ended.
-        settings: Those of the run; see `with_inputs` for one whose files have moved.
-        given: Where it comes from.
-        also: Told of each step, too.
+        settings: Settings of the run; see `with_inputs` for one whose files have moved.
+        given: Its provenance.
+        also: Receives each step, too.
 
     Returns:
-        The rows of every table of `TABLES`, in an order that depends on nothing but the run.
+        The rows of every table of `TABLES`, in an order that depends only on the run.
 
     Raises:
         VisupError: The run has not ended, or its journal is damaged.
@@ -97,8 +97,8 @@ def run_tables(
 
 
 @dataclass(slots=True)
-class _ObjectLife:
-    """What is known of an object so far."""
+class _ObjectRecord:
+    """The accumulated record of an object."""
 
     belief: ObjectBelief
     first: tuple[float, float]
@@ -128,7 +128,7 @@ class _ObjectLife:
 
 
 class StepTables:
-    """Takes the steps of a run and gives the rows of those tables that follow from them."""
+    """Collects the steps of a run into the rows of the tables derived from them."""
 
     def __init__(self) -> None:
         self.last: StepTime | None = None
@@ -137,11 +137,11 @@ class StepTables:
         self._tasks: Stretches[str, tuple[Any, ...]] = Stretches()
         self._stages: Stretches[tuple[str, str], tuple[Any, ...]] = Stretches()
         self._health: Stretches[str, str] = Stretches()
-        self._objects: dict[int, _ObjectLife] = {}
+        self._objects: dict[int, _ObjectRecord] = {}
         self._percepts: dict[tuple[str, str, float], list[float]] = {}
 
     def add(self, step: Step) -> None:
-        """Take one step."""
+        """Add one step."""
         mind = step.mind
         at = StepTime(self.last.number + 1 if self.last else 0, step.frame_index, step.time)
         self.last, self.size = at, mind.frame_size
@@ -154,10 +154,10 @@ class StepTables:
         self._add_percepts(step.observation)
 
     def finish(self) -> dict[str, Rows]:
-        """The rows of all these tables, without the run."""
+        """The rows of all these tables, without the run column."""
         last = self.last or StepTime(0, 0, 0.0)
         return {
-            "objects": [life.row() for _, life in sorted(self._objects.items())],
+            "objects": [record.row() for _, record in sorted(self._objects.items())],
             "tasks": sorted(
                 ((s.key, *s.value, *s.columns) for s in self._tasks.finish(last)), key=_by_begin(5)
             ),
@@ -178,15 +178,16 @@ class StepTables:
     def _add_objects(self, mind: Mind) -> None:
         playing = [(b.actor, b.object_id) for t in mind.tasks for b in t.bindings if b.object_id]
         for number, belief in mind.objects.items():
-            life = self._objects.setdefault(
-                number, _ObjectLife(belief, (belief.region.centroid[0], belief.region.centroid[1]))
+            record = self._objects.setdefault(
+                number,
+                _ObjectRecord(belief, (belief.region.centroid[0], belief.region.centroid[1])),
             )
-            life.belief = belief
-            life.names.add(belief.name)
-            life.actors |= {actor for actor, played in playing if played == number}
+            record.belief = belief
+            record.names.add(belief.name)
+            record.actors |= {actor for actor, played in playing if played == number}
             if belief.presence is Presence.SEEN:
-                life.seen_steps += 1
-                life.area += float(belief.region.area)
+                record.seen_steps += 1
+                record.area += float(belief.region.area)
 
     def _add_percepts(self, observation: Observation) -> None:
         begin = observation.time // PERCEPT_BUCKET_S * PERCEPT_BUCKET_S

@@ -1,4 +1,4 @@
-"""The tables of a lake: what each column holds. Stable: a change of it is a new `SCHEMA_VERSION`."""
+"""The schema of the tables of a lake. It is stable: any change needs a new `SCHEMA_VERSION`."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class LakeColumn:
 
 @dataclass(frozen=True, slots=True)
 class LakeTable:
-    """A data set of a lake.
+    """A table of a lake.
 
     Attributes:
-        name: Its name; also that of its folder.
+        name: Its name and that of its folder.
         meaning: What a row is, a phrase.
-        columns: In order; the first is always `run`.
+        columns: Columns in order; the first is always `run`.
     """
 
     name: str
@@ -71,15 +71,15 @@ _PLAIN = {"string": "string", "int64": "int64", "float64": "float64", "bool": "b
 
 def _table(name: str, meaning: str, *columns: str) -> LakeTable:
     """A table from lines `name kind: meaning`."""
-    made = [LakeColumn("run", "string", "the run")] if name != "runs" else []
+    fields = [LakeColumn("run", "string", "the run")] if name != "runs" else []
     for line in columns:
-        head, _, told = line.partition(": ")
+        head, _, description = line.partition(": ")
         column, kind = head.split()
-        made.append(LakeColumn(column, kind, told))
-    return LakeTable(name, meaning, tuple(made))
+        fields.append(LakeColumn(column, kind, description))
+    return LakeTable(name, meaning, tuple(fields))
 
 
-_STRETCH = (
+_INTERVAL_COLUMNS = (
     "begin float64: time of the first step at which it was so, s",
     "end float64: time of the first step at which it was not; of what was open, of the last step, s",
     "first_frame int64: number of the first frame",
@@ -164,7 +164,7 @@ TASKS = _table(
     "stage string: the stage under way, or null",
     "confidence float64: of the verdict, 0 to 1, to two digits",
     "success float64: probability that it still ends well, to two digits; null when not followed",
-    *_STRETCH,
+    *_INTERVAL_COLUMNS,
 )
 STAGES = _table(
     "stages",
@@ -173,7 +173,7 @@ STAGES = _table(
     "stage string: its name",
     "status string: pending, active, progressing, paused, stalled, failing, failed, done or unknown",
     "confidence float64: how likely it has this status, 0 to 1, to two digits",
-    *_STRETCH,
+    *_INTERVAL_COLUMNS,
 )
 RELATIONS = _table(
     "relations",
@@ -182,7 +182,7 @@ RELATIONS = _table(
     "a int64: the one object",
     "b int64: the other; where order does not matter, a < b",
     "truth string: true or unknown; what is neither is false while both are there",
-    *_STRETCH,
+    *_INTERVAL_COLUMNS,
     "confidence float64: lowest of the stretch, 0 to 1",
     "least float64: lowest value of what is behind it: px/s of the trend and of moving_together, px of "
     "touching and of distances; null without",
@@ -203,7 +203,7 @@ HEALTH = _table(
     "a stretch in which the image, or what is perceived, was in a state",
     "about string: 'image', or a kind of percept",
     "state string: of the image ok, dark, frozen, ...; of a kind of percept, unknown",
-    *_STRETCH,
+    *_INTERVAL_COLUMNS,
 )
 
 TABLES: Mapping[str, LakeTable] = MappingProxyType(
@@ -213,7 +213,7 @@ TABLES: Mapping[str, LakeTable] = MappingProxyType(
 
 
 def schema_text() -> str:
-    """All tables in Markdown, as they stand in `docs/archives.md`."""
+    """All tables in Markdown, as in `docs/archives.md`."""
     blocks = []
     for table in TABLES.values():
         rows = [f"| `{c.name}` | {c.kind} | {c.meaning} |" for c in table.columns]

@@ -1,4 +1,4 @@
-"""Stretches: from values step by step to how long each of them stood."""
+"""Stretches: run-length encoding of values over steps."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Value = TypeVar("Value", bound=Hashable)
 
 @dataclass(frozen=True, slots=True)
 class StepTime:
-    """When a step was.
+    """The time of a step.
 
     Attributes:
-        number: Its place among the steps, from 0.
+        number: Its index, from 0.
         frame: Number of its frame.
         time: Seconds.
     """
@@ -27,14 +27,14 @@ class StepTime:
 
 @dataclass(frozen=True, slots=True)
 class Stretch(Generic[Key, Value]):
-    """A time in which something had one value.
+    """An interval in which a key had one value.
 
     Attributes:
-        key: What had it.
+        key: The key.
         value: The value.
-        begin: First step at which it had it.
-        end: First step at which it had it no more; the last step of the run, where `open`.
-        open: Whether it still had it when the run ended.
+        begin: First step with the value.
+        end: First step without it; the last step of the run if `open`.
+        open: Whether the run ended meanwhile.
     """
 
     key: Key
@@ -45,30 +45,36 @@ class Stretch(Generic[Key, Value]):
 
     @property
     def columns(self) -> tuple[float, float, int, int, bool]:
-        """Begin, end, first frame, number of steps, open: as they stand in the tables of a lake."""
+        """Begin, end, first frame, number of steps, open: the columns of the tables of a lake."""
         return stretch_columns(self.begin, self.end, self.open)
 
 
 def stretch_columns(
-    begin: StepTime, end: StepTime, still: bool
+    begin: StepTime, end: StepTime, open_stretches: bool
 ) -> tuple[float, float, int, int, bool]:
-    """Begin, end, first frame, number of steps, open: as they stand in the tables of a lake."""
-    return begin.time, end.time, begin.frame, end.number - begin.number + still, still
+    """Begin, end, first frame, number of steps, open: the columns of the tables of a lake."""
+    return (
+        begin.time,
+        end.time,
+        begin.frame,
+        end.number - begin.number + open_stretches,
+        open_stretches,
+    )
 
 
 @dataclass(slots=True)
 class Stretches(Generic[Key, Value]):
-    """Takes values step by step and gives the stretches in which each stood.
+    """Collects values step by step into stretches.
 
     Attributes:
-        closed: Those that are over.
+        closed: The finished stretches.
     """
 
     closed: list[Stretch[Key, Value]] = field(default_factory=list)
     _open: dict[Key, tuple[Value, StepTime]] = field(default_factory=dict)
 
     def add(self, at: StepTime, values: Mapping[Key, Value]) -> None:
-        """Take the values of one step; a key that is not among them has none."""
+        """Add the values of one step; a key that is missing has none."""
         for key, (value, begin) in list(self._open.items()):
             if values.get(key) != value:
                 self.closed.append(Stretch(key, value, begin, at, False))
@@ -78,6 +84,6 @@ class Stretches(Generic[Key, Value]):
                 self._open[key] = value, at
 
     def finish(self, last: StepTime) -> list[Stretch[Key, Value]]:
-        """All stretches, those that are open at the last step last."""
-        still = [Stretch(k, v, begin, last, True) for k, (v, begin) in self._open.items()]
-        return [*self.closed, *still]
+        """All stretches, the open ones last."""
+        open_stretches = [Stretch(k, v, begin, last, True) for k, (v, begin) in self._open.items()]
+        return [*self.closed, *open_stretches]

@@ -1,5 +1,5 @@
-"""Questions to a lake.
+"""SQL queries over a lake.
 
-Read `views.py` (the tables as people ask for them), `database.py` (SQL over them that reads the lake and does
-nothing else), `examples.py` (questions to begin with) and `answers.py` (answers as text and files).
+Read `views.py` (the tables for queries), `database.py` (read-only SQL over them), `examples.py` (example
+queries) and `answers.py` (results as text and files).
 """

@@ -1,4 +1,4 @@
-"""Answers to questions: as CSV, JSON and Parquet, the same values in each."""
+"""Query results as CSV, JSON and Parquet, with the same values in each."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def cell(value: Any) -> str:
-    """A value as it stands in a table or in CSV; nothing where it is null."""
+    """A value as text for a table or CSV; empty for null."""
     if value is None:
         return ""
     if isinstance(value, float):
@@ -31,7 +31,7 @@ def cell(value: Any) -> str:
 
 
 def as_csv(table: pa.Table) -> str:
-    """An answer as CSV, with a head."""
+    """A result as CSV with a header."""
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(table.column_names)
@@ -42,12 +42,12 @@ def as_csv(table: pa.Table) -> str:
 
 
 def as_json(table: pa.Table) -> str:
-    """An answer as a JSON list of objects."""
+    """A result as a JSON list of objects."""
     return json.dumps(answer_rows(table), ensure_ascii=False) + "\n"
 
 
 def answer_rows(table: pa.Table) -> list[dict[str, Any]]:
-    """The rows of an answer as JSON-like values."""
+    """The rows of a result as JSON-like values."""
     return [_plain(row) for row in table.to_pylist()]
 
 
@@ -56,25 +56,25 @@ FORMATS = ("table", *TEXTS, "parquet")
 
 
 def format_of(form: str | None, out: Path | None) -> str:
-    """The format that is wanted: the one that is named, else that of the file's ending, else a table.
+    """The format: the one named, else that of the file's suffix, else a table.
 
     Raises:
-        SettingsError: There is no such format, or none without a file.
+        SettingsError: The format does not exist, or it needs a file.
     """
-    wanted = form or (out.suffix.removeprefix(".").lower() if out else "table")
-    if wanted not in FORMATS:
+    format_name = form or (out.suffix.removeprefix(".").lower() if out else "table")
+    if format_name not in FORMATS:
         raise SettingsError(
-            f"there is no format '{wanted}'", expected=f"one of: {', '.join(FORMATS)}"
+            f"there is no format '{format_name}'", expected=f"one of: {', '.join(FORMATS)}"
         )
-    if wanted == "parquet" and out is None:
+    if format_name == "parquet" and out is None:
         raise SettingsError("Parquet is written to a file", hint="add --out FILE.parquet")
-    if wanted == "table" and out is not None:
+    if format_name == "table" and out is not None:
         raise SettingsError("a table is shown, not written", hint="choose --format csv")
-    return wanted
+    return format_name
 
 
 def write_answer(table: pa.Table, form: str, out: Path) -> None:
-    """Write an answer to a file, whole or not at all.
+    """Write a result to a file atomically.
 
     Raises:
         OutputError: It cannot be written.
@@ -86,8 +86,8 @@ def write_answer(table: pa.Table, form: str, out: Path) -> None:
         with replacing(out) as draft:
             imported("pyarrow.parquet").write_table(table, draft)
     except OSError as fault:
-        what = f"the file cannot be written ({fault.strerror})"
-        raise OutputError(what, where=str(out)) from fault
+        message = f"the file cannot be written ({fault.strerror})"
+        raise OutputError(message, where=str(out)) from fault
 
 
 def _plain(value: Any) -> Any:
@@ -95,7 +95,7 @@ def _plain(value: Any) -> Any:
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list):
         return [_plain(v) for v in value]
-    if isinstance(value, tuple):  # a pair of a map
+    if isinstance(value, tuple):  # an entry of a map
         return [_plain(v) for v in value]
     if isinstance(value, datetime | date):
         return value.isoformat()

@@ -1,7 +1,7 @@
-"""SQL over a lake that reads the lake and does nothing else.
+"""Read-only SQL over a lake.
 
-DuckDB is let into the folder of the tables and no other, its settings are locked, and only statements that
-read are taken: a question can neither read another file, nor write one, nor reach the network.
+DuckDB may access only the folder of the tables, its settings are locked, and only SELECT statements are
+accepted: a query can neither read other files, nor write any, nor reach the network.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ MEMORY_GB = 2.0
 
 
 class QueryError(VisupError):
-    """A question to a lake cannot be answered as it is put."""
+    """A query to a lake cannot be answered."""
 
 
 @dataclass(frozen=True, slots=True)
 class LakeDatabase:
-    """A lake that can be asked.
+    """A lake that can be queried.
 
     Attributes:
-        connection: Of DuckDB, locked.
+        connection: The locked DuckDB connection.
     """
 
     connection: Any
 
     def ask(self, sql: str) -> pa.Table:
-        """The answer to one SELECT.
+        """The result of one SELECT.
 
         Raises:
-            QueryError: It is none, or cannot be answered.
+            QueryError: It is not a single SELECT, or cannot be answered.
         """
         duckdb = imported("duckdb")
         try:
@@ -53,7 +53,7 @@ class LakeDatabase:
                     else "the query is empty",
                     expected="one SELECT",
                 )
-            # Not EXPLAIN either: EXPLAIN ANALYZE runs what it explains.
+            # EXPLAIN is refused too: EXPLAIN ANALYZE runs the statement.
             if statements[0].type != duckdb.StatementType.SELECT:
                 raise QueryError(
                     f"a lake is only read, and this is {statements[0].type.name}",
@@ -61,7 +61,7 @@ class LakeDatabase:
                 )
             return self.connection.sql(sql).to_arrow_table()
         except duckdb.Error as fault:
-            raise _told(fault) from fault
+            raise _query_error(fault) from fault
 
 
 @contextmanager
@@ -70,7 +70,7 @@ def open_database(lake: Lake, memory_gb: float = MEMORY_GB) -> Iterator[LakeData
 
     Args:
         lake: The lake.
-        memory_gb: What a question may take.
+        memory_gb: Memory limit of a query, gigabytes.
 
     Raises:
         QueryError: The tables cannot be read.
@@ -104,7 +104,7 @@ def open_database(lake: Lake, memory_gb: float = MEMORY_GB) -> Iterator[LakeData
 
 
 def _number_runs(connection: Any, found: LakeSnapshot) -> None:
-    """Make the table of runs with their numbers in the index."""
+    """Create the table of runs with their numbers in the index."""
     arrow = imported("pyarrow")
     parts = [
         arrow.table(
@@ -122,8 +122,8 @@ def _number_runs(connection: Any, found: LakeSnapshot) -> None:
     connection.unregister("numbered")
 
 
-def _told(fault: Exception) -> QueryError:
-    """What DuckDB says, as visup says it."""
+def _query_error(fault: Exception) -> QueryError:
+    """A DuckDB error as a `QueryError`."""
     kind, name = str(fault).partition(": ")[::2], type(fault).__name__
     text = kind[1].strip() or str(fault)
     hints = {

@@ -1,4 +1,4 @@
-"""Fifteen questions to begin with."""
+"""Fifteen example queries."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ExampleQuestion:
-    """A question to a lake.
+    """An example query.
 
     Attributes:
-        words: In English.
-        sql: The same, as `visup query` takes it.
+        words: The question in English.
+        sql: The query for `visup query`.
     """
 
     words: str

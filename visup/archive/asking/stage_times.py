@@ -1,17 +1,17 @@
-"""The times in which a stage had one status: from the stretches of several probabilities, joined."""
+"""The intervals in which a stage had one status, merged from the intervals of its probabilities."""
 
 from __future__ import annotations
 
 CLIP = "regexp_replace(rtrim(r.source, '/\\'), '.*[/\\\\]', '') AS clip"
-"""The name of the clip, of a row `r` of `runs`."""
+"""The file name of the clip of a row `r` of `runs`."""
 
 
 def stage_times(runs: str, stages: str) -> str:
-    """The SELECT that joins the stretches of stages.
+    """The SELECT that merges the intervals of stages.
 
     Args:
-        runs: What gives rows of the table `runs`.
-        stages: What gives rows of the table `stages`.
+        runs: Table expression with rows of `runs`.
+        stages: Table expression with rows of `stages`.
     """
     return f"""
         SELECT s.run, {CLIP}, s.task, s.stage, s.status,

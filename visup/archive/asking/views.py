@@ -1,8 +1,8 @@
-"""The tables of a lake as people ask for them: with the clip's name, the objects' names and durations.
+"""The views of a lake for queries: its tables with clip names, object names and durations.
 
-The tables as they stand in the files are in the schema `lake` (`lake.stages`, ...); these views are what a
-plain name means. Only rows of committed runs are in either. The schema `lake_index` is for visup itself: what
-the partitions hold beside the tables, and the same of runs that are not joined yet.
+The tables of the files are in the schema `lake` (`lake.stages`, ...); unqualified names mean these views.
+Both have rows of committed runs only. The schema `lake_index` is internal: the indexes of the partitions, and
+the same for runs that are not in a partition yet.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from visup.rules.predicates.snapshot import RELATION_NAMES
 if TYPE_CHECKING:
     from visup.archive.lake import LakeSnapshot
 
-_STRETCH = 't."begin", t."end", t."end" - t."begin" AS seconds, t.open'
-_WHO = "list_transform(t.objects, lambda i: coalesce(n.names[i], 'object ' || i)) AS who"
+_INTERVAL = 't."begin", t."end", t."end" - t."begin" AS seconds, t.open'
+_OBJECT_NAMES = "list_transform(t.objects, lambda i: coalesce(n.names[i], 'object ' || i)) AS who"
 _NAMES = (
     " LEFT JOIN (SELECT run, map(list(object), list(name)) AS names FROM lake.objects GROUP BY run) n"
     " USING (run)"
@@ -41,18 +41,18 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "events": (
             "something that happened, with `who`: the names of the objects",
-            f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run), " + _WHO + ""
+            f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run), " + _OBJECT_NAMES + ""
             " FROM lake.events t JOIN lake.runs r USING (run)" + _NAMES,
         ),
         "alerts": (
             "an alert, with `who`, and `seconds` that it was open",
-            f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run), " + _WHO + ","
+            f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run), " + _OBJECT_NAMES + ","
             " coalesce(t.closed, r.seconds) - t.opened AS seconds"
             " FROM lake.alerts t JOIN lake.runs r USING (run)" + _NAMES,
         ),
         "tasks": (
             "a stretch in which a task stood as it did",
-            f"SELECT t.run, {_CLIP}, t.task, t.verdict, t.stage, t.confidence, t.success, {_STRETCH}"
+            f"SELECT t.run, {_CLIP}, t.task, t.verdict, t.stage, t.confidence, t.success, {_INTERVAL}"
             " FROM lake.tasks t JOIN lake.runs r USING (run)",
         ),
         "stages": (
@@ -64,7 +64,7 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
             "a time in which a relation held (`truth` true) or was unknown, with the names `first` and"
             " `second`",
             f"SELECT t.run, {_CLIP}, t.relation, t.a, t.b, x.name AS first, y.name AS second, t.truth,"
-            f" {_STRETCH}, t.confidence, t.least, t.most"
+            f" {_INTERVAL}, t.confidence, t.least, t.most"
             " FROM lake.relations t JOIN lake.runs r USING (run)"
             " LEFT JOIN lake.objects x ON x.run = t.run AND x.object = t.a"
             " LEFT JOIN lake.objects y ON y.run = t.run AND y.object = t.b",
@@ -75,24 +75,24 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "health": (
             "a time in which the image, or what is perceived, was in a state",
-            f"SELECT t.run, {_CLIP}, t.about, t.state, {_STRETCH}"
+            f"SELECT t.run, {_CLIP}, t.about, t.state, {_INTERVAL}"
             " FROM lake.health t JOIN lake.runs r USING (run)",
         ),
     }
 )
-"""Name -> what a row is, and its SELECT."""
+"""Name -> meaning of a row, and the SELECT."""
 
 RELATIONS = tuple(sorted({*RELATION_NAMES, "distance"} - {*VIEWS}))
-"""Each relation is a view of its own: the times in which it held."""
+"""Each relation is a view of its own: the intervals in which it held."""
 
 
-_OWN = "SELECT * FROM read_parquet({files}) SEMI JOIN lake_index.own USING (run)"
-"""The rows of runs that are not joined."""
-_HELD = (
+_UNJOINED_ROWS = "SELECT * FROM read_parquet({files}) SEMI JOIN lake_index.own USING (run)"
+"""The rows of runs that are not in a partition."""
+_UNJOINED_HELD = (
     'SELECT o.number, t.relation, t.a, t.b, t."begin", t."end" FROM lake_index.own_relations t'
     " JOIN lake_index.own o USING (run) WHERE t.truth = 'true'"
 )
-_MEANT = """
+_UNJOINED_MEANT = """
     SELECT unnest(list_distinct(t.names || t.actors ||
                list_filter(map_keys(r.cast_of), lambda k: list_has_any(t.names, r.cast_of[k])))) AS name,
            o.number, t.object
@@ -103,20 +103,24 @@ _MEANT = """
 
 
 def definitions(found: LakeSnapshot) -> Iterator[str]:
-    """The statements that make all views; the table `lake_index.runs` (run, number, own) is there.
+    """The statements that create all views; the table `lake_index.runs` (run, number, own) must exist.
 
     Args:
-        found: What the lake holds.
+        found: Snapshot of the lake.
     """
     yield "CREATE SCHEMA lake"
     yield "CREATE VIEW lake_index.own AS SELECT run, number FROM lake_index.runs WHERE own"
     for name in TABLES:
         yield f"CREATE VIEW lake.{name} AS SELECT * FROM read_parquet({_files(found.files[name])})"
-        own = [f for f in found.files[name] if f.parent.parent.name == name]
-        rows = _OWN.format(files=_files([*own, found.files[name][0]]))
+        unjoined_files = [f for f in found.files[name] if f.parent.parent.name == name]
+        rows = _UNJOINED_ROWS.format(files=_files([*unjoined_files, found.files[name][0]]))
         yield f"CREATE VIEW lake_index.own_{name} AS {rows}"
-    own_stages = f"({stage_times('lake_index.own_runs', 'lake_index.own_stages')})"
-    for name, rows in (("held", _HELD), ("meant", _MEANT), ("stage_times", own_stages)):
+    unjoined_stages = f"({stage_times('lake_index.own_runs', 'lake_index.own_stages')})"
+    for name, rows in (
+        ("held", _UNJOINED_HELD),
+        ("meant", _UNJOINED_MEANT),
+        ("stage_times", unjoined_stages),
+    ):
         joined = found.index_files(name)
         both = f"SELECT * FROM read_parquet({_files(joined)}) UNION ALL ({rows})"
         yield f"CREATE VIEW lake_index.{name} AS {both if joined else rows}"
@@ -130,15 +134,15 @@ def definitions(found: LakeSnapshot) -> Iterator[str]:
 
 
 def quoted(text: str) -> str:
-    """A text as SQL writes it."""
+    """A text as an SQL literal."""
     return "'" + text.replace("'", "''") + "'"
 
 
 def _files(paths: Sequence[Path]) -> str:
-    """Files as DuckDB reads them, whatever they are called."""
+    """A list of files for DuckDB, with special characters escaped."""
     return f"[{', '.join(quoted(escaped(path.absolute())) for path in paths)}]"
 
 
 def escaped(path: Path) -> str:
-    """A path as it stands in a pattern."""
+    """A path with glob characters escaped."""
     return "".join(f"[{c}]" if c in "*?[" else c for c in str(path))

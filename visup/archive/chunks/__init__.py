@@ -1,6 +1,6 @@
-"""Long videos in chunks that are watched beside each other, and stitched to one run.
+"""Long videos are processed in parallel chunks, which are stitched to one run.
 
-Read `spans.py` (where a video is cut), `region_matching.py` (who is who in two chunks), `seams.py` (where
-one recording ends and the next begins) with `extending.py`, then `stitching.py` (what all of them perceived
-as one recording, about which a mind reasons from beginning to end).
+Read `spans.py` (where a video is cut), `region_matching.py` (which regions of two chunks are the same),
+`seams.py` (where to pass from one recording to the next) with `extending.py`, then `stitching.py` (the
+observations of all chunks as one recording, over which reasoning runs from beginning to end).
 """

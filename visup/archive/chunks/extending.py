@@ -1,4 +1,4 @@
-"""A chunk that is watched on beyond its end, from the state in which it ended."""
+"""Continues a chunk beyond its end from its last state."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from visup.runs.runner import supervise
 from visup.runs.settings import RunOptions, WatchSettings
 
 KEEP_LAST_STATE = math.inf
-"""Seconds between states: none but the last."""
+"""Seconds between saved states: only the last is saved."""
 
 
 def chunk_options(begin: int, end: int | None) -> RunOptions:
-    """How a chunk is recorded: its journal alone, and its last state, from which it can go on."""
+    """How a chunk is recorded: only its journal, and its last state, from which it can be continued."""
     return RunOptions(video=False, report=False, state_every_s=KEEP_LAST_STATE, span=(begin, end))
 
 
 def extend_chunk(settings: WatchSettings, chunk: Recording, end: int) -> None:
-    """Watch a chunk on.
+    """Continue a chunk.
 
     Args:
-        settings: Those of the run: whatever code of the user's own it has is named by them.
-        chunk: Its recording, which grows.
-        end: The first frame that it no longer looks at.
+        settings: Settings of the run, which name any code of the user.
+        chunk: Its recording, which is appended to.
+        end: The frame before which it stops.
 
     Raises:
-        VisupError: It cannot be watched on.
+        VisupError: It cannot be continued.
     """
     folder, ends = chunk.path.parent, chunk.first_and_last()
     past = interrupted_run(folder, settings.behaviours, settings.plugins)

@@ -1,4 +1,4 @@
-"""Which regions of two chunks are the same, by frames that both have seen; percepts under their ids."""
+"""Matches the regions of two chunks over the frames that both processed, and renumbers percepts."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import shared_pixels
 
 LEAST_OVERLAP = 0.5
-"""Regions that overlap less (IoU over all frames in which both are there) are two."""
+"""Least IoU, over all frames with both regions, at which they are the same."""
 
 
 class RegionMatcher:
-    """Takes what two have seen of the same frames, and says which regions are the same."""
+    """Matches the regions of two observers of the same frames."""
 
     def __init__(self) -> None:
         self._shared: Counter[tuple[int, int]] = Counter()
-        self._either: Counter[tuple[int, int]] = Counter()
+        self._union: Counter[tuple[int, int]] = Counter()
 
     def add(self, before: Iterable[Region], after: Iterable[Region]) -> None:
-        """Take one frame.
+        """Add one frame.
 
         Args:
-            before: Its regions as those saw them whose ids are kept.
-            after: As the others saw them.
+            before: Regions of the observer whose ids are retained.
+            after: Regions of the other observer.
         """
         for a, b in product(before, after):
             both = shared_pixels(a, b)
             self._shared[a.id, b.id] += both
-            self._either[a.id, b.id] += int(a.area + b.area) - both
+            self._union[a.id, b.id] += int(a.area + b.area) - both
 
     def same(self) -> dict[int, int]:
-        """Ids of the others -> ids that are kept; each at most once, those that overlap most first."""
-        overlaps = {p: n / self._either[p] for p, n in self._shared.items() if n}
+        """Ids of the other observer -> retained ids, one to one, matched greedily by overlap."""
+        overlaps = {p: n / self._union[p] for p, n in self._shared.items() if n}
         best = sorted(overlaps, key=lambda p: (-overlaps[p], p))
         found: dict[int, int] = {}
         for old, new in best:
@@ -53,8 +53,8 @@ class RegionNumbers:
 
     Attributes:
         known: Id in the chunk -> id in the run.
-        last: The highest id that the run has given so far.
-        since: Id in the run -> since when it has been in view, as the first chunk said that saw it.
+        last: The highest id assigned in the run so far.
+        since: Id in the run -> since when it has been in view, by the first chunk that saw it.
     """
 
     known: dict[int, int] = field(default_factory=dict)
@@ -62,7 +62,7 @@ class RegionNumbers:
     since: dict[int, float | None] = field(default_factory=dict)
 
     def renumbered(self, observation: Observation) -> Observation:
-        """The same observation with the ids of the run; what nobody had seen before gets a new one."""
+        """The same observation with the ids of the run; new regions get new ids."""
         reports = tuple(
             replace(report, percepts=tuple(map(self._percept, report.percepts)))
             for report in observation.reports

@@ -1,7 +1,7 @@
-"""Where the recording of one chunk ends and that of the next begins: where both see alike.
+"""Chooses the seam between two chunks: a frame at which their regions agree.
 
-A chunk that has seen enough sees what a run from the beginning of the video would see; how much is enough is
-told by the chunk before it. Where the two differ still at the end of that one, it is watched on, for a while.
+After some frames a chunk sees the same as a run from the beginning of the video would; the chunk before it
+shows from where on. If the two still differ at the end of the earlier one, it is continued for a while.
 """
 
 from __future__ import annotations
@@ -15,28 +15,29 @@ from visup.archive.chunks.region_matching import RegionMatcher
 from visup.rules.geometry.regions import shared_pixels
 
 ALIKE = 0.01
-"""Share of all pixels of regions in which two chunks may differ where they see alike. On the shared missions
-chunks that have come to see the same differ by a tenth of that; those that have not, by two to ten times."""
+"""Share of all region pixels by which two chunks that agree may differ. On the shared missions chunks that
+have converged differ by a tenth of that; those that have not, by two to ten times as much."""
 ALIKE_S = 1.0
-"""For so long they must."""
+"""How long they must agree, seconds."""
 STEP_S = 5.0
 MOST_S = 30.0
-"""A chunk is watched on in such steps, seconds, and no longer: a scene may be so that two never agree."""
+"""A chunk is continued in steps of the one, at most for the other, seconds: in some scenes two never
+agree."""
 
 Extend = Callable[[Recording, int], None]
-"""Watches a chunk on to the frame before a given one."""
+"""Continues a chunk up to the frame before a given one."""
 FramePairs = Sequence[tuple[Observation, Observation]]
-"""Frames that both chunks have seen: as the one saw it that ends, and as the one that begins."""
+"""Frames that both chunks processed: (the earlier chunk's observation, the later's)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What is taken of a chunk.
+    """The part of a chunk that goes into the run.
 
     Attributes:
         chunk: Its recording.
-        first: The first frame that is taken of it.
-        same: Ids of its regions -> ids of the same regions in the part before.
+        first: Its first frame.
+        same: Ids of its regions -> ids of the same regions in the previous part.
     """
 
     chunk: Recording
@@ -45,15 +46,14 @@ class Part:
 
 
 def find_parts(chunks: Sequence[Recording], extend: Extend) -> tuple[Part, ...]:
-    """What is to be taken of which chunk.
+    """The parts of the chunks that make up the run.
 
     Args:
-        chunks: In the order of their beginnings; one goes on where the next has begun already.
-        extend: Watches one on.
+        chunks: In order of their beginnings; successive chunks overlap.
+        extend: Continues a chunk.
 
     Returns:
-        Parts in their order; a chunk with which the one before never agreed, until it was watched to the
-        end of it, has none.
+        Parts in order; a chunk with which the one before never agreed up to its end has none.
     """
     parts = [Part(chunks[0])]
     for chunk in chunks[1:]:
@@ -63,18 +63,18 @@ def find_parts(chunks: Sequence[Recording], extend: Extend) -> tuple[Part, ...]:
 
 
 def _part(before: Recording, chunk: Recording, extend: Extend) -> Part | None:
-    """What is taken of a chunk, or None when nothing is."""
+    """The part of a chunk, or None."""
     ends, ended = chunk.first_and_last(), before.first_and_last()
-    if ends is None or ended is None:  # the video was shorter than it announced
+    if ends is None or ended is None:  # the video was shorter than its header says
         return None
     pairs = _same_frames(before, chunk)
-    step, left = max(1, round(STEP_S * _rate(pairs))), int(MOST_S / STEP_S)
+    step, attempts_left = max(1, round(STEP_S * _rate(pairs))), int(MOST_S / STEP_S)
     while pairs and not _alike_at_the_end(pairs):
         if pairs[-1][1].frame_index >= ends[1]:
             return None
-        if not left:
+        if not attempts_left:
             break
-        left -= 1
+        attempts_left -= 1
         extend(before, pairs[-1][0].frame_index + 1 + step)
         pairs = _same_frames(before, chunk)
     same = same_regions(pairs)
@@ -82,7 +82,7 @@ def _part(before: Recording, chunk: Recording, extend: Extend) -> Part | None:
 
 
 def same_regions(pairs: FramePairs) -> dict[int, int]:
-    """Ids of the chunk that begins -> those of the one that ends, of regions that are the same."""
+    """Ids of the later chunk -> ids of the earlier one, for regions that are the same."""
     matcher = RegionMatcher()
     for old, new in pairs:
         matcher.add(old.of("region"), new.of("region"))
@@ -90,16 +90,16 @@ def same_regions(pairs: FramePairs) -> dict[int, int]:
 
 
 def seam_frame(pairs: FramePairs, same: Mapping[int, int]) -> int:
-    """The first frame that is taken from the chunk that begins: the one in which both see most alike.
+    """The first frame taken from the later chunk: the one at which both agree best.
 
-    It is in the last seconds that both have seen, where they do; else in the later half.
+    It is in the last seconds of the overlap if the chunks agree there, else in its later half.
     """
     late = _last_moment(pairs) if _alike_at_the_end(pairs) else pairs[len(pairs) // 2 :]
     return min(late, key=lambda pair: _difference(pair, same))[0].frame_index
 
 
 def _alike_at_the_end(pairs: FramePairs) -> bool:
-    """Whether both see alike in all of the last moment."""
+    """Whether both agree throughout the last `ALIKE_S`."""
     same = same_regions(pairs)
     return all(_difference(pair, same) <= (0, ALIKE) for pair in _last_moment(pairs))
 
@@ -112,7 +112,7 @@ def _last_moment(pairs: FramePairs) -> FramePairs:
 def _difference(
     pair: tuple[Observation, Observation], same: Mapping[int, int]
 ) -> tuple[int, float]:
-    """How many regions only one has seen, and the share of all pixels in which both differ."""
+    """The number of regions that only one has, and the share of region pixels that differ."""
     old, new = pair
     before = {r.id: r for r in old.of("region")}
     after = {same.get(r.id, -r.id): r for r in new.of("region")}
@@ -136,7 +136,7 @@ def _same_frames(before: Recording, chunk: Recording) -> FramePairs:
 
 
 def _rate(pairs: FramePairs) -> float:
-    """Frames of the source a second, as far as a chunk tells."""
+    """Source frames per second, estimated from a chunk."""
     if len(pairs) < 2:
         return 1.0
     (first, _), (last, _) = pairs[0], pairs[-1]

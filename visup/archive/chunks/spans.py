@@ -1,4 +1,4 @@
-"""Where a long video is cut: chunks that overlap, so that each has seen something before it counts."""
+"""Cuts a long video into overlapping chunks, so that each has a warm-up before its own part."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from visup.runs.settings import WatchSettings
 
 WARM_UP_S = 5.0
-"""How long a chunk looks at what is before its own, and what is after it, seconds."""
+"""Overlap of a chunk before and after its own part, seconds."""
 SHORTEST_CHUNK_S = 3 * WARM_UP_S
 LONGER = 1.5
-"""What is shorter than so many chunks is not cut."""
+"""A video shorter than this many chunks is not cut."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkSpan:
-    """The frames that one chunk looks at, by their numbers in the source.
+    """The frames of one chunk, numbered as in the source.
 
     Attributes:
-        begin: The first.
-        end: The one after the last; None for all that are left.
+        begin: The first frame.
+        end: The frame after the last; None for the end of the video.
     """
 
     begin: int
@@ -27,20 +27,20 @@ class ChunkSpan:
 
     @property
     def frames(self) -> tuple[int, int | None]:
-        """As `VideoSource.span` has it."""
+        """In the form of `VideoSource.span`."""
         return self.begin, self.end
 
 
 def chunk_spans(frames: int, length: int, warm_up: int) -> tuple[ChunkSpan, ...]:
-    """The chunks of a video, all nearly of one length.
+    """The chunks of a video, of nearly equal length.
 
     Args:
-        frames: How many the video has.
-        length: Frames of a chunk, 1 or more, without those that others look at, too.
-        warm_up: How many frames a chunk looks at before its own, and after them.
+        frames: Frames of the video.
+        length: Frames of a chunk, 1 or more, without the overlap.
+        warm_up: Frames of overlap before and after.
 
     Returns:
-        Chunks in their order, which together look at all frames; one where the video is short.
+        Chunks in order, which cover all frames; a single one for a short video.
 
     >>> chunk_spans(900, 300, 50)[1]
     ChunkSpan(begin=250, end=650)
@@ -53,23 +53,23 @@ def chunk_spans(frames: int, length: int, warm_up: int) -> tuple[ChunkSpan, ...]
 
 @dataclass(frozen=True, slots=True)
 class Cutting:
-    """How long videos are cut.
+    """How videos are cut.
 
     Attributes:
-        chunk_s: Seconds of a chunk.
-        warm_up_s: Seconds that it looks at before and after, too.
+        chunk_s: Length of a chunk without the overlap, seconds.
+        warm_up_s: Overlap before and after, seconds.
     """
 
     chunk_s: float
     warm_up_s: float = WARM_UP_S
 
     def spans(self, settings: WatchSettings) -> tuple[ChunkSpan, ...]:
-        """The chunks of the source of some settings; none where it is short, or nobody knows how long.
+        """The chunks of the source; none if it is short or of unknown length.
 
         Raises:
             SourceError: It cannot be opened.
         """
-        from visup.runs.wiring import open_video  # commands read this file before they need eyes
+        from visup.runs.wiring import open_video  # heavy import, not needed to parse a command line
 
         with open_video(settings) as source:
             frames, fps = source.frame_count, source.fps

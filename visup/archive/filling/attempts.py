@@ -1,8 +1,8 @@
-"""How often a clip was begun and nobody came back from it.
+"""Counts the attempts at a clip that crashed their worker.
 
-A worker leaves a mark before it begins a clip and takes it away when it is through, well or not. A mark that
-stays is of a worker that died meanwhile. It stands in the lake, so that whoever tries the clip next finds it,
-whichever worker, machine or scheduler that is.
+A worker leaves a mark before it begins a clip and removes it when it has finished, with or without success. A
+mark that remains is of a worker that died. Marks are files in the lake, so that the next attempt finds them
+on any worker, machine or scheduler.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from visup.agent.model.errors import OutputError
 
 MOST = 2
-"""A clip that has ended so many workers is put aside."""
+"""A clip that has crashed this many workers is put aside."""
 FOLDER = "attempts"
 
 
@@ -23,7 +23,7 @@ class Attempts:
 
     Attributes:
         lake: Folder of the lake.
-        run: Key of the run, or of a piece of it.
+        run: Key of the run or piece.
     """
 
     lake: Path
@@ -31,11 +31,11 @@ class Attempts:
 
     @property
     def exhausted(self) -> bool:
-        """Whether it is not to be tried any more."""
+        """Whether it is given up."""
         return all(mark.exists() for mark in self._marks())
 
     def begin(self) -> bool:
-        """Leave a mark; False when there are as many as may be.
+        """Leave a mark; False if the limit is reached.
 
         Raises:
             OutputError: It cannot be written.
@@ -47,13 +47,13 @@ class Attempts:
             except FileExistsError:
                 continue
             except OSError as fault:
-                what = f"the lake cannot be written ({fault.strerror})"
-                raise OutputError(what, where=str(mark)) from fault
+                message = f"the lake cannot be written ({fault.strerror})"
+                raise OutputError(message, where=str(mark)) from fault
             return True
         return False
 
     def exhaust(self) -> None:
-        """Leave all marks that may be: it is given up.
+        """Give it up: leave as many marks as the limit.
 
         Raises:
             OutputError: They cannot be written.
@@ -62,7 +62,7 @@ class Attempts:
             pass
 
     def clear(self) -> None:
-        """Take all marks away: someone came back, or it is to be tried anew."""
+        """Remove all marks, after a worker finished or to try again."""
         for mark in self._marks():
             mark.unlink(missing_ok=True)
 
@@ -71,11 +71,11 @@ class Attempts:
 
 
 def forget_interrupted(lake: Path, *, also_put_aside: bool = False) -> None:
-    """Take away the marks of clips that were merely under way when all was stopped.
+    """Remove the marks of clips that were merely in progress when filling was stopped.
 
     Args:
-        lake: Folder of the lake; nobody else is filling it.
-        also_put_aside: Those of clips that were put aside, too.
+        lake: Folder of the lake; no other process is filling it.
+        also_put_aside: Whether to remove those of clips put aside, too.
     """
     marks = sorted((lake / FOLDER).glob("*.*"))
     for run in {mark.stem for mark in marks}:

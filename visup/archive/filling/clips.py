@@ -1,4 +1,4 @@
-"""Clips: the sources that a user named, one by one."""
+"""Clips: expands the sources that a user names."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ PARQUET = ".parquet"
 MANIFESTS = (".csv", PARQUET)
 LARGEST_MANIFEST_BYTES = 128 * 2**20
 SEQUENCE_FOLDERS = ("img1", "frames")
-"""In a folder with one of these, images are a sequence in the layout of MOT or DAVIS."""
+"""A folder with one of these is a sequence of images in the layout of MOT or DAVIS."""
 _OWN = ("source", "task", "actor", "taken")
 Row = Mapping[str | None, str | None]
 
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """One source with what is known of it.
+    """One source with its metadata.
 
     Attributes:
         source: A video file, a folder of images, or a file in a store.
-        tasks: What it is watched for; those of the command where empty.
-        actors: Actor -> models; those of the command where empty.
-        taken: When it was made, seconds since the epoch; None for the time of its file.
-        labels: Whatever else the manifest says of it.
+        tasks: Its tasks; if empty, those of the command.
+        actors: Actor -> models; if empty, those of the command.
+        taken: When it was recorded, seconds since the epoch; None for the time of its file.
+        labels: Further columns of the manifest.
     """
 
     source: Path | StoredFile
@@ -48,31 +48,31 @@ class Clip:
 
 
 def clips_of(sources: Iterable[str]) -> list[Clip]:
-    """The clips that some words name, in their order, each once, with what a manifest says of them.
+    """The clips that the sources name, in order and without duplicates, with the metadata of manifests.
 
     Args:
-        sources: Files; folders of images; folders in which clips are looked for, also further down; patterns
+        sources: Files; folders of images; folders, searched recursively for clips; patterns
             with `*`, `?`, `[...]`, and `**` for any depth; manifests (`.csv`, `.parquet`); URLs of stores.
 
     Raises:
-        SourceError: A word names no clip, or a manifest is not as it should be.
+        SourceError: A source names no clip, or a manifest is not valid.
     """
     found: dict[Path | StoredFile, Clip] = {}
     for word in sources:
-        for clip in _named(word):
+        for clip in _clips_named(word):
             if found.get(clip.source, bare := Clip(clip.source)) == bare:
                 found[clip.source] = clip
     return list(found.values())
 
 
-def _named(word: str) -> list[Clip]:
+def _clips_named(word: str) -> list[Clip]:
     if is_url(word):
         return [Clip(stored) for stored in stored_clips(word)]
     path = Path(word).expanduser()
     if path.suffix.lower() in MANIFESTS and path.is_file():
         return list(_manifest(path))
     if path.exists():
-        clips = [Clip(p) for p in _below(path.absolute(), named=True)]
+        clips = [Clip(p) for p in _below(path.absolute(), explicit=True)]
     else:
         hits = sorted(glob.glob(str(path), recursive=True)) if glob.has_magic(word) else []  # noqa: PTH207
         clips = [Clip(p) for hit in hits for p in _below(Path(hit).absolute())]
@@ -86,10 +86,10 @@ def _named(word: str) -> list[Clip]:
     return clips
 
 
-def _below(path: Path, *, named: bool = False) -> Iterator[Path]:
-    """A clip itself, or the clips in a folder; a file that was named is one, whatever it is called."""
+def _below(path: Path, *, explicit: bool = False) -> Iterator[Path]:
+    """The path itself, or the clips in a folder; a file named explicitly is a clip whatever its suffix."""
     if path.is_file():
-        if named or path.suffix.lower() in VIDEO_SUFFIXES:
+        if explicit or path.suffix.lower() in VIDEO_SUFFIXES:
             yield path
     elif _is_sequence(path):
         yield path
@@ -121,7 +121,7 @@ def _manifest(path: Path) -> Iterator[Clip]:
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[int, Row]]:
-    """The rows of a manifest with their lines; one without rows still has its head looked at."""
+    """The rows of a manifest with their line numbers; the header is checked even without rows."""
     try:
         reader = csv.DictReader(StringIO(read_text_file(path, LARGEST_MANIFEST_BYTES)), strict=True)
         if "source" not in (reader.fieldnames or ()):
@@ -130,12 +130,12 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, Row]]:
     except UnicodeDecodeError:
         raise SourceError("this is not text", where=str(path), expected="CSV in UTF-8") from None
     except (OSError, csv.Error) as fault:
-        said = getattr(fault, "strerror", None) or fault
-        raise SourceError(f"the manifest cannot be read ({said})", where=str(path)) from fault
+        reason = getattr(fault, "strerror", None) or fault
+        raise SourceError(f"the manifest cannot be read ({reason})", where=str(path)) from fault
 
 
 def _parquet_rows(path: Path) -> Iterator[tuple[int, Row]]:
-    """The rows of a manifest with their numbers; lists are what `;` separates in CSV."""
+    """The rows of a manifest with their numbers; lists correspond to values separated by `;` in CSV."""
     try:
         table = imported("pyarrow.parquet").read_table(path, partitioning=None)
     except (OSError, imported("pyarrow").ArrowInvalid) as fault:
@@ -147,7 +147,7 @@ def _parquet_rows(path: Path) -> Iterator[tuple[int, Row]]:
 
 
 def _text(value: Any) -> str:
-    """A value of Parquet as CSV would have it."""
+    """A Parquet value as the text that CSV would have."""
     if isinstance(value, list):
         return ";".join(map(_text, value))
     return "" if value is None else str(value)
@@ -155,21 +155,21 @@ def _text(value: Any) -> str:
 
 def _clip(row: Row, manifest: Path, line: int) -> Clip:
     where = f"{manifest}:{line}"
-    told = {str(k): (v or "").strip() for k, v in row.items() if k is not None}
+    fields = {str(k): (v or "").strip() for k, v in row.items() if k is not None}
     if None in row:
         raise SourceError("the line has more fields than the head", where=where)
-    source = _source(told["source"], manifest.absolute().parent, where)
-    tasks = tuple(_task(t, manifest) for t in _parts(told.get("task", "")))
-    labels = {k: v for k, v in told.items() if k not in _OWN and v}
-    actors = parse_actors(_parts(told.get("actor", "")))
-    return Clip(source, tasks, actors, _taken(told.get("taken", ""), where), labels)
+    source = _source(fields["source"], manifest.absolute().parent, where)
+    tasks = tuple(_task(t, manifest) for t in _parts(fields.get("task", "")))
+    labels = {k: v for k, v in fields.items() if k not in _OWN and v}
+    actors = parse_actors(_parts(fields.get("actor", "")))
+    return Clip(source, tasks, actors, _taken(fields.get("taken", ""), where), labels)
 
 
-def _source(told: str, folder: Path, where: str) -> Path | StoredFile:
-    if is_url(told):
-        return stored_clips(told)[0]
-    source = folder / Path(told).expanduser()
-    if not told or not source.exists():
+def _source(fields: str, folder: Path, where: str) -> Path | StoredFile:
+    if is_url(fields):
+        return stored_clips(fields)[0]
+    source = folder / Path(fields).expanduser()
+    if not fields or not source.exists():
         raise SourceError(
             "there is no such clip", where=where, expected="a path from the folder of the manifest"
         )
@@ -181,9 +181,9 @@ def _parts(text: str) -> list[str]:
 
 
 def _task(name: str, manifest: Path) -> str:
-    """A task file beside the manifest, or the name as it is: a shipped task, or a path of its own."""
-    beside = manifest.absolute().parent / name
-    return str(beside) if beside.exists() else name
+    """A task file next to the manifest, or the name unchanged: a shipped task or another path."""
+    neighbour = manifest.absolute().parent / name
+    return str(neighbour) if neighbour.exists() else name
 
 
 def _taken(text: str, where: str) -> float | None:

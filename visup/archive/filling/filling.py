@@ -1,4 +1,4 @@
-"""A lake filled with the runs of many clips; to be stopped and begun again at any time."""
+"""Fills a lake with the runs of many clips; it can be stopped and restarted at any time."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from visup.archive.filling.watching import WORK, ClipOutcome, Watch, watch_into
 from visup.archive.lake import MARK, Lake
 
 RATE = "rate.json"
-"""How fast clips of this lake were watched, for estimates."""
+"""Processing speed of the clips of this lake, for estimates."""
 
 
 @contextmanager
 def only_filler(lake: Lake) -> Iterator[None]:
-    """Be the only one to fill a lake.
+    """Hold the lock for filling a lake.
 
     Raises:
         OutputError: Another process is filling it.
     """
     lock = acquire_lock(lake.path / MARK, "this lake")
     try:
-        shutil.rmtree(lake.path / WORK, ignore_errors=True)  # of who was killed
+        shutil.rmtree(lake.path / WORK, ignore_errors=True)  # left by a killed process
         yield
     finally:
         lock.release()
@@ -39,13 +39,13 @@ def only_filler(lake: Lake) -> Iterator[None]:
 
 @dataclass(slots=True)
 class FillResult:
-    """How filling a lake ended.
+    """The result of filling a lake.
 
     Attributes:
-        added: How many runs were added.
+        added: Number of runs added.
         failed: Clips without a run.
-        video_s: Seconds of video that were watched.
-        work_s: Seconds that workers took for that, added up.
+        video_s: Seconds of video processed.
+        work_s: Seconds of work, summed over the workers.
     """
 
     added: int = 0
@@ -70,14 +70,14 @@ def fill(
     tell: Callable[[ClipOutcome], None],
     watch: Watch = watch_into,
 ) -> FillResult:
-    """Do what is planned; `only_filler` is held, and old marks are forgotten.
+    """Carry out a plan; the caller holds `only_filler` and has removed old marks.
 
     Args:
-        lake: Where to.
-        plan: What is missing.
-        pool: Who watches.
-        tell: Told what became of each clip.
-        watch: How a clip is watched.
+        lake: The lake.
+        plan: The missing runs.
+        pool: The workers.
+        tell: Receives the outcome of each clip.
+        watch: Records a clip.
     """
     result = FillResult(failed=list(plan.failed))
     sizes = {job.run: job.bytes for job in plan.jobs}
@@ -88,21 +88,21 @@ def fill(
             if not outcome.failure:
                 rate = rate[0] + sizes[outcome.run], rate[1] + outcome.wall_s
             tell(outcome)
-        shutil.rmtree(lake.path / CHUNKS, ignore_errors=True)  # of clips that failed
+        shutil.rmtree(lake.path / CHUNKS, ignore_errors=True)  # left by clips that failed
     finally:
-        with suppress(OSError):  # it is only for estimates
+        with suppress(OSError):  # used for estimates only
             known = json.dumps({"bytes": rate[0], "seconds": rate[1]})
             write_whole(lake.path / RATE, known.encode())
     return result
 
 
 def begin_anew(lake: Lake, *, retry: bool) -> None:
-    """Forget which clips were under way when all was stopped; with `retry` those put aside, too."""
+    """Remove the marks of clips in progress when filling stopped; with `retry` also of those put aside."""
     forget_interrupted(lake.path, also_put_aside=retry)
 
 
 def read_rate(lake: Path) -> tuple[int, float]:
-    """Bytes that were watched so far, and the seconds that one worker took for them; (0, 0.0) before."""
+    """Bytes processed so far, and seconds of work for them; (0, 0.0) at first."""
     try:
         told = json.loads((lake / RATE).read_text(encoding="utf-8"))
         return int(told["bytes"]), float(told["seconds"])
@@ -111,6 +111,6 @@ def read_rate(lake: Path) -> tuple[int, float]:
 
 
 def estimated_s(lake: Path, bytes_left: int, workers: int) -> float | None:
-    """How long so much takes on so many workers; None before the first clip of a lake."""
+    """Estimated seconds for some bytes on some workers; None before the first clip."""
     known, seconds = read_rate(lake)
     return bytes_left * seconds / known / max(1, workers) if known and seconds else None

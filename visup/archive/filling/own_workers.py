@@ -1,8 +1,8 @@
-"""Workers of Dask on this machine: forked from a process that has loaded all, and kept at their number.
+"""Dask workers on this machine: forked from a preloaded process, and replaced when they die.
 
-Dask puts a worker in the place of one that dies. It gives a place up for good when the new one cannot be
-started, as when the process that workers are forked from dies at the same moment, or takes too long; such
-places are filled anew here.
+Dask itself replaces a worker that dies, but gives up for good if the new one cannot be started or takes too
+long, for example because the process from which workers are forked died at the same moment. Such workers are
+replaced here.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from visup.archive.filling.pieces import watch_piece
 from visup.archive.filling.pool_settings import PoolSettings
 
 MOST_RENEWALS = 6
-"""How often workers are started in place of lost ones, before all of them have been there again; after each
-failure it waits twice as long, a minute in all."""
+"""Attempts to replace lost workers until all are back; the wait doubles after each failure, to a minute in
+all."""
 START_S = 300.0
-"""How long a worker may take to start in place of another one; a busy machine needs minutes for it."""
+"""How long a replacement may take to start, seconds; a busy machine needs minutes."""
 LOOK_S = 1.0
 
 
 @dataclass(slots=True)
 class OwnWorkers:
-    """Workers that were started for this.
+    """Workers started by this process.
 
     Attributes:
-        cluster: Of Dask.
-        count: How many there should be.
-        renewals: How often lost ones were replaced since all of them were last there.
+        cluster: The Dask cluster.
+        count: Number of workers.
+        renewals: Replacements since all workers were last alive.
     """
 
     cluster: Any
@@ -45,23 +45,23 @@ class OwnWorkers:
 
     @contextmanager
     def kept(self, client: Any, starve: Callable[[], None]) -> Iterator[None]:
-        """Meanwhile lost workers are replaced.
+        """Replace lost workers while the context is open.
 
         Args:
-            client: Of the cluster.
-            starve: Called once when all workers are gone and none comes after them.
+            client: Client of the cluster.
+            starve: Called once when all workers are gone and cannot be replaced.
         """
         over = Event()
 
         def look() -> None:
-            seen = time.monotonic()
-            # That the scheduler is gone is told where it is asked.
+            last_alive = time.monotonic()
+            # A scheduler that is gone is reported where its results are awaited.
             with suppress(OSError, RuntimeError):
                 while not over.wait(LOOK_S):
-                    if there := len(client.ncores()):
-                        seen = time.monotonic()
-                    self._renew(there)
-                    if time.monotonic() - seen > START_S or self._given_up(there):
+                    if alive := len(client.ncores()):
+                        last_alive = time.monotonic()
+                    self._renew(alive)
+                    if time.monotonic() - last_alive > START_S or self._given_up(alive):
                         starve()
                         return
 
@@ -73,9 +73,9 @@ class OwnWorkers:
             over.set()
             watcher.join()
 
-    def _renew(self, there: int) -> None:
-        """Start workers in the places that Dask has given up; `there` are at work."""
-        if there >= self.count:
+    def _renew(self, alive: int) -> None:
+        """Replace the workers that Dask has given up; `alive` are working."""
+        if alive >= self.count:
             self.renewals = 0
         lost, now = self._lost(), time.monotonic()
         if not lost or self.renewals >= MOST_RENEWALS or now < self._not_before:
@@ -85,11 +85,11 @@ class OwnWorkers:
         self.cluster.sync(self.cluster.scale_down, lost)
         self.cluster.scale(self.count)
 
-    def _given_up(self, there: int) -> bool:
-        return not there and self.renewals >= MOST_RENEWALS and len(self._lost()) >= self.count
+    def _given_up(self, alive: int) -> bool:
+        return not alive and self.renewals >= MOST_RENEWALS and len(self._lost()) >= self.count
 
     def _lost(self) -> list[Any]:
-        """Names of the places that Dask has given up."""
+        """Names of the workers that Dask has given up."""
         return [
             name
             for name, nanny in list(self.cluster.workers.items())
@@ -99,7 +99,7 @@ class OwnWorkers:
 
 @contextmanager
 def own_workers(settings: PoolSettings) -> Iterator[OwnWorkers]:
-    """Workers of this machine, which end with this.
+    """Workers on this machine, ended with the context.
 
     Raises:
         ExtraMissingError: Dask is not installed.
@@ -108,7 +108,7 @@ def own_workers(settings: PoolSettings) -> Iterator[OwnWorkers]:
     memory = "auto" if settings.memory_gb is None else int(settings.memory_gb * 1e9)
     with (
         _quiet(),
-        _loaded_once(distributed),
+        _preloaded_forkserver(distributed),
         distributed.LocalCluster(
             n_workers=settings.processes,
             threads_per_worker=1,
@@ -123,10 +123,10 @@ def own_workers(settings: PoolSettings) -> Iterator[OwnWorkers]:
 
 
 @contextmanager
-def _loaded_once(distributed: Any) -> Iterator[None]:
-    """Workers are forked from a process that has loaded all that they need, and done nothing else.
+def _preloaded_forkserver(distributed: Any) -> Iterator[None]:
+    """Fork workers from a process that has only loaded their modules.
 
-    So a worker in place of one that died is there at once, and what is loaded stands in memory once.
+    A replacement is ready at once, and the modules are in memory once.
     """
     changed: dict[str, Any] = {"distributed.deploy.lost-worker-timeout": f"{START_S} s"}
     if "forkserver" in multiprocessing.get_all_start_methods():
@@ -139,7 +139,7 @@ def _loaded_once(distributed: Any) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Workers that die are told of in visup's words, and not in Dask's."""
+    """Silence Dask's messages about dying workers; visup reports them itself."""
     logger = logging.getLogger("distributed")
     before = logger.level
     logger.setLevel(logging.CRITICAL)

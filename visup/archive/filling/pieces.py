@@ -1,7 +1,7 @@
-"""What one worker does at a time: a clip, a chunk of a long one, or the stitching of its chunks.
+"""Units of work: a clip, a chunk of a long one, or the stitching of its chunks.
 
-Chunks that are watched stay in the lake until their run is, so that whoever is stopped goes on with those
-that are missing.
+Recorded chunks stay in the lake until their run is committed, so that a restart continues with the missing
+ones.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from visup.archive.filling.watching import WORK, ClipOutcome, Watch, reason_of, 
 from visup.archive.lake import Lake
 
 CHUNKS = "chunks"
-"""Folder of a lake in which chunks wait until all of their clip are watched."""
+"""Folder of a lake for recorded chunks until all chunks of their clip are ready."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClipPiece:
-    """What one worker does at a time.
+    """One unit of work.
 
     Attributes:
-        job: Of which clip.
-        chunk: Number of the chunk that is watched; None for all of the clip, or its stitching.
+        job: The clip.
+        chunk: Number of the chunk; None for the whole clip or its stitching.
     """
 
     job: Job
@@ -39,54 +39,54 @@ class ClipPiece:
 
     @property
     def key(self) -> str:
-        """What tells it apart."""
+        """Unique key."""
         return self.job.run if self.chunk is None else f"{self.job.run}-{self.chunk}"
 
     def folder(self, lake: Path) -> Path:
-        """Where the chunk waits, or all chunks of the clip."""
+        """Folder of the chunk, or of all chunks of the clip."""
         folder = lake / CHUNKS / self.job.run
         return folder if self.chunk is None else folder / f"{self.chunk:04}"
 
 
 class PieceBook:
-    """Which pieces are to be done, and what becomes of their clips.
+    """The queue of pieces, and the progress of their clips.
 
     Args:
-        jobs: Clips, in the order in which they are begun.
+        jobs: Clips in order.
     """
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._waiting = [p for job in reversed(jobs) for p in reversed(_first_pieces(job))]
-        self._left = {job.run: len(job.spans) for job in jobs}
-        self._took: dict[str, float] = {job.run: 0.0 for job in jobs}
+        self._chunks_left = {job.run: len(job.spans) for job in jobs}
+        self._work_s: dict[str, float] = {job.run: 0.0 for job in jobs}
 
     def next(self) -> ClipPiece | None:
-        """What is to be handed over next; None when nothing is waiting."""
+        """The next piece; None if none is waiting."""
         return self._waiting.pop() if self._waiting else None
 
     def done(self, piece: ClipPiece, outcome: ClipOutcome) -> ClipOutcome | None:
-        """Take note of a piece that is through; what became of its clip, when that is known by this."""
+        """Record a finished piece; returns the outcome of its clip once it is known."""
         run = piece.job.run
-        if run not in self._left:  # another chunk has failed
+        if run not in self._chunks_left:  # another chunk has failed
             return None
-        self._took[run] += outcome.wall_s
+        self._work_s[run] += outcome.wall_s
         if outcome.failure or piece.chunk is None:
-            del self._left[run]
+            del self._chunks_left[run]
             self._waiting = [p for p in self._waiting if p.job.run != run]
-            return replace(outcome, wall_s=self._took[run])
-        self._left[run] -= 1
-        if not self._left[run]:
+            return replace(outcome, wall_s=self._work_s[run])
+        self._chunks_left[run] -= 1
+        if not self._chunks_left[run]:
             self._waiting.append(ClipPiece(piece.job))
         return None
 
 
 def watch_piece(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
-    """Do a piece; whatever is wrong with the clip is told, and raises nothing.
+    """Do a piece; faults of the clip are part of the outcome and not raised.
 
     Args:
-        lake: Where to.
-        piece: What.
-        watch: How clips are watched, and chunks of them.
+        lake: The lake.
+        piece: The piece.
+        watch: Records a clip or chunk.
     """
     if piece.chunk is not None:
         return _watch_chunk(lake, piece, piece.chunk, watch)
@@ -101,20 +101,20 @@ def watch_piece(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
 
 
 def given_up(lake: Lake, piece: ClipPiece) -> ClipOutcome:
-    """What becomes of a clip of which a piece has ended its workers."""
+    """The outcome of a clip whose piece crashed its workers."""
     Attempts(lake.path, piece.job.run).exhaust()
     return ClipOutcome(piece.job.run, piece.job.settings.source, failure=put_aside(piece.job))
 
 
 def _first_pieces(job: Job) -> list[ClipPiece]:
-    """What can be done of a clip at once."""
+    """The pieces of a clip that can be done first."""
     return [ClipPiece(job, n) for n in range(len(job.spans))] or [ClipPiece(job)]
 
 
 def _watch_chunk(lake: Lake, piece: ClipPiece, chunk: int, watch: Watch) -> ClipOutcome:
-    begun, job = time.monotonic(), piece.job
+    start, job = time.monotonic(), piece.job
     source, target = job.settings.source, piece.folder(lake.path)
-    if target.exists():  # since before all was stopped
+    if target.exists():  # recorded before a restart
         return ClipOutcome(job.run, source)
     attempts = Attempts(lake.path, piece.key)
     folder = lake.path / WORK / f"{piece.key}-{os.getpid()}"
@@ -132,4 +132,4 @@ def _watch_chunk(lake: Lake, piece: ClipPiece, chunk: int, watch: Watch) -> Clip
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     attempts.clear()
-    return ClipOutcome(job.run, source, wall_s=time.monotonic() - begun)
+    return ClipOutcome(job.run, source, wall_s=time.monotonic() - start)

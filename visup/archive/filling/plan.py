@@ -1,4 +1,4 @@
-"""What is missing in a lake of the runs of some clips."""
+"""Plans which runs of some clips are missing in a lake."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from visup.runs.wiring import build_agent
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A clip that is to be watched.
+    """A clip to process.
 
     Attributes:
-        settings: With which.
-        provenance: What its run is called, and where it comes from.
-        bytes: Of the source.
-        spans: The chunks in which it is watched; none where it is not cut.
+        settings: Its settings.
+        provenance: Key and origin of its run.
+        bytes: Size of the source.
+        spans: Its chunks; none if it is not cut.
     """
 
     settings: WatchSettings
@@ -44,12 +44,12 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class FailedClip:
-    """A clip of which there is no run.
+    """A clip without a run.
 
     Attributes:
         source: The clip.
-        reason: Why.
-        put_aside: Whether it is not tried any more, since it has ended its worker twice.
+        reason: The reason.
+        put_aside: Whether it is no longer tried because it crashed its worker twice.
     """
 
     source: str
@@ -59,13 +59,13 @@ class FailedClip:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be done.
+    """What to do.
 
     Attributes:
-        jobs: The runs that are missing.
-        present: How many clips have their run in the lake.
-        same: How many clips have the same content and settings as one before.
-        failed: Clips that cannot be watched, or are put aside.
+        jobs: The missing runs.
+        present: Number of clips with a run in the lake.
+        same: Number of clips with the content and settings of an earlier one.
+        failed: Clips that cannot be processed or are put aside.
     """
 
     jobs: tuple[Job, ...] = ()
@@ -75,7 +75,7 @@ class Plan:
 
     @property
     def bytes(self) -> int:
-        """Of all sources that are to be watched."""
+        """Size of all sources to process."""
         return sum(job.bytes for job in self.jobs)
 
 
@@ -85,35 +85,35 @@ def make_plan(
     settings: WatchSettings,
     cutting: Cutting | None = None,
 ) -> Plan:
-    """Find out which runs are missing.
+    """Find the missing runs.
 
     Args:
-        lake: Where to; None where there is none yet.
-        clips: What is to be watched.
-        settings: Those of all clips, but for what each says itself.
+        lake: The lake; None if it does not exist yet.
+        clips: The clips.
+        settings: Settings of all clips, which a clip may override.
         cutting: How long clips are cut; None for not at all.
 
     Raises:
         VisupError: A file that the settings name cannot be read.
     """
-    there = frozenset(lake.runs() if lake else ())
+    committed = frozenset(lake.runs() if lake else ())
     hashes: dict[str, str] = {}
     jobs: dict[str, Job] = {}
     present, same, failed = 0, 0, list[FailedClip]()
     for clip in clips:
-        own = clip_settings(settings, clip)
-        about = repr(replace(own, source=""))
+        clip_config = clip_settings(settings, clip)
+        about = repr(replace(clip_config, source=""))
         if about not in hashes:
-            hashes[about] = settings_hash(own)
+            hashes[about] = settings_hash(clip_config)
         try:
-            job = _job(clip, own, hashes[about], cutting)
+            job = _job(clip, clip_config, hashes[about], cutting)
         except VisupError as fault:
             reason = str(fault).removeprefix(f"{clip.source}: ")
             failed.append(FailedClip(str(clip.source), reason))
             continue
         if job.run in jobs:
             same += 1
-        elif job.run in there:
+        elif job.run in committed:
             present += 1
         elif lake is not None and Attempts(lake.path, job.run).exhausted:
             failed.append(put_aside(job))
@@ -123,7 +123,7 @@ def make_plan(
 
 
 def put_aside(job: Job) -> FailedClip:
-    """What is said of a clip that ends its workers."""
+    """The failure of a clip that crashed its workers."""
     return FailedClip(
         job.settings.source,
         "it has ended its worker twice (killed, or out of memory), and is put aside; "
@@ -143,13 +143,13 @@ def clip_settings(settings: WatchSettings, clip: Clip) -> WatchSettings:
 
 
 def check_settings(jobs: Sequence[Job]) -> Iterator[str]:
-    """Refuse settings with which no clip could be watched, before thousands are tried.
+    """Check the settings before thousands of clips fail by them.
 
     Yields:
-        What may keep the runs from coming to anything, a sentence each.
+        Warnings, a sentence each.
 
     Raises:
-        VisupError: A task, the models or a behaviour are not as they should be.
+        VisupError: A task, the models or a behaviour are not valid.
     """
     for settings in {repr(replace(j.settings, source="")): j.settings for j in jobs}.values():
         agent = build_agent(settings)
@@ -160,17 +160,17 @@ def check_settings(jobs: Sequence[Job]) -> Iterator[str]:
 
 
 def _job(clip: Clip, settings: WatchSettings, by: str, cutting: Cutting | None) -> Job:
-    content, made, size = _facts(clip.source)
-    taken = made if clip.taken is None else clip.taken
+    content, modified, size = _facts(clip.source)
+    taken = modified if clip.taken is None else clip.taken
     spans = cutting.spans(settings) if cutting and isinstance(clip.source, Path) else ()
-    if cutting and spans:  # what is seen may be another by a little
+    if cutting and spans:  # results may differ slightly
         by = hashlib.sha256(f"{by}\n{cutting}".encode()).hexdigest()
     key = run_key(content, by)
     return Job(settings, Provenance(key, content, by, taken, clip.labels), size, spans)
 
 
 def _facts(source: Path | StoredFile) -> tuple[str, float | None, int]:
-    """What tells the content of a clip apart, when it was made, and its size in bytes."""
+    """Content hash of a clip, time of recording, and size in bytes."""
     if isinstance(source, StoredFile):
         return source.content_hash, source.modified, source.bytes
     content = content_hash(source)

@@ -1,8 +1,8 @@
-"""Jobs on workers: in this process, or on those of Dask, here or on a cluster.
+"""Runs jobs in this process, or on Dask workers here or on a cluster.
 
-Dask runs a job again elsewhere when its worker dies; the marks of `attempts.py` see to it that a clip which
-ends its workers is given up after two, whatever the scheduler allows. Only a few jobs for each worker are
-handed over at a time, so that a scheduler never holds a hundred thousand of them.
+Dask reruns a job elsewhere when its worker dies; the marks of `attempts.py` ensure that a clip which crashes
+its workers is given up after two, whatever the scheduler allows. Only a few jobs per worker are submitted at
+a time, so that a scheduler never holds a hundred thousand of them.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from visup.archive.filling.watching import ClipOutcome, Watch, watch_into
 from visup.archive.lake import Lake
 
 WAITING_PER_WORKER = 3
-"""Jobs handed over for each worker: while one is watched, the next is there."""
+"""Jobs submitted per worker, so that the next is ready when one ends."""
 CONNECT_S = 20
 MOST_RESUBMISSIONS = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Pool:
-    """Workers that are there.
+    """Available workers.
 
     Attributes:
-        client: Of Dask, or None for this process.
+        client: Dask client, or None for this process.
         dashboard: Address of Dask's dashboard, or None.
-        own: Its workers, when they were started for this.
+        own: The workers, if this process started them.
     """
 
     client: Any = None
@@ -49,15 +49,15 @@ class Pool:
     def outcomes(
         self, lake: Lake, jobs: Sequence[Job], watch: Watch = watch_into
     ) -> Iterator[ClipOutcome]:
-        """Run jobs and give what becomes of each, in the order in which they end."""
+        """Run jobs and yield the outcome of each in the order of completion."""
         if self.client is None:
-            return _here(lake, jobs, watch)
+            return _in_process(lake, jobs, watch)
         return _on_dask(self, lake, jobs, watch)
 
 
 @contextmanager
 def open_pool(settings: PoolSettings) -> Iterator[Pool]:
-    """Workers, which end with this; those of a scheduler stay.
+    """Open a pool; workers started here end with the context, those of a scheduler stay.
 
     Raises:
         SettingsError: The scheduler cannot be reached.
@@ -87,7 +87,7 @@ def _connected(distributed: Any, address: str) -> Any:
         ) from fault
 
 
-def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
+def _in_process(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
     book = PieceBook(jobs)
     while piece := book.next():
         if outcome := book.done(piece, watch_piece(lake, piece, watch)):
@@ -95,7 +95,7 @@ def _here(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome
 
 
 def _on_worker(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
-    """Do a piece on one core: the others have workers of their own, and threads would be in their way."""
+    """Do a piece on one core, since every core has a worker."""
     cv2.setNumThreads(1)
     return watch_piece(lake, piece, watch)
 
@@ -105,7 +105,7 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
     book, running = PieceBook(jobs), dict[Any, tuple[ClipPiece, int]]()
     completed = distributed.as_completed(raise_errors=False)
 
-    def submit(piece: ClipPiece | None, again: int = 0) -> None:
+    def submit(piece: ClipPiece | None, resubmissions: int = 0) -> None:
         if piece is None:
             return
         future = client.submit(
@@ -113,10 +113,10 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
             Lake(lake.path.absolute()),
             piece,
             watch,
-            key=f"visup-{piece.key}-{again}",
+            key=f"visup-{piece.key}-{resubmissions}",
             pure=False,
         )
-        running[future] = piece, again
+        running[future] = piece, resubmissions
         completed.add(future)
 
     for _ in range(max(1, len(client.ncores())) * WAITING_PER_WORKER):
@@ -127,11 +127,11 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
 
     with pool.own.kept(client, take_back) if pool.own else nullcontext():
         for future in completed:
-            piece, again = running[future]
-            outcome = _outcome(lake, piece, future, again)
+            piece, resubmissions = running[future]
+            outcome = _outcome(lake, piece, future, resubmissions)
             del running[future]
             if outcome is None:
-                submit(piece, again + 1)
+                submit(piece, resubmissions + 1)
                 continue
             finished = book.done(piece, outcome)
             submit(book.next())
@@ -139,11 +139,11 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
                 yield finished
 
 
-def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutcome | None:
-    """What became of a piece; None when it is to be handed over once more."""
+def _outcome(lake: Lake, piece: ClipPiece, future: Any, resubmissions: int) -> ClipOutcome | None:
+    """The outcome of a piece; None if it must be submitted again."""
     run, source = piece.job.run, piece.job.settings.source
     if future.status == "finished":
-        with suppress(Exception):  # its worker has died since, with the result
+        with suppress(Exception):  # fails if the worker died with the result
             found: ClipOutcome = future.result()
             return found
     if Attempts(lake.path, piece.key).exhausted:
@@ -153,8 +153,8 @@ def _outcome(lake: Lake, piece: ClipPiece, future: Any, again: int) -> ClipOutco
             "all workers were lost, or the scheduler",
             hint="run the same command again: what is in the lake is kept, and the rest is done",
         )
-    if again >= MOST_RESUBMISSIONS:
+    if resubmissions >= MOST_RESUBMISSIONS:
         why = f" ({error_line(future.exception())})" if future.status == "error" else ""
-        reason = f"its workers were lost {again} times{why}"
+        reason = f"its workers were lost {resubmissions} times{why}"
         return ClipOutcome(run, source, failure=FailedClip(source, reason))
     return None

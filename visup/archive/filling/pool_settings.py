@@ -1,4 +1,4 @@
-"""Where jobs are run, as it is said on the command line."""
+"""The command-line options for where jobs run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from visup.runs.settings import Option
 
 @dataclass(frozen=True, slots=True)
 class PoolSettings:
-    """Where jobs are run."""
+    """Where jobs run."""
 
     workers: Annotated[
         int | None,
@@ -30,7 +30,7 @@ class PoolSettings:
 
     @property
     def processes(self) -> int:
-        """How many processes are to be started on this machine."""
+        """Number of processes to start on this machine."""
         if self.scheduler:
             return 0
         return (os.cpu_count() or 1) if self.workers is None else self.workers

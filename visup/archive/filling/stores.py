@@ -1,7 +1,7 @@
-"""Clips in object stores and on servers: anything that fsspec reads, copied to the worker that watches it.
+"""Clips in object stores and on servers that fsspec can read; each is copied to its worker.
 
-A store says of each file by what it would be told apart from another one (an entity tag, or size and time).
-That stands for the content of the clip, so that ten thousand clips are planned without being read.
+The store's own identity of a file (an entity tag, or size and time) replaces a hash of its content, so that
+ten thousand clips are planned without being read.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class StoredFile:
     """A file in a store.
 
     Attributes:
-        url: Where it is.
-        mark: Follows from its content, as far as the store says.
+        url: Its URL.
+        mark: Identity of its content as given by the store.
         bytes: Its size.
-        modified: When it was last written, seconds since the epoch, or None.
+        modified: Time of its last change, seconds since the epoch, or None.
     """
 
     url: str
@@ -48,27 +48,27 @@ class StoredFile:
 
     @property
     def content_hash(self) -> str:
-        """What tells it apart: SHA-256 of its place and what the store says of its content."""
+        """SHA-256 of its URL and the store's mark."""
         return hashlib.sha256(f"{self.url}\n{self.mark}".encode()).hexdigest()
 
 
 def is_url(word: str) -> bool:
-    """Whether a word names something in a store."""
+    """Whether a word is a URL."""
     return _URL.match(word) is not None
 
 
 def stored_clips(word: str) -> list[StoredFile]:
-    """The clips that a URL names: a file, a folder with all below it, or a pattern.
+    """The clips that a URL names: a file, a folder (recursively), or a pattern.
 
     Raises:
-        SourceError: The store cannot be read, or there is nothing.
+        SourceError: The store cannot be read, or no clip is found.
         ExtraMissingError: fsspec is not installed.
     """
     fsspec = imported("fsspec")
     try:
         store, path = fsspec.core.url_to_fs(word)
         found = [_file(store, store.unstrip_protocol(p)) for p in _paths(store, path)]
-    except Exception as fault:  # stores raise what they like, and their libraries may be missing
+    except Exception as fault:  # store libraries raise any type, and may be missing
         raise _unreadable(word, fault) from fault
     if not found:
         raise SourceError(
@@ -78,11 +78,11 @@ def stored_clips(word: str) -> list[StoredFile]:
 
 
 def fetched(settings: WatchSettings, folder: Path) -> WatchSettings:
-    """Settings whose source is on this machine: as they are, or with a copy of a stored file.
+    """Settings whose source is local: a file in a store is replaced by a copy.
 
     Args:
-        settings: Of a run.
-        folder: Where copies are put.
+        settings: Settings of a run.
+        folder: Folder for copies.
 
     Raises:
         SourceError: It cannot be copied.
@@ -92,15 +92,15 @@ def fetched(settings: WatchSettings, folder: Path) -> WatchSettings:
     place = folder / FETCHED / PurePosixPath(settings.source).name
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        with imported("fsspec").open(settings.source, "rb") as there, place.open("wb") as here:
-            shutil.copyfileobj(there, here)
+        with imported("fsspec").open(settings.source, "rb") as remote, place.open("wb") as local:
+            shutil.copyfileobj(remote, local)
     except Exception as fault:
         raise _unreadable(settings.source, fault) from fault
     return replace(settings, source=str(place))
 
 
 def note_source(folder: Path, settings: WatchSettings) -> None:
-    """Let a recorded run be of what was named, and not of the copy that was watched."""
+    """Record the original source of a run in place of the local copy."""
     journal = Journal(folder / JOURNAL, resume=True)
     try:
         journal.note(source=settings.source, settings=to_jsonable(settings))
@@ -122,13 +122,13 @@ def _is_video(path: str) -> bool:
 
 
 def _file(store: Any, url: str) -> StoredFile:
-    told = store.info(url)
-    times = [told[k] for k in ("LastModified", "last_modified", "mtime", "created") if told.get(k)]
+    info = store.info(url)
+    times = [info[k] for k in ("LastModified", "last_modified", "mtime", "created") if info.get(k)]
     when = times[0] if times else None
     seconds = when.timestamp() if isinstance(when, datetime) else when
     modified = float(seconds) if isinstance(seconds, int | float) else None
-    mark = str(told.get("ETag") or store.ukey(url))
-    return StoredFile(url, mark, int(told.get("size") or 0), modified)
+    mark = str(info.get("ETag") or store.ukey(url))
+    return StoredFile(url, mark, int(info.get("size") or 0), modified)
 
 
 def _unreadable(where: str, fault: Exception) -> SourceError:
@@ -137,5 +137,5 @@ def _unreadable(where: str, fault: Exception) -> SourceError:
     hint = (
         "install what the store needs: pip install s3fs" if isinstance(fault, ImportError) else None
     )
-    said = str(fault) or type(fault).__name__
-    return SourceError(f"it cannot be read ({said})", where=where, hint=hint)
+    reason = str(fault) or type(fault).__name__
+    return SourceError(f"it cannot be read ({reason})", where=where, hint=hint)

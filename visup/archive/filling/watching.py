@@ -1,4 +1,4 @@
-"""One clip on a worker: watched, reasoned about, committed."""
+"""Processes one clip on a worker: watch, reason, commit."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from visup.runs.runner import supervise
 from visup.runs.settings import RunOptions, WatchSettings
 
 WORK = "work"
-"""Folder of a lake in which runs that go on are recorded."""
+"""Folder of a lake for runs in progress."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClipOutcome:
-    """What became of a job.
+    """The outcome of a job.
 
     Attributes:
-        run: Its key.
+        run: Key of the run.
         source: The clip.
-        verdict: Of the run; None when nothing was to be judged, or there is no run.
-        video_s: Seconds of video that were watched.
-        wall_s: How long it took.
+        verdict: Verdict of the run; None without a task or without a run.
+        video_s: Seconds of video processed.
+        wall_s: Elapsed time, seconds.
         failure: Why there is no run, or None.
     """
 
@@ -51,21 +51,21 @@ class ClipOutcome:
 
 
 Watch = Callable[..., None]
-"""Watches a source and records the run in a folder; with a third argument only that span of it."""
+"""Records the run of a source in a folder; a third argument limits it to a span."""
 
 
 def watch_into(
     settings: WatchSettings, folder: Path, span: tuple[int, int | None] = (0, None)
 ) -> None:
-    """Watch a source and record the run in a folder: the journal alone.
+    """Watch a source and record only the journal of the run.
 
     Args:
-        settings: Of the run.
-        folder: A folder that is there.
-        span: Which frames; see `VideoSource`.
+        settings: Settings of the run.
+        folder: An existing folder.
+        span: The frames; see `VideoSource`.
 
     Raises:
-        VisupError: It cannot be watched, or not all of it could be recorded.
+        VisupError: It cannot be watched, or not recorded completely.
     """
     options = RunOptions(video=False, report=False, state_every_s=0.0)
     if span != (0, None):
@@ -80,14 +80,14 @@ def watch_into(
 
 
 def watch_job(lake: Lake, job: Job, watch: Watch = watch_into) -> ClipOutcome:
-    """Watch a clip and commit its run; whatever is wrong with the clip is told, and raises nothing.
+    """Watch a clip and commit its run; faults of the clip are part of the outcome and not raised.
 
     Args:
-        lake: Where to.
-        job: What.
-        watch: How.
+        lake: The lake.
+        job: The job.
+        watch: Records a clip.
     """
-    begun, source = time.monotonic(), job.settings.source
+    start, source = time.monotonic(), job.settings.source
     attempts = Attempts(lake.path, job.run)
     folder = lake.path / WORK / f"{job.run}-{os.getpid()}"
     try:
@@ -106,11 +106,11 @@ def watch_job(lake: Lake, job: Job, watch: Watch = watch_into) -> ClipOutcome:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     attempts.clear()
-    return ClipOutcome(job.run, source, verdict, seconds, time.monotonic() - begun)
+    return ClipOutcome(job.run, source, verdict, seconds, time.monotonic() - start)
 
 
 def _committed(lake: Lake, job: Job, folder: Path) -> tuple[str | None, float]:
-    """Put a recorded run into the lake; its verdict and its seconds of video."""
+    """Commit a recorded run; returns its verdict and its seconds of video."""
     recording = Recording.open(folder)
     settings = recorded_settings(recording.facts(), str(recording.path))
     notes = BeliefNotes()
@@ -121,9 +121,9 @@ def _committed(lake: Lake, job: Job, folder: Path) -> tuple[str | None, float]:
 
 
 def reason_of(fault: BaseException, source: str) -> str:
-    """Why a clip has no run, without its name, which is told before."""
+    """Why a clip has no run, without its name, which the caller prints."""
     if isinstance(fault, VisupError):
         return str(fault).removeprefix(f"{source}: ")
     if isinstance(fault, MemoryError):
         return f"there was no memory left ({fault})"
-    return f"visup has a fault: {error_line(fault)}"  # the others go on
+    return f"visup has a fault: {error_line(fault)}"  # the other clips go on

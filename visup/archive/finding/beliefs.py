@@ -1,9 +1,8 @@
-"""What conditions about relations depend on, step by step: kept beside a run, which is then judged at once.
+"""Saved beliefs of a run, step by step, for fast evaluation of conditions about relations.
 
-Reasoning again about a run takes seconds. A condition that names relations alone sees of a mind who is
-present, what each is taken for and plays, and what holds between them; that is noted when the run is added,
-and the same judge judges it. A run without such a note, or with one of another visup, is reasoned about
-again.
+Replaying the reasoning of a run takes seconds. A condition that names only relations depends on the objects
+present, their identities and roles, and the relations between them; these are saved when the run is added,
+and evaluated by the same code. A run without this file, or with one of another version of visup, is replayed.
 """
 
 from __future__ import annotations
@@ -35,26 +34,26 @@ from visup.version import __version__
 FORMAT = 1
 STATES = 1 + max(row for column in COLUMNS.each for row in column.rows)
 SURE = tuple(sorted({column.confidence for column in COLUMNS.each}))
-"""Rows of numbers that say how sure an answer is; the others do not count here."""
+"""Rows of the numbers that are confidences; the others are not needed."""
 NUMBERS = 1 + max(
     max(c.confidence, -1 if c.value is None else c.value, -1 if c.sigma is None else c.sigma)
     for c in COLUMNS.each
 )
 NOWHERE = cast("Region", None)
-"""Where an object is: not kept, and not asked for by relations."""
+"""Region of an object: not saved, and not used by relations."""
 Cast = Mapping[str, Any]
-"""Who is there: as JSON, kept where it changes."""
+"""The objects, names and roles of a step as JSON; saved when they change."""
 
 
 def told_by_relations(pattern: Expression) -> bool:
-    """Whether a condition depends on nothing but relations between objects."""
+    """Whether a condition depends only on relations between objects."""
     prepared = compile_rules((pattern.rule,))
     return not prepared.facts and not prepared.quantities and set(prepared.relations) <= set(NAMES)
 
 
 @dataclass(slots=True)
 class BeliefNotes:
-    """Takes the steps of a run, and gives what is kept of them."""
+    """Collects the beliefs of a run step by step."""
 
     times: list[float] = field(default_factory=list)
     frames: list[int] = field(default_factory=list)
@@ -64,7 +63,7 @@ class BeliefNotes:
     whole: bool = True
 
     def __call__(self, step: Step) -> None:
-        """Take one step."""
+        """Add one step."""
         mind = as_rules_see(step.mind)
         table = mind.relations
         if not isinstance(table, RelationTable):
@@ -81,7 +80,7 @@ class BeliefNotes:
             self.sure.append(block.numbers[list(SURE)].ravel())
 
     def content(self) -> bytes:
-        """The file; nothing where a plug-in's reasoner is among those that were heard."""
+        """The content of the file; empty if a plug-in's reasoner contributed relations."""
         if not self.whole:
             return b""
         told = {"format": FORMAT, "visup": __version__, "casts": self.casts}
@@ -98,9 +97,9 @@ class BeliefNotes:
 
 
 def read_minds(folder: Path) -> list[Mind] | None:
-    """The minds of a run, with what is kept of them; None where that is not there, or of another visup."""
+    """The minds of a run as far as saved; None if the file is missing or of another version of visup."""
     try:
-        # Read whole first: of a damaged one NumPy would leave the file open.
+        # Read into memory first: NumPy would leave a damaged file open.
         with np.load(BytesIO((folder / BELIEFS).read_bytes()), allow_pickle=False) as kept:
             told = json.loads(kept["told"].tobytes())
             if (told["format"], told["visup"]) != (FORMAT, __version__):
@@ -113,7 +112,7 @@ def read_minds(folder: Path) -> list[Mind] | None:
 
 
 def _is_all(table: RelationTable, blocks: list[RelationBlock]) -> bool:
-    """Whether the relations that conditions name stand in one block, and a plug-in adds nothing to them."""
+    """Whether one block has all relations of the condition language, without additions by plug-ins."""
     others = {n for part in table.parts if part.columns is not COLUMNS for n in part.columns.named}
     return len(blocks) <= 1 and others.union(r.name for r in table.extra).isdisjoint(NAMES)
 
@@ -166,12 +165,12 @@ def _minds(
 
 @lru_cache(maxsize=64)
 def _never(pairs: int) -> NDArray[np.float64]:
-    """Since when relations hold: not kept, and not asked for."""
+    """Since when relations hold: not saved, and not used."""
     return np.zeros((STATES, pairs))
 
 
 def _mind_of(told: Cast) -> tuple[Mind, list[int] | None]:
-    """Who is there, and between whom relations are kept."""
+    """The mind of a step, and the objects between which relations are saved."""
     played = tuple(Binding(actor, (), number) for actor, number in told["played"])
     mind = Mind(
         objects={int(number): _object(int(number), name) for number, name in told["names"].items()},

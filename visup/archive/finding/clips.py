@@ -1,4 +1,4 @@
-"""What was found, cut out of the footage, where that is still there."""
+"""Cuts hits out of the footage, if it still exists."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from visup.report.video import WebmWriter
 
 BEFORE_S = 1.0
 AFTER_S = 1.0
-"""How much of what comes before and after a hit is shown."""
+"""Seconds shown before and after a hit."""
 
 
 def cut_hits(clip: str, run: str, hits: tuple[Hit, ...], folder: Path) -> list[Path]:
@@ -19,15 +19,15 @@ def cut_hits(clip: str, run: str, hits: tuple[Hit, ...], folder: Path) -> list[P
 
     Args:
         clip: The source of the run.
-        run: Its key; the videos are called after it and their time.
-        hits: By time.
-        folder: Where to; made when it is not there.
+        run: Its key; the videos are named for it and their time.
+        hits: Hits by time.
+        folder: Folder for the videos; created if missing.
 
     Returns:
-        The videos. Hits whose times, with a second before and after, overlap share one.
+        The videos. Hits that overlap, with a second before and after, share one.
 
     Raises:
-        SourceError: The footage is not there any more, or cannot be read.
+        SourceError: The footage is missing or cannot be read.
         OutputError: A video cannot be written.
     """
     if not Path(clip).exists():
@@ -44,7 +44,7 @@ def cut_hits(clip: str, run: str, hits: tuple[Hit, ...], folder: Path) -> list[P
 
 
 def spans(hits: tuple[Hit, ...]) -> list[tuple[float, float]]:
-    """What is to be cut out: times with a second before and after; those that overlap are one."""
+    """The intervals to cut: hits with a second before and after, overlapping ones merged."""
     found: list[tuple[float, float]] = []
     for begin, end in sorted((max(0.0, h.begin - BEFORE_S), h.end + AFTER_S) for h in hits):
         if found and begin <= found[-1][1]:
@@ -55,7 +55,7 @@ def spans(hits: tuple[Hit, ...]) -> list[tuple[float, float]]:
 
 
 def _cut(clip: str, begin: float, end: float, path: Path) -> bool:
-    """Whether there was a frame between two times."""
+    """Write the frames between two times; returns whether there were any."""
     with open_source(clip) as source, WebmWriter(path, max(1.0, source.fps)) as writer:
         for frame in source:
             if frame.time > end:

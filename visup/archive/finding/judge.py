@@ -1,4 +1,4 @@
-"""A condition judged step by step in a run, as rules are."""
+"""Evaluates a condition step by step in a run, as rules are evaluated."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ Objects = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """A time in which a condition was true, or unknown.
+    """An interval in which a condition was true or unknown.
 
     Attributes:
-        objects: Ids, in the order of the condition's names.
-        names: What they were taken for when it began.
+        objects: Ids in the order of the condition's names.
+        names: Their identities at the beginning.
         truth: 'true' or 'unknown'.
         begin: Seconds.
-        end: Seconds at which it was so no more, or of the last step.
-        open: Whether it was still so when the run ended.
-        confidence: Lowest among the relations of the condition that were true meanwhile; None without any.
-        rule: Which one, where rules were looked for.
+        end: Time of the first step at which it no longer was, or of the last step, seconds.
+        open: Whether the run ended meanwhile.
+        confidence: Lowest confidence of the condition's relations that were true meanwhile; None without any.
+        rule: Name of the rule, if rules were searched for.
     """
 
     objects: Objects
@@ -41,7 +41,7 @@ class Hit:
 
 @dataclass(slots=True)
 class ConditionJudge:
-    """Judges a condition step by step."""
+    """Evaluates a condition step by step."""
 
     pattern: Expression
     before: ExpressionResult | None = None
@@ -51,11 +51,11 @@ class ConditionJudge:
     confidences: dict[tuple[Objects, int], float] = field(default_factory=dict)
 
     def __call__(self, step: Step) -> None:
-        """Judge it after one step."""
+        """Evaluate it after one step."""
         self.judge(as_rules_see(step.mind))
 
     def judge(self, mind: Mind) -> None:
-        """Judge it in a mind as rules see it, the next one of a run."""
+        """Evaluate it in the next mind of a run, given as rules see it."""
         number = self.last.number + 1 if self.last else 0
         self.last = StepTime(number, mind.frame_index, mind.time)
         self.before = self.pattern.judge(mind, self.before)
@@ -82,7 +82,7 @@ class ConditionJudge:
     def _values(
         self, mind: Mind, judged: ExpressionResult
     ) -> dict[tuple[int, ...], tuple[str, Objects]]:
-        """Of each set of objects the truth, and the choice for which it holds: true before unknown."""
+        """Set of objects -> the truth and the assignment for which it holds, true before unknown."""
         found: dict[tuple[int, ...], tuple[str, Objects]] = {}
         assert self.last is not None
         for reading in judged.readings:
@@ -99,12 +99,12 @@ class ConditionJudge:
 
     def _note_confidence(self, mind: Mind, objects: Objects) -> None:
         rule = self.pattern.rule
-        meant = dict(zip(rule.variables, objects, strict=True))
+        assignment = dict(zip(rule.variables, objects, strict=True))
         for call in compile_rules((rule,)).related(rule):
-            held = mind.relation(call.name, *(meant[w] for w in call.words))
-            if held is not None and held.truth is Truth.TRUE and self.last is not None:
+            found = mind.relation(call.name, *(assignment[w] for w in call.words))
+            if found is not None and found.truth is Truth.TRUE and self.last is not None:
                 at = objects, self.last.number
-                self.confidences[at] = min(self.confidences.get(at, 1.0), held.confidence)
+                self.confidences[at] = min(self.confidences.get(at, 1.0), found.confidence)
 
     def _confidence(self, objects: Objects, first: int, end: int) -> float | None:
         found = [
@@ -116,5 +116,5 @@ class ConditionJudge:
 
 
 def as_rules_see(mind: Mind) -> Mind:
-    """A mind with its tasks as they stood when the rules of its step were judged."""
+    """A mind with the task beliefs that the rules of its step were evaluated with."""
     return replace(mind, tasks=rule_memory(mind).tasks)

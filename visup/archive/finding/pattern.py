@@ -1,4 +1,4 @@
-"""What is looked for: a condition of the rule language, or several `and then`.
+"""Search patterns: a condition of the rule language, or several joined by `and then`.
 
 `f and then g within 5 s` is true when g is, and f was at an earlier sample, at most 5 s before; without
 `within`, at any earlier sample.
@@ -18,19 +18,19 @@ from visup.rules.safety.expression import Expression, expression
 _THEN = re.compile(r"\band\s+then\b")
 _WITHIN = re.compile(r"^(?P<what>.*)\bwithin\s+(?P<span>\d+(\.\d+)?\s*(ms|s|min|h))\s*$", re.DOTALL)
 JUST_BEFORE = "1 ms"
-"""A sample speaks for the time up to the next one: what held so shortly ago held at the sample before."""
+"""A sample holds until the next one, so what held this shortly ago held at the previous sample."""
 
 
 def read_pattern(text: str) -> Expression:
-    """A condition made ready.
+    """Parse and compile a condition.
 
     Raises:
-        RuleError: It is none, or not as it should be.
-        ManyErrors: It has several faults.
+        RuleError: It is not a valid condition.
+        ManyErrors: It has several mistakes.
     """
     if len(parts := list(_parts(text))) > 1:
-        for part in parts:  # what is wrong with one is told at its own place
-            expression(_said(_WITHIN.sub(r"\g<what>", part)))
+        for part in parts:  # mistakes are reported at their own position
+            expression(_stripped(_WITHIN.sub(r"\g<what>", part)))
     found = expression(desugared(text))
     if found.quantity:
         raise RuleError(
@@ -41,7 +41,7 @@ def read_pattern(text: str) -> Expression:
 
 
 def desugared(text: str) -> str:
-    """The text with every `and then` written in the rule language.
+    """The text with every `and then` expanded to the rule language.
 
     Raises:
         RuleError: Something is missing before or after one.
@@ -49,19 +49,19 @@ def desugared(text: str) -> str:
     first, *following = _parts(text)
     if not following:
         return text
-    whole = _said(first)
+    condition = _stripped(first)
     for part in following:
         match = _WITHIN.match(part)
         before = (
-            f"({whole}) within {JUST_BEFORE} to {match['span']} ago"
+            f"({condition}) within {JUST_BEFORE} to {match['span']} ago"
             if match
-            else (f"previous once ({whole})")
+            else (f"previous once ({condition})")
         )
-        whole = f"({_said(match['what'] if match else part)}) and ({before})"
-    return whole
+        condition = f"({_stripped(match['what'] if match else part)}) and ({before})"
+    return condition
 
 
-def _said(part: str) -> str:
+def _stripped(part: str) -> str:
     if not part.strip():
         raise RuleError(
             "something is missing beside `and then`", expected="f and then g within 5 s"
@@ -70,7 +70,7 @@ def _said(part: str) -> str:
 
 
 def _parts(text: str) -> Iterator[str]:
-    """What stands between the `and then` that are in no parentheses."""
+    """The parts between the `and then` that are outside parentheses."""
     begin = 0
     for match in _THEN.finditer(text):
         before = text[: match.start()]

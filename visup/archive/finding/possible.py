@@ -1,10 +1,10 @@
-"""Which runs of a lake can have a moment at which a condition is true, by the intervals of their relations.
+"""Prefilters the runs of a lake for a condition, by the recorded intervals of relations.
 
-Of a formula the *possible times* are found: intervals that hold every moment at which it is true, for each
-choice of objects, and perhaps others. A relation is possible where it was recorded as true; `and` is possible
-where all its parts are; a window moves and widens the interval of its part. What says nothing about recorded
-relations (a quantity, a `not`) is possible always. What is not possible need not be looked at; what is
-possible is then judged exactly.
+The *possible times* of a formula are intervals that include every moment at which it is true, for each
+assignment of objects, and perhaps others. A relation is possible where it was recorded as true; `and` where
+all its parts are; a window shifts and widens the interval of its part. A formula without recorded relations
+(a quantity, a `not`) is always possible. Runs without possible times are skipped; the others are evaluated
+exactly.
 """
 
 from __future__ import annotations
@@ -35,28 +35,28 @@ from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.relations.reasoner import COLUMNS
 
 HELD_S = SAMPLE_HOLD / TICKS + 0.1
-"""By how much intervals are widened: a sample speaks for so much of what follows; and for rounding."""
+"""Seconds by which intervals are widened: the hold time of a sample, and rounding."""
 EVER = 1e12
 HELD = (
     'held AS MATERIALIZED (SELECT number AS run, relation, a, b, "begin", "end" FROM lake_index.held'
     " WHERE relation IN ({names}){known})"
 )
-"""Relations that held, those that a formula names, in the runs with somebody for every name: read once. Runs
-are numbers."""
+"""Intervals of the relations that a formula names, in runs with an object for every name; materialised once.
+Runs are numbers."""
 SYMMETRIC = frozenset(
     name for column in COLUMNS.each if column.rows[0] == column.rows[1] for name in column.names
 ) | {"coupled"}
-"""Relations whose rows stand once for a pair."""
+"""Relations with one row per unordered pair."""
 
 
 @dataclass(frozen=True, slots=True)
 class PossibleTimes:
-    """Intervals in which something may be true, as a SELECT.
+    """Intervals in which a formula may be true, as a SELECT.
 
     Attributes:
-        sql: Gives `run`, the variables, `low` and `high` (seconds), from the rows of `HELD`.
-        variables: Of which objects.
-        relations: Which relations it is about.
+        sql: Yields `run`, the variables, `low` and `high` (seconds) from the rows of `HELD`.
+        variables: Its variables.
+        relations: Its relations.
     """
 
     sql: str
@@ -70,18 +70,18 @@ class PossibleTimes:
         return PossibleTimes(sql, self.variables, self.relations)
 
     def of(self, variables: Sequence[str]) -> PossibleTimes:
-        """The same of fewer variables, whoever stands for the others."""
-        kept = tuple(v for v in self.variables if v in variables)
-        names = "".join(f"{_name(v)}, " for v in kept)
+        """The projection on fewer variables."""
+        retained = tuple(v for v in self.variables if v in variables)
+        names = "".join(f"{_name(v)}, " for v in retained)
         return PossibleTimes(
-            f"SELECT DISTINCT run, {names}low, high FROM ({self.sql})", kept, self.relations
+            f"SELECT DISTINCT run, {names}low, high FROM ({self.sql})", retained, self.relations
         )
 
     def meant(self, variable: str, who: str) -> PossibleTimes:
-        """The same where only some objects may stand for a variable.
+        """The times restricted to some objects for a variable.
 
         Args:
-            variable: One of these, or another.
+            variable: One of the variables, or another.
             who: A SELECT of `run` and `object`.
         """
         if variable not in self.variables:
@@ -101,9 +101,9 @@ def possible_times(formula: Formula) -> PossibleTimes | None:
             return _relation(name, a, b)
         case And(parts=parts):
             found = [p for p in map(possible_times, parts) if p is not None]
-            return reduce(_both, found) if found else None
+            return reduce(_intersection, found) if found else None
         case Or(parts=parts):
-            return _either([possible_times(p) for p in parts])
+            return _union([possible_times(p) for p in parts])
         case Quantified(kind="exists", variable=variable, part=part):
             inner = possible_times(part)
             others = [v for v in inner.variables if v != variable] if inner else []
@@ -121,7 +121,7 @@ def _windowed(formula: Formula) -> PossibleTimes | None:
     match formula:
         case PastOperator(kind="once", part=part, window=window):
             return _moved(part, *_span(window))
-        case PastOperator(kind="always", part=part, window=window) if _from_now(window):
+        case PastOperator(kind="always", part=part, window=window) if _includes_now(window):
             return possible_times(part)
         case Since(right=right, window=window):
             return _moved(right, *_span(window))
@@ -141,14 +141,14 @@ def _span(window: TimeWindow | None) -> tuple[float, float]:
     return (0.0, EVER) if window is None else (window.low.base, window.high.base)
 
 
-def _from_now(window: TimeWindow | None) -> bool:
-    """Whether a window has the present in it."""
+def _includes_now(window: TimeWindow | None) -> bool:
+    """Whether a window includes the present."""
     return window is None or window.low.base == 0
 
 
 def _relation(name: str, a: str, b: str) -> PossibleTimes:
     low, high = f'"begin" - {HELD_S!r}', f'"end" + {HELD_S!r}'
-    if name == "coupled":  # judged of what is hidden, too, which the recorded relation leaves open
+    if name == "coupled":  # also evaluated for hidden objects, for which no relation is recorded
         low, high = repr(-EVER), repr(EVER)
     rows = f"FROM held WHERE relation = {quoted(name)}"
     sql = f"SELECT run, a AS {_name(a)}, b AS {_name(b)}, {low} AS low, {high} AS high {rows}"
@@ -160,7 +160,7 @@ def _relation(name: str, a: str, b: str) -> PossibleTimes:
     return PossibleTimes(sql, (a, b), (name,))
 
 
-def _both(one: PossibleTimes, other: PossibleTimes) -> PossibleTimes:
+def _intersection(one: PossibleTimes, other: PossibleTimes) -> PossibleTimes:
     shared = [v for v in other.variables if v in one.variables]
     more = [v for v in other.variables if v not in one.variables]
     names = [f"l.{_name(v)}" for v in one.variables] + [f"r.{_name(v)}" for v in more]
@@ -174,7 +174,7 @@ def _both(one: PossibleTimes, other: PossibleTimes) -> PossibleTimes:
     return PossibleTimes(sql, (*one.variables, *more), (*one.relations, *other.relations))
 
 
-def _either(parts: Sequence[PossibleTimes | None]) -> PossibleTimes | None:
+def _union(parts: Sequence[PossibleTimes | None]) -> PossibleTimes | None:
     known = [p for p in parts if p is not None]
     if len(known) < len(parts):
         return None

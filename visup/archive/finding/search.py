@@ -1,4 +1,4 @@
-"""A condition looked for in all runs of a lake, judged in each as an agent would have."""
+"""Searches all runs of a lake for a condition, evaluated as an agent would have."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 
 MANY_QUICK = 200
-"""Fewer runs that are looked into in a moment are done before other processes have begun."""
+"""Fewer quick runs than this are done before worker processes would have started."""
 _BY_ID = re.compile(r"object_(\d+)")
 
 
 @dataclass(frozen=True, slots=True)
 class FoundRun:
-    """A run that was looked at.
+    """A run that was searched.
 
     Attributes:
         run: Its key.
-        clip: What was watched.
-        folder: Where it can be opened.
-        hits: By time.
+        clip: Its source.
+        folder: Its folder.
+        hits: Hits by time.
     """
 
     run: str
@@ -53,30 +53,30 @@ class FoundRun:
 
 
 class Search(Protocol):
-    """What is looked for."""
+    """What to search for."""
 
     @property
     def quick(self) -> bool:
-        """Whether a run is looked into in a moment, without reasoning about it again."""
+        """Whether a run can be searched without replaying its reasoning."""
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
-        """The runs in which it may be; in all others it is not.
+        """The runs that may have hits; all others have none.
 
         Raises:
-            QueryError: It names somebody whom no run of the lake knows.
+            QueryError: It names an object that no run of the lake has.
         """
 
     def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
-        """Where it is in a run, by time."""
+        """The hits in a run, by time."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConditionSearch:
-    """Looks for the times in which a condition was true, or unknown.
+    """Searches for the intervals in which a condition was true or unknown.
 
     Attributes:
         pattern: The condition.
-        unknown: Whether times in which it was unknown are wanted, too; any run may have some.
+        unknown: Whether to include intervals in which it was unknown; any run may have some.
     """
 
     pattern: Expression
@@ -93,7 +93,7 @@ class ConditionSearch:
         who = {v: select for v in variables if (select := objects_meant(v)) is not None}
         for variable, select in who.items():
             if not database.ask(f"SELECT 1 FROM ({select}) LIMIT 1").num_rows:
-                raise _nobody(database, variable)
+                raise _unknown_name(database, variable)
         if self.unknown:
             return runs_of(database, None, who)
         return runs_of(database, possible_times(self.pattern.rule.when), who)
@@ -111,11 +111,11 @@ class ConditionSearch:
 
 @dataclass(frozen=True, slots=True)
 class RulesSearch:
-    """Looks for the alerts that other rules would have raised.
+    """Searches for the alerts that other rules would have raised.
 
     Attributes:
         file: A rules file.
-        rules: What it holds.
+        rules: Its rules.
     """
 
     file: Path
@@ -157,11 +157,11 @@ class RulesSearch:
 
 
 def read_search(text: str, *, unknown: bool = False) -> Search:
-    """What is looked for, from a condition or the name of a rules file or a task file.
+    """Parse a search: a condition, or the name of a rules file or a task file.
 
     Raises:
         RuleError: It is none of them.
-        ManyErrors: It has several faults.
+        ManyErrors: It has several mistakes.
     """
     if text.endswith((".rules", ".task")):
         if unknown:
@@ -171,7 +171,7 @@ def read_search(text: str, *, unknown: bool = False) -> Search:
             )
         if text.endswith(".rules"):
             return RulesSearch(Path(text), load_rules(text))
-        load_tasks(text)  # what is wrong with it is told before the first run
+        load_tasks(text)  # reports mistakes before the first run
         return TaskSearch(Path(text))
     return ConditionSearch(read_pattern(text), unknown)
 
@@ -179,27 +179,27 @@ def read_search(text: str, *, unknown: bool = False) -> Search:
 def find(
     lake: Lake, search: Search, runs: Iterable[str], workers: int | None = 0
 ) -> Iterator[FoundRun]:
-    """Look into runs.
+    """Search runs.
 
     Args:
         lake: The lake.
-        search: What is looked for.
-        runs: Which runs; those that are possible are enough.
-        workers: Processes that share them; None for one for each core.
+        search: What to search for.
+        runs: The runs; those that are possible suffice.
+        workers: Worker processes; None for one per core.
 
     Yields:
-        Each run, also one without hits.
+        Each run, including those without hits.
 
     Raises:
         OutputError: A run is damaged.
     """
-    wanted = list(runs)
-    if workers is None and search.quick and len(wanted) < MANY_QUICK:
+    keys = list(runs)
+    if workers is None and search.quick and len(keys) < MANY_QUICK:
         workers = 0
-    yield from each_run(partial(_looked_into, lake, search), wanted, workers)
+    yield from each_run(partial(_searched, lake, search), keys, workers)
 
 
-def _looked_into(lake: Lake, search: Search, run: str) -> FoundRun:
+def _searched(lake: Lake, search: Search, run: str) -> FoundRun:
     recording, settings = lake.recorded(run)
     hits = search.hits(recording, settings)
     return FoundRun(run, settings.source, lake.folder_of(run), hits)
@@ -208,11 +208,11 @@ def _looked_into(lake: Lake, search: Search, run: str) -> FoundRun:
 def runs_of(
     database: LakeDatabase, times: PossibleTimes | None, who: Mapping[str, str]
 ) -> list[str]:
-    """The runs with possible times and with somebody for every name.
+    """The runs with possible times and an object for every name.
 
     Args:
         database: The lake.
-        times: When it may be; None for always.
+        times: Possible times; None for always.
         who: Variable -> SELECT of `run`, as a number, and `object`.
     """
     named = {v: f'"who_{v}"' for v in who}
@@ -234,7 +234,7 @@ def runs_of(
 
 
 def objects_meant(variable: str) -> str | None:
-    """The objects that a name may ever have stood for, as a SELECT; None for a name that is anybody's."""
+    """The objects that a name may have meant, as a SELECT; None for a variable."""
     if by_id := _BY_ID.fullmatch(variable):
         return (
             "SELECT n.number AS run, o.object FROM lake.objects o JOIN lake_index.runs n USING (run)"
@@ -245,7 +245,7 @@ def objects_meant(variable: str) -> str | None:
     return f"SELECT number AS run, object FROM lake_index.meant WHERE name = {quoted(variable)}"
 
 
-def _nobody(database: LakeDatabase, name: str) -> QueryError:
+def _unknown_name(database: LakeDatabase, name: str) -> QueryError:
     known = database.ask("SELECT DISTINCT name FROM lake_index.meant ORDER BY name")
     names = [n for n in known.column("name").to_pylist() if " " not in n]
     return QueryError(

@@ -1,4 +1,4 @@
-"""A task as a question: in which runs was it carried out, and when?"""
+"""Searches for a task: in which runs it was carried out, and when."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from visup.runs.settings import WatchSettings
 
 @dataclass(frozen=True, slots=True)
 class TaskSearch:
-    """Looks for the runs in which a task succeeded.
+    """Searches for the runs in which a task succeeded.
 
     Attributes:
         file: A task file.
@@ -26,12 +26,12 @@ class TaskSearch:
     quick: bool = False
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
-        """See `Search`: any run may have it, with whoever plays its actors."""
+        """See `Search`: any run is possible, with any objects as its actors."""
         found: list[str] = database.ask("SELECT run FROM lake.runs ORDER BY run")["run"].to_pylist()
         return found
 
     def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
-        """See `Search`: from the first stage under way to success."""
+        """See `Search`: from the first active stage to success."""
         watch = _TaskTimes()
         replay(recording, changed_settings(settings, tasks=(str(self.file),)), tell=watch)
         return tuple(sorted(watch.done.values(), key=lambda hit: (hit.end, hit.rule)))
@@ -39,13 +39,13 @@ class TaskSearch:
 
 @dataclass(slots=True)
 class _TaskTimes:
-    """When each task began and succeeded; told of each step."""
+    """Collects when each task began and succeeded."""
 
     begun: dict[str, float] = field(default_factory=dict)
     done: dict[str, Hit] = field(default_factory=dict)
 
     def __call__(self, step: Step) -> None:
-        """Take down one step."""
+        """Add one step."""
         for task in step.mind.tasks:
             if task.current is not None:
                 self.begun.setdefault(task.task, step.time)
@@ -53,7 +53,7 @@ class _TaskTimes:
                 begin = self.begun.get(task.task, step.time)
                 self.done[task.task] = _hit(task, begin, step)
             elif task.verdict is not Verdict.SUCCEEDED:
-                self.done.pop(task.task, None)  # it came to nothing after all
+                self.done.pop(task.task, None)  # the success was withdrawn
 
 
 def _hit(task: TaskBelief, begin: float, step: Step) -> Hit:

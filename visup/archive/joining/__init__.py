@@ -1,5 +1,5 @@
-"""The files of many runs joined, so that a question to a hundred thousand runs opens a few hundred files.
+"""Compaction: the files of many runs joined, so that a query over 100,000 runs opens a few hundred files.
 
-Read `manifest.py` (which partitions a lake has: one file, replaced whole), `partition.py` (what is in one,
-with its index) and `compacting.py` (runs into partitions, and what they replace taken away).
+Read `manifest.py` (the partitions of a lake: one file, replaced atomically), `partition.py` (the content of
+one, with its index) and `compacting.py` (joins runs into partitions and deletes what they replace).
 """

@@ -1,8 +1,7 @@
-"""Which partitions a lake has: one file, replaced whole, so that a reader sees all of a change or nothing.
+"""The manifest: the partitions of a lake in one file, which is replaced atomically.
 
-A run is in a partition when the manifest says so. Files of its own that are still there then are of no
-account any more, and go later: a reader that began before the manifest was replaced may still be reading
-them.
+A run is in a partition when the manifest says so. Its own files are then ignored, and deleted later: a reader
+that began before the manifest was replaced may still be using them.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ MOST_RUNS = 2_000
 
 @dataclass(frozen=True, slots=True)
 class Partition:
-    """Runs whose rows stand in the same files.
+    """Runs whose rows share files.
 
     Attributes:
-        name: Follows from its runs; its folder is called so.
-        number: Its place in the index, where a run is a number.
-        runs: Their keys, sorted.
-        rows: Of relations: what its size is reckoned by.
-        since: When it came into the manifest, seconds since the epoch.
-        tidied: Whether its runs have no files of their own any more.
+        name: Derived from its runs; also the name of its folder.
+        number: Its position in the index, from which the numbers of its runs follow.
+        runs: Keys of the runs, sorted.
+        rows: Rows of relations, the measure of its size.
+        since: When it was added to the manifest, seconds since the epoch.
+        tidied: Whether the runs' own files have been deleted.
     """
 
     name: str
@@ -45,7 +44,7 @@ class Partition:
     tidied: bool = False
 
     def run_number(self, place: int) -> int:
-        """The number that a run has in the index, by its place among `runs`."""
+        """The number of a run in the index, by its position in `runs`."""
         return self.number * MOST_RUNS + place
 
 
@@ -54,8 +53,8 @@ class Manifest:
     """The partitions of a lake.
 
     Attributes:
-        partitions: Those that are read.
-        retired: Name of a partition that others replace -> since when, seconds since the epoch.
+        partitions: The active partitions.
+        retired: Name of a replaced partition -> since when, seconds since the epoch.
     """
 
     partitions: tuple[Partition, ...] = ()
@@ -67,7 +66,7 @@ class Manifest:
         return frozenset(run for part in self.partitions for run in part.runs)
 
     def free_number(self) -> int:
-        """The lowest number that no partition has."""
+        """The lowest unused partition number."""
         taken = {part.number for part in self.partitions}
         return next(n for n in range(len(taken) + 1) if n not in taken)
 
@@ -75,23 +74,23 @@ class Manifest:
         """Replace the manifest of a lake.
 
         Raises:
-            OSError: It cannot be written; the old one stands.
+            OSError: It cannot be written; the old one remains.
         """
-        told = {
+        fields = {
             "version": VERSION,
             "partitions": [asdict(part) for part in self.partitions],
             "retired": dict(self.retired),
         }
-        write_whole(lake / MANIFEST, (json.dumps(told) + "\n").encode())
+        write_whole(lake / MANIFEST, (json.dumps(fields) + "\n").encode())
 
 
 def partition_name(runs: Iterable[str]) -> str:
-    """The name of the partition of some runs: 16 hexadecimal digits."""
+    """The name of a partition of some runs: 16 hexadecimal digits."""
     return hashlib.sha256("\n".join(sorted(runs)).encode()).hexdigest()[:16]
 
 
 def read_manifest(lake: Path) -> Manifest:
-    """The manifest of a lake; without partitions where there is none.
+    """The manifest of a lake; an empty one if there is none.
 
     Raises:
         OutputError: It is damaged, or of another version.
@@ -101,23 +100,25 @@ def read_manifest(lake: Path) -> Manifest:
         stat = path.stat()
     except FileNotFoundError:
         return Manifest()
-    # Replaced whole, it is another file then: what was read of this one is still so.
+    # The file is replaced, never modified, so its inode, time and size identify the cached content.
     return _read(path, (stat.st_ino, stat.st_mtime_ns, stat.st_size))
 
 
 @lru_cache(maxsize=4)
 def _read(path: Path, state: tuple[int, int, int]) -> Manifest:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        if told["version"] != VERSION:
+        fields = json.loads(path.read_text(encoding="utf-8"))
+        if fields["version"] != VERSION:
             raise OutputError(
-                f"the list of partitions has version {told['version']}",
+                f"the list of partitions has version {fields['version']}",
                 where=str(path),
                 expected=f"version {VERSION}",
                 hint="read the lake with the visup that wrote it",
             )
-        parts = (Partition(**{**part, "runs": tuple(part["runs"])}) for part in told["partitions"])
-        return Manifest(tuple(parts), told["retired"])
+        parts = (
+            Partition(**{**part, "runs": tuple(part["runs"])}) for part in fields["partitions"]
+        )
+        return Manifest(tuple(parts), fields["retired"])
     except (OSError, ValueError, KeyError, TypeError) as fault:
-        what = f"the list of partitions cannot be read ({fault})"
-        raise OutputError(what, where=str(path)) from fault
+        message = f"the list of partitions cannot be read ({fault})"
+        raise OutputError(message, where=str(path)) from fault

@@ -1,8 +1,8 @@
-"""One partition: the rows of its runs in a file for each table, and its index.
+"""One partition: the rows of its runs in one file per table, and its index.
 
-The index is what questions need of nearly every run: the times in which relations held, whom a name may have
-stood for, and the times of stages with the stretches of one status joined. Runs are numbers in it, since
-joining numbers takes a fraction of what joining keys takes.
+The index is what most queries need: the intervals in which relations held, the objects that a name may mean,
+and the intervals of stages merged by status. Runs are numbers in it, because joining on numbers is much
+faster than on keys.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 HELD, MEANT, STAGE_TIMES = "held", "meant", "stage_times"
 INDEX = (HELD, MEANT, STAGE_TIMES)
-"""Files of a partition beside those of the tables."""
+"""Further files of a partition."""
 ROW_GROUP = 65_536
-"""A question about one relation passes over most groups by their least and greatest value."""
+"""Rows per Parquet row group: a query for one relation skips most groups by their minimum and maximum."""
 
 Tables = Mapping[str, "pa.Table"]
 
 
 def read_files(files: Iterable[Path], table: str) -> pa.Table:
-    """The rows of some files of a table, in their order.
+    """The rows of some files of a table, in order.
 
     Raises:
         OSError: One cannot be read.
@@ -45,11 +45,11 @@ def read_files(files: Iterable[Path], table: str) -> pa.Table:
 
 
 def in_order(rows: pa.Table, runs: Sequence[str]) -> pa.Table:
-    """Rows by relation, where they have one, and then by run; what is left keeps its order.
+    """Sort rows stably by relation, if they have one, and then by run.
 
     Args:
-        rows: Of a table; those of a run stand in their own order.
-        runs: Sorted keys; rows of other runs are left out.
+        rows: Rows of a table, those of a run in order.
+        runs: Sorted keys; rows of other runs are dropped.
     """
     arrow, compute = imported("pyarrow"), imported("pyarrow.compute")
     rows = rows.filter(compute.is_in(rows["run"], arrow.array(runs, arrow.string())))
@@ -62,12 +62,12 @@ def in_order(rows: pa.Table, runs: Sequence[str]) -> pa.Table:
 
 
 def write_partition(folder: Path, part: Partition, tables: Tables) -> None:
-    """Write the files of a partition; it is none before the manifest says so.
+    """Write the files of a partition; it counts only once the manifest names it.
 
     Args:
-        folder: Its own.
-        part: Which.
-        tables: The rows of its runs, by the name of their table.
+        folder: Its folder.
+        part: The partition.
+        tables: The rows of its runs by table.
 
     Raises:
         OSError: They cannot be written.
@@ -82,7 +82,7 @@ def write_partition(folder: Path, part: Partition, tables: Tables) -> None:
 
 
 def _held(part: Partition, relations: pa.Table) -> pa.Table:
-    """The times in which relations held."""
+    """The intervals in which relations held."""
     compute = imported("pyarrow.compute")
     held = relations.filter(compute.equal(relations["truth"], "true"))
     columns = {name: held[name] for name in ("relation", "a", "b", "begin", "end")}
@@ -91,17 +91,17 @@ def _held(part: Partition, relations: pa.Table) -> pa.Table:
 
 def _numbers(part: Partition, runs: pa.ChunkedArray) -> pa.ChunkedArray:
     arrow, compute = imported("pyarrow"), imported("pyarrow.compute")
-    places = compute.index_in(runs, arrow.array(part.runs, arrow.string()))
-    return compute.cast(compute.add(compute.cast(places, "int64"), part.run_number(0)), "uint32")
+    positions = compute.index_in(runs, arrow.array(part.runs, arrow.string()))
+    return compute.cast(compute.add(compute.cast(positions, "int64"), part.run_number(0)), "uint32")
 
 
 def _meant(part: Partition, runs: pa.Table, objects: pa.Table) -> pa.Table:
-    """Whom each name may have stood for, by name."""
+    """The objects that each name may mean, by name."""
     arrow = imported("pyarrow")
     place = {run: part.run_number(n) for n, run in enumerate(part.runs)}
     actors = {
-        run: json.loads(told or "{}")
-        for run, told in zip(runs["run"].to_pylist(), runs["actors"].to_pylist(), strict=True)
+        run: json.loads(text or "{}")
+        for run, text in zip(runs["run"].to_pylist(), runs["actors"].to_pylist(), strict=True)
     }
     columns = (objects[c].to_pylist() for c in ("run", "object", "names", "actors"))
     found = sorted(
@@ -119,12 +119,12 @@ def _meant(part: Partition, runs: pa.Table, objects: pa.Table) -> pa.Table:
 def meanings(
     names: Sequence[str], played: Sequence[str], actors: Mapping[str, Sequence[str]]
 ) -> set[str]:
-    """The words that an object may ever have been meant by.
+    """The words by which an object may be meant.
 
     Args:
-        names: The identities that it was ever likeliest to have.
-        played: The actors that it was ever believed to play.
-        actors: Actor -> models, of its run.
+        names: Its most likely identities over time.
+        played: The actors it was believed to be.
+        actors: Actor -> models of its run.
 
     >>> sorted(meanings(["spartan"], [], {"satellite": ["spartan"], "arm": ["rms"]}))
     ['satellite', 'spartan']

@@ -1,4 +1,4 @@
-"""What a lake tells as a whole, on one page.
+"""The report page of a lake.
 
 Read `statistics.py` (how long stages take, what drifts, how runs fail), `figures.py` and `page.py`.
 """

@@ -1,4 +1,4 @@
-"""The figures of a lake's page as Plotly draws them."""
+"""The Plotly figures of a lake's report."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_STAGES = 24
 
 
 def verdict_figure(found: LakeStatistics) -> Figure | None:
-    """How many runs of each week ended how."""
+    """Verdicts of the runs by week."""
     dated = [v for v in found.verdicts if v[0]]
     if not dated:
         return None
@@ -45,7 +45,7 @@ def verdict_figure(found: LakeStatistics) -> Figure | None:
 
 
 def duration_figures(found: LakeStatistics) -> list[Figure]:
-    """How long each stage takes, week by week."""
+    """Durations of each stage by week."""
     return [
         _duration_figure(n, d, [w for w in found.by_week if (w.task, w.stage) == (d.task, d.stage)])
         for n, d in enumerate(found.durations[:MOST_STAGES])
@@ -85,7 +85,7 @@ def _duration_figure(number: int, stage: StageDuration, weeks: list[StageDuratio
 
 
 def all_figures(found: LakeStatistics) -> Iterator[Figure]:
-    """All of them, in the order of the page."""
+    """All figures in the order of the page."""
     verdicts = verdict_figure(found)
     yield from [verdicts] if verdicts else []
     yield from duration_figures(found)

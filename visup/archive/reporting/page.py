@@ -1,4 +1,4 @@
-"""The page of a lake: one HTML file that opens offline."""
+"""The report of a lake: one HTML file that opens offline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DURATION_HEAD = ("task", "stage", "runs", "a tenth under", "median", "a tenth ov
 
 
 def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
-    """Write the page of a lake.
+    """Write the report of a lake.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
@@ -28,7 +28,7 @@ def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
 
 
 def lake_page(found: LakeStatistics, lake: Path) -> str:
-    """The whole page; the same lake always gives the same one.
+    """The whole page; it depends on the lake only.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
@@ -50,10 +50,10 @@ def archive_page(template: str, text: Mapping[str, str], drawn: list[Figure], ki
     """A page about many runs.
 
     Args:
-        template: Name of its file in this folder.
-        text: What stands in its places, as HTML.
-        drawn: All figures that it names.
-        kind: What it is about, in a word or two.
+        template: File name in this folder.
+        text: Placeholder -> HTML.
+        drawn: The figures of the page.
+        kind: Kind of page, in a word or two.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
@@ -120,7 +120,7 @@ def _failures(found: LakeStatistics) -> str:
 
 
 def html_table(head: Iterable[str], rows: Iterable[Iterable[str]], empty: str) -> str:
-    """A table of texts, which are escaped; a sentence where there are no rows."""
+    """An HTML table of escaped texts; a sentence if there are no rows."""
     lines = "".join(f"<tr>{''.join(f'<td>{escape(c)}' for c in row)}" for row in rows)
     if not lines:
         return f"<p class=empty>{escape(empty)}</p>"

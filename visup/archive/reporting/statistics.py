@@ -1,4 +1,4 @@
-"""What a lake tells as a whole: how long stages take, what drifts, how runs fail."""
+"""Statistics of a lake: durations of stages, drifts, and failure modes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TOOK = (
     "(SELECT run, task, stage, sum(seconds) AS took FROM stages"
     " WHERE status IN ('active', 'progressing', 'paused', 'stalled') GROUP BY ALL)"
 )
-"""How long each run was at each stage."""
+"""Seconds of each run in each stage."""
 QUANTILES = (
     "count(*) AS runs, quantile_cont(took, 0.1) AS low, median(took) AS mid,"
     " quantile_cont(took, 0.9) AS high, max(took) AS longest"
@@ -28,27 +28,27 @@ BY = """
         SELECT run, unnest(map_entries(from_json(coalesce(actors, '{}'),
                '"MAP(VARCHAR, VARCHAR[])"'))) AS e FROM lake.runs)
 """
-"""Who played in a run, and what its manifest says of it."""
+"""The cast and the manifest labels of a run."""
 LEAST_CHANGE = 0.05
 CHANCE = 0.01
-"""A drift is told when chance alone gives one as strong in one lake of a hundred, whatever the stages."""
+"""Significance level of a drift, corrected for the number of stages."""
 LEAST_RUNS = 10
 MOST_MODES = 20
 
 
 @dataclass(frozen=True, slots=True)
 class StageDuration:
-    """How long a stage takes.
+    """The durations of a stage.
 
     Attributes:
         task: Its task.
         stage: Its name.
-        group: The week, or who played; '' for all runs.
-        runs: How many came to it.
-        low: A tenth of them took less, s.
+        group: The week, or the cast; '' for all runs.
+        runs: Number of runs that reached it.
+        low: 10th percentile, s.
         mid: Median, s.
-        high: A tenth of them took more, s.
-        longest: s.
+        high: 90th percentile, s.
+        longest: Maximum, s.
     """
 
     task: str
@@ -63,15 +63,15 @@ class StageDuration:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """A stage that has become slower or faster over the months.
+    """A stage whose duration changes over time.
 
     Attributes:
         task: Its task.
         stage: Its name.
-        runs: How many came to it.
+        runs: Number of runs that reached it.
         before: Median of the first quarter of them, s.
         after: Median of the last quarter, s.
-        chance: How likely the order of durations would be as far from any, were there no drift.
+        chance: p-value of the order of durations without drift.
     """
 
     task: str
@@ -83,20 +83,20 @@ class Drift:
 
     @property
     def change(self) -> float:
-        """By which share it takes longer now."""
+        """Relative change of the duration."""
         return self.after / self.before - 1.0 if self.before > 0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class FailureMode:
-    """A way in which runs fail.
+    """A failure mode of runs.
 
     Attributes:
-        stage: 'task: stage' that was failing, or '' where no stage was.
-        alert: The gravest kind of alert meanwhile, or ''.
-        runs: How many failed so.
-        share: Of all runs that failed.
-        clip: One of them.
+        stage: 'task: stage' that was failing, or ''.
+        alert: Kind of the most severe alert meanwhile, or ''.
+        runs: Number of runs.
+        share: Share of all failed runs.
+        clip: An example.
         run: Its key.
     """
 
@@ -110,17 +110,17 @@ class FailureMode:
 
 @dataclass(frozen=True, slots=True)
 class LakeStatistics:
-    """All of it.
+    """All statistics of a lake.
 
     Attributes:
-        runs: How many runs there are.
-        hours: Of video.
-        verdicts: (week, verdict, how many), by week.
-        durations: Of stages in all runs.
-        by_week: Of stages, by the week in which runs were taken.
-        by_actor: Of stages, by who played, and by the labels of the manifest.
-        drifts: The strongest first.
-        failures: The most frequent first.
+        runs: Number of runs.
+        hours: Hours of video.
+        verdicts: (week, verdict, count), by week.
+        durations: Durations of stages over all runs.
+        by_week: Durations by the week in which runs were recorded.
+        by_actor: Durations by cast and by manifest labels.
+        drifts: Drifts, strongest first.
+        failures: Failure modes, most frequent first.
     """
 
     runs: int
@@ -134,7 +134,7 @@ class LakeStatistics:
 
 
 def lake_statistics(database: LakeDatabase) -> LakeStatistics:
-    """What a lake tells as a whole."""
+    """Compute all statistics of a lake."""
     ((runs, hours),) = _rows(
         database, "SELECT count(*), coalesce(sum(seconds), 0) / 3600 FROM lake.runs"
     )
@@ -156,24 +156,24 @@ def lake_statistics(database: LakeDatabase) -> LakeStatistics:
 
 
 def drifts(database: LakeDatabase) -> tuple[Drift, ...]:
-    """Stages whose durations go up or down with time, more than chance would have it."""
+    """Stages whose durations rise or fall significantly over time."""
     taken: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for task, stage, at, took in _rows(
+    for task, stage, at, duration in _rows(
         database,
         f"SELECT task, stage, epoch(taken), took FROM {TOOK} JOIN lake.runs USING (run)"
         " WHERE taken IS NOT NULL ORDER BY taken, run",
     ):
-        taken.setdefault((task, stage), []).append((at, took))
+        taken.setdefault((task, stage), []).append((at, duration))
     tried = [_drift(*key, np.array(of)) for key, of in taken.items() if len(of) >= LEAST_RUNS]
     found = [d for d in tried if d.chance < CHANCE / len(tried) and abs(d.change) >= LEAST_CHANGE]
     return tuple(sorted(found, key=lambda d: (-abs(d.change), d.task, d.stage)))
 
 
 def _drift(task: str, stage: str, of: NDArray[np.float64]) -> Drift:
-    """What becomes of a stage with time: (N, 2) times and durations, by time."""
+    """The drift of a stage from (N, 2) times and durations, sorted by time."""
     quarter = max(1, len(of) // 4)
     if np.ptp(of[:, 0]) == 0 or np.ptp(of[:, 1]) == 0:
-        chance = 1.0  # nothing to be ordered by
+        chance = 1.0  # all times or durations are equal
     else:
         chance = float(stats.kendalltau(of[:, 0], of[:, 1]).pvalue)
     before, after = (float(np.median(of[s, 1])) for s in (slice(quarter), slice(-quarter, None)))
@@ -181,7 +181,7 @@ def _drift(task: str, stage: str, of: NDArray[np.float64]) -> Drift:
 
 
 def failure_modes(database: LakeDatabase) -> tuple[FailureMode, ...]:
-    """How runs fail, the most frequent first: by the stage that failed and the gravest alert."""
+    """Failure modes by failed stage and most severe alert, most frequent first."""
     found = _rows(
         database,
         """

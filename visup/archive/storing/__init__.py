@@ -1,5 +1,4 @@
-"""Lakes in stores (`s3://...`, all that fsspec reads and writes): a copy here, and what differs brought over.
+"""Lakes in object stores (`s3://...`, anything that fsspec supports), synchronised with a local copy.
 
-Read `lake_store.py` (a run comes into the store whole or not at all), then `places.py` (what a command
-calls a lake).
+Read `lake_store.py` (transfers each run atomically), then `places.py` (how commands name a lake).
 """

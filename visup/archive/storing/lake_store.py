@@ -1,9 +1,8 @@
-"""A lake in a store, of which there is a copy on this machine.
+"""A lake in an object store with a local copy.
 
-The files of a run never change, so that a file which is there is as it should be. A run is committed in
-the store as it is here: by the file of its row in `runs`, which is written after all others of it.
-Partitions come before `joined.json`, which names them. Journals are brought here when a run is opened, and
-not before.
+The files of a run never change, so an existing file is up to date. A run is committed in the store as
+locally: by the file of its row in `runs`, which is written last. Partitions are written before `joined.json`,
+which names them. Journals are downloaded only when a run is opened.
 """
 
 from __future__ import annotations
@@ -23,21 +22,21 @@ from visup.archive.schema import TABLES
 
 COMMITS = f"{TABLES_FOLDER}/runs/"
 PULLED = ".joined.pulled"
-"""In a copy: `joined.json` as it was in the store when it was last looked at."""
+"""In a copy: the last `joined.json` read from the store."""
 
 
 @dataclass(frozen=True, slots=True)
 class LakeStore:
-    """Where a lake is kept.
+    """The store of a lake.
 
     Attributes:
-        url: Of its folder, without a slash at the end.
+        url: URL of its folder, without a trailing slash.
     """
 
     url: str
 
     def exists(self) -> bool:
-        """Whether there is a lake.
+        """Whether the store has a lake.
 
         Raises:
             OutputError: The store cannot be read.
@@ -46,32 +45,32 @@ class LakeStore:
             return bool(store.exists(f"{root}/{MARK}"))
 
     def pull(self, copy: Path) -> None:
-        """Bring the tables here, as far as they are not; of a run whose row is here all others are.
+        """Download missing table files; the row in `runs` comes last for each run.
 
         Args:
             copy: Folder of the copy.
 
         Raises:
-            OutputError: The store cannot be read, or the copy not be written.
+            OutputError: The store cannot be read, or the copy cannot be written.
         """
         with self._reached() as (store, root):
-            theirs = self._sizes(store, root)
-            tables = [n for n in theirs if n.startswith((f"{TABLES_FOLDER}/", f"{FOLDER}/"))]
+            remote = self._sizes(store, root)
+            tables = [n for n in remote if n.startswith((f"{TABLES_FOLDER}/", f"{FOLDER}/"))]
             for name in sorted(tables, key=_commits_last):
-                _bring(store, f"{root}/{name}", copy / name, theirs[name])
-            joined = _content(store, f"{root}/{MANIFEST}") if MANIFEST in theirs else b""
+                _download(store, f"{root}/{name}", copy / name, remote[name])
+            joined = _content(store, f"{root}/{MANIFEST}") if MANIFEST in remote else b""
             write_whole(copy / PULLED, joined)
             if joined:
                 write_whole(copy / MANIFEST, joined)
-            if MARK in theirs:
+            if MARK in remote:
                 write_whole(copy / MARK, _content(store, f"{root}/{MARK}"))
 
     def fetch(self, run: str, folder: Path) -> None:
-        """Bring the journal of a run here, with all beside it.
+        """Download the journal of a run and the files saved with it.
 
         Args:
             run: Its key.
-            folder: Where it is kept.
+            folder: Its local folder.
 
         Raises:
             OutputError: The store cannot be read.
@@ -82,91 +81,94 @@ class LakeStore:
             source = f"{root}/{RECORDINGS}/{run[:2]}/{run}"
             draft = folder.with_name(f".{folder.name}.part")
             for name, size in self._sizes(store, source).items():
-                _bring(store, f"{source}/{name}", draft / name, size)
+                _download(store, f"{source}/{name}", draft / name, size)
             if draft.exists():
                 draft.rename(folder)
 
     def push_run(self, lake: Lake, run: str) -> None:
-        """Bring a run to the store that is committed here.
+        """Upload a locally committed run.
 
         Args:
             lake: The copy.
             run: Its key.
 
         Raises:
-            OutputError: The store cannot be written; the run is not there then.
+            OutputError: The store cannot be written; the run is then not committed in it.
         """
         with self._reached() as (store, root):
-            _send_all(store, root, lake.path, _files_of(lake, run))
+            _upload_all(store, root, lake.path, _files_of(lake, run))
 
     def push(self, lake: Lake) -> None:
-        """Bring to the store what is committed here and not there, runs and partitions.
+        """Upload runs and partitions that the store does not have.
 
         Args:
             lake: The copy.
 
         Raises:
-            OutputError: The store cannot be written, or another has joined files of this lake meanwhile.
+            OutputError: The store cannot be written, or another process has joined files of this lake
+                meanwhile.
         """
         with self._reached() as (store, root):
-            known = self._sizes(store, root)
-            files = (f for f in _all_files(lake) if known.get(_name(f, lake)) != _size(f))
-            _send_all(store, root, lake.path, files)
-            self._push_manifest(store, root, lake, known)
+            remote_sizes = self._sizes(store, root)
+            files = (f for f in _all_files(lake) if remote_sizes.get(_name(f, lake)) != _size(f))
+            _upload_all(store, root, lake.path, files)
+            self._push_manifest(store, root, lake, remote_sizes)
 
-    def _push_manifest(self, store: Any, root: str, lake: Lake, known: dict[str, int]) -> None:
-        """Name the partitions in the store, and take away there what they replaced and is gone here."""
+    def _push_manifest(
+        self, store: Any, root: str, lake: Lake, remote_sizes: dict[str, int]
+    ) -> None:
+        """Update the manifest in the store, and delete there the replaced files that were deleted locally."""
         if not (lake.path / MANIFEST).exists():
             return
-        ours = (lake.path / MANIFEST).read_bytes()
-        theirs = _content(store, f"{root}/{MANIFEST}") if MANIFEST in known else b""
-        if theirs not in (ours, _read_or(lake.path / PULLED, b"")):
+        local_manifest = (lake.path / MANIFEST).read_bytes()
+        remote = _content(store, f"{root}/{MANIFEST}") if MANIFEST in remote_sizes else b""
+        if remote not in (local_manifest, _read_or(lake.path / PULLED, b"")):
             raise OutputError(
                 "another has joined files of this lake meanwhile",
                 where=self.url,
                 hint="run the same command again",
             )
-        if theirs != ours:
-            _send(store, f"{root}/{MANIFEST}", ours)
-            write_whole(lake.path / PULLED, ours)
+        if remote != local_manifest:
+            _upload(store, f"{root}/{MANIFEST}", local_manifest)
+            write_whole(lake.path / PULLED, local_manifest)
         manifest = read_manifest(lake.path)
         parts = {p.name for p in manifest.partitions} | set(manifest.retired)
-        gone = [
-            n for n in known if _replaced(n, manifest.runs, parts) and not (lake.path / n).exists()
+        obsolete = [
+            n
+            for n in remote_sizes
+            if _replaced(n, manifest.runs, parts) and not (lake.path / n).exists()
         ]
-        for name in gone:
+        for name in obsolete:
             store.rm_file(f"{root}/{name}")
 
     def _sizes(self, store: Any, root: str) -> dict[str, int]:
-        """The files below a folder, by their path from there: how large each is, bytes."""
+        """Relative path -> size in bytes of the files below a folder."""
         store.invalidate_cache()
         base = store._strip_protocol(root).rstrip("/")
         found = store.find(root, detail=True)
         return {
-            str(path)[len(base) :].lstrip("/"): int(told["size"]) for path, told in found.items()
+            str(path)[len(base) :].lstrip("/"): int(entry["size"]) for path, entry in found.items()
         }
 
     @contextmanager
     def _reached(self) -> Iterator[tuple[Any, str]]:
-        """The store, and the path of the lake in it; what goes wrong there is told in visup's words."""
+        """The file system and the path of the lake in it; its errors become `OutputError`."""
         try:
             store, root = imported("fsspec").core.url_to_fs(self.url)
             yield store, root
         except OutputError:
             raise
-        except (
-            Exception
-        ) as fault:  # stores raise what they like, and their libraries may be missing
+        except Exception as fault:  # store libraries raise any type, and may be missing
             hint = None
             if isinstance(fault, ImportError):
                 hint = "install what the store needs: pip install s3fs"
-            said = str(fault) or type(fault).__name__
-            what = f"the lake in the store cannot be read or written ({said})"
-            raise OutputError(what, where=self.url, hint=hint) from fault
+            reason = str(fault) or type(fault).__name__
+            message = f"the lake in the store cannot be read or written ({reason})"
+            raise OutputError(message, where=self.url, hint=hint) from fault
 
 
 def _all_files(lake: Lake) -> Iterator[Path]:
-    """The files of what is committed here: runs, partitions, the columns of tables, the mark."""
+    """All committed local files: runs, partitions, schema files, the mark."""
     joined = read_manifest(lake.path)
     for run in lake.snapshot().loose:
         yield from _files_of(lake, run)
@@ -179,13 +181,13 @@ def _all_files(lake: Lake) -> Iterator[Path]:
 
 
 def _files_of(lake: Lake, run: str) -> Iterator[Path]:
-    """The files of a run of its own."""
+    """The own files of a run."""
     yield from (f for f in (lake.table_file(table, run) for table in TABLES) if f.is_file())
     yield from _below(lake.folder_of(run))
 
 
 def _replaced(name: str, runs: frozenset[str], parts: set[str]) -> bool:
-    """Whether a file of the store is of a run that is joined, or of a partition that nobody names."""
+    """Whether a file in the store is of a joined run, or of a partition not in the manifest."""
     path = Path(name)
     if path.parts[0] == FOLDER:
         return path.parts[1] not in parts
@@ -198,7 +200,7 @@ def _below(folder: Path) -> Iterator[Path]:
 
 
 def _commits_last(name: str) -> tuple[bool, bool, str]:
-    """Rows of `runs` after all else, and the mark of a lake last of all."""
+    """Sort key: rows of `runs` after all other files, and the mark of a lake last."""
     return name == MARK, name.startswith(COMMITS), name
 
 
@@ -206,31 +208,31 @@ def _name(file: Path, lake: Lake) -> str:
     return file.relative_to(lake.path).as_posix()
 
 
-def _send_all(store: Any, root: str, lake: Path, files: Iterable[Path]) -> None:
-    """Write files, those last that commit the others."""
+def _upload_all(store: Any, root: str, lake: Path, files: Iterable[Path]) -> None:
+    """Upload files, the committing ones last."""
     names = (f.relative_to(lake).as_posix() for f in files)
     for name in sorted(names, key=_commits_last):
-        _send(store, f"{root}/{name}", (lake / name).read_bytes())
+        _upload(store, f"{root}/{name}", (lake / name).read_bytes())
 
 
-def _bring(store: Any, there: str, here: Path, size: int) -> None:
-    """Copy a file here, unless it is here already; it is there whole or not at all."""
-    if _size(here) == size:
+def _download(store: Any, remote_path: str, local_path: Path, size: int) -> None:
+    """Download a file atomically unless it exists."""
+    if _size(local_path) == size:
         return
-    here.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(here) as draft:
-        store.get_file(there, str(draft))
+    local_path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(local_path) as draft:
+        store.get_file(remote_path, str(draft))
 
 
-def _send(store: Any, there: str, content: bytes) -> None:
-    """Write a file whole or not at all: also where a store shows what is half written, such as a disk."""
-    store.makedirs(there.rpartition("/")[0], exist_ok=True)
-    with store.transaction, store.open(there, "wb") as file:
+def _upload(store: Any, remote_path: str, content: bytes) -> None:
+    """Upload a file atomically, even to a store that shows partial files, such as a disk."""
+    store.makedirs(remote_path.rpartition("/")[0], exist_ok=True)
+    with store.transaction, store.open(remote_path, "wb") as file:
         file.write(content)
 
 
-def _content(store: Any, there: str) -> bytes:
-    content: bytes = store.cat_file(there)
+def _content(store: Any, remote_path: str) -> bytes:
+    content: bytes = store.cat_file(remote_path)
     return content
 
 

@@ -1,4 +1,4 @@
-"""What a command calls a lake: a folder, or the address of one in a store with a copy here."""
+"""How commands name a lake: a local folder, or the URL of one in a store, of which there is a local copy."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from visup.archive.storing.lake_store import LakeStore
 
 
 def store_of(place: str) -> LakeStore | None:
-    """The store that is meant, or None for a folder."""
+    """The store of a URL, or None for a folder."""
     return LakeStore(place.rstrip("/")) if is_url(place) else None
 
 
 def copy_of(place: str) -> Path:
-    """The folder of a lake: itself, or where the copy of a lake in a store is kept."""
+    """The local folder of a lake, or of the copy of a lake in a store."""
     if not is_url(place):
         return Path(place)
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -30,7 +30,7 @@ def copy_of(place: str) -> Path:
 
 
 def is_lake(place: str) -> bool:
-    """Whether there is a lake.
+    """Whether the lake exists.
 
     Raises:
         OutputError: The store cannot be read.
@@ -40,7 +40,7 @@ def is_lake(place: str) -> bool:
 
 
 def open_lake(place: str) -> Lake:
-    """A lake that there is; the copy of one in a store is brought up to date.
+    """Open an existing lake; the copy of one in a store is updated.
 
     Raises:
         OutputError: There is none, it is of another version, or the store cannot be reached.
@@ -56,10 +56,10 @@ def open_lake(place: str) -> Lake:
 
 
 def create_lake(place: str) -> Lake:
-    """A lake that there is, or a new one.
+    """Open a lake, or create one.
 
     Raises:
-        OutputError: The folder holds something else, or cannot be written; or the store.
+        OutputError: The folder or the store holds something else or cannot be written.
     """
     store, copy = store_of(place), copy_of(place)
     if store is None:
@@ -78,7 +78,7 @@ def _pulled(store: LakeStore, copy: Path) -> Lake:
 
 
 def settle(lake: Lake, store: LakeStore | None) -> None:
-    """What is done once a lake is filled: files are joined where that is worth it, and all is in the store.
+    """Finish filling: compact the lake if it is worth it, and upload everything to its store.
 
     Raises:
         OutputError: It cannot be written.
@@ -91,9 +91,9 @@ def settle(lake: Lake, store: LakeStore | None) -> None:
 def pushed(
     store: LakeStore | None, lake: Lake, tell: Callable[[ClipOutcome], None]
 ) -> Callable[[ClipOutcome], None]:
-    """What is told of each clip, once its run is in the store.
+    """Wrap `tell` to upload each run first.
 
-    A store that cannot be reached stops nobody: the run is here, and goes there with the next `push`.
+    An unreachable store stops nothing: the run is committed locally and is uploaded with the next `push`.
     """
     if store is None:
         return tell
