@@ -1,10 +1,10 @@
 """Access control for every request, page, picture and socket of the console.
 
-- The console listens on this machine alone unless told otherwise.
-- Whoever asks must know a token. The address that is printed holds it once; from then on a cookie does.
-- A request must name this host, so that no foreign name that points here gets in (DNS rebinding), and a
-  request that another page makes is refused, also for the socket, to which browsers let any page connect.
-- The operator's token may act (note, assume, try other texts); the viewer's may only look.
+- By default the console listens on this machine only.
+- Every request needs a token. The printed address contains it once; from then on a cookie does.
+- A request must name this host, so that no foreign name that resolves to it is accepted (DNS rebinding), and
+  cross-origin requests are refused, also for the socket, to which browsers let any page connect.
+- The operator's token may act (note, assume, try other texts); the viewer's is read-only.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ COOKIE = "visup_console"
 PARAMETER = "token"
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
 WHO = "visup_role"
-"""Where the role of a request stands in its scope."""
+"""Key of the role in the scope of a request."""
 
 LONGEST_BODY = 2**20
-"""Bytes of a request; what pages send is far smaller."""
+"""Bytes of a request; pages send far less."""
 
 
 class ConsoleRole(StrEnum):
-    """A role: what its holder may do."""
+    """The permissions of a token."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -47,9 +47,9 @@ class Access:
     """Access by tokens and host names.
 
     Attributes:
-        operator: Token of those who may act.
-        viewer: Token of those who may only look; None for nobody.
-        hosts: Names under which the console may be asked for, without ports.
+        operator: Token for full access.
+        viewer: Token for read-only access, or None.
+        hosts: Accepted host names, without ports.
     """
 
     operator: str = field(default_factory=lambda: secrets.token_urlsafe(18))
@@ -58,16 +58,16 @@ class Access:
 
     def role(self, token: str) -> ConsoleRole | None:
         """The role of a token, or None."""
-        given = token.encode()
-        if secrets.compare_digest(given, self.operator.encode()):
+        encoded = token.encode()
+        if secrets.compare_digest(encoded, self.operator.encode()):
             return ConsoleRole.OPERATOR
-        if self.viewer and secrets.compare_digest(given, self.viewer.encode()):
+        if self.viewer and secrets.compare_digest(encoded, self.viewer.encode()):
             return ConsoleRole.VIEWER
         return None
 
 
 class AccessGuard:
-    """Lets a request through to the application behind it, or not.
+    """Middleware that passes only permitted requests to the application.
 
     Args:
         app: The application.
@@ -78,19 +78,19 @@ class AccessGuard:
         self._app, self._access = app, access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request or socket."""
+        """Handle one request or socket."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
         headers = _headers(scope["headers"])
         fault = self._fault(headers)
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        given = query.get(PARAMETER, [""])[0]
-        role = self._access.role(given or _cookie(headers.get("cookie", "")))
+        token = query.get(PARAMETER, [""])[0]
+        role = self._access.role(token or _cookie(headers.get("cookie", "")))
         if fault or role is None:
             await _refuse(scope, send, fault or _UNKNOWN, headers.get("accept", ""))
-        elif given and scope["type"] == "http":
-            await _welcome(scope, send, given)
+        elif token and scope["type"] == "http":
+            await _set_cookie(scope, send, token)
         else:
             scope[WHO] = role
             await self._app(scope, receive, send)
@@ -115,12 +115,12 @@ _UNKNOWN = (
 )
 
 
-def _headers(given: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
-    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in given}
+def _headers(token: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
+    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in token}
 
 
 def _name(host: str) -> str:
-    """A host without its port."""
+    """A host name without its port."""
     name, colon, port = host.rpartition(":")
     return name if colon and port.isdecimal() else host
 
@@ -133,20 +133,22 @@ def _cookie(text: str) -> str:
     return found.value if found else ""
 
 
-async def _welcome(scope: Scope, send: Send, token: str) -> None:
-    """Keep the token in a cookie that scripts cannot read, and take it out of the address."""
-    kept = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
-    place = "/" + quote(scope["path"].lstrip("/\\"))  # two slashes would lead to another host
-    headers = [(b"location", place.encode()), (b"set-cookie", kept.encode())]
+async def _set_cookie(scope: Scope, send: Send, token: str) -> None:
+    """Move the token from the address to a cookie that scripts cannot read."""
+    cookie = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+    place = "/" + quote(
+        scope["path"].lstrip("/\\")
+    )  # two leading slashes would redirect to another host
+    headers = [(b"location", place.encode()), (b"set-cookie", cookie.encode())]
     await send({"type": "http.response.start", "status": 303, "headers": [*headers, *_SAFE]})
     await send({"type": "http.response.body", "body": b""})
 
 
-async def _refuse(scope: Scope, send: Send, why: str, wanted: str) -> None:
+async def _refuse(scope: Scope, send: Send, why: str, accepted: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 4403, "reason": why})
         return
-    page = "text/html" in wanted
+    page = "text/html" in accepted
     kind = b"text/html" if page else b"text/plain"
     headers = [(b"content-type", kind + b"; charset=utf-8"), *_SAFE]
     body = plain_page("This console is closed to you", why) if page else why.encode()

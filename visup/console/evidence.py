@@ -1,4 +1,4 @@
-"""Pictures and clips that `visup serve` keeps of alerts, found by the number of the alert, not by a path."""
+"""The pictures and clips of alerts saved by `visup serve`, looked up by alert number, never by path."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from visup.agent.storage.text_file import read_text_file
 from visup.runs.evidence.keeper import EVIDENCE, KEYS
 
 LARGEST_NOTE = 2**20
-"""Bytes of what is noted of one alert."""
+"""Maximum size of the record of an alert, bytes."""
 
 _SNAPSHOT = re.compile(r"alert-(\d{1,9})\.jpg")
 
 
 @dataclass(frozen=True, slots=True)
 class AlertEvidence:
-    """What there is of an alert.
+    """The evidence of an alert.
 
     Attributes:
         snapshot: Its picture, or None.
         clip: Its clip, or None.
-        awaited: Whether a clip is still being made.
+        awaited: Whether a clip is still being recorded.
     """
 
     snapshot: Path | None = None
@@ -43,16 +43,20 @@ def evidence_of(run: Path, alert: int) -> AlertEvidence:
     """
     folder = run / EVIDENCE
     try:
-        told = json.loads(read_text_file(folder / f"alert-{alert}.json", LARGEST_NOTE))
-        snapshot, clip = (folder / Path(str(told[key])).name for key in KEYS)
+        record = json.loads(read_text_file(folder / f"alert-{alert}.json", LARGEST_NOTE))
+        snapshot, clip = (folder / Path(str(record[key])).name for key in KEYS)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return AlertEvidence()
     spool = clip.with_suffix(".spool")
-    return AlertEvidence(_own(snapshot, ".jpg"), _own(clip, ".webm"), bool(_own(spool, ".spool")))
+    return AlertEvidence(
+        _regular_file(snapshot, ".jpg"),
+        _regular_file(clip, ".webm"),
+        bool(_regular_file(spool, ".spool")),
+    )
 
 
 def latest_snapshot(run: Path) -> int | None:
-    """Number of the latest alert of a run of which there is a picture, or None."""
+    """Number of the latest alert of a run with a picture, or None."""
     try:
         found = [_SNAPSHOT.fullmatch(p.name) for p in (run / EVIDENCE).iterdir()]
     except OSError:
@@ -61,8 +65,8 @@ def latest_snapshot(run: Path) -> int | None:
     return max((n for n in numbers if evidence_of(run, n).snapshot), default=None)
 
 
-def _own(path: Path, kind: str) -> Path | None:
-    """A file that stands in the folder itself; links may lead anywhere."""
+def _regular_file(path: Path, kind: str) -> Path | None:
+    """A regular file of the folder; links are refused, because they may lead anywhere."""
     try:
         fine = path.suffix == kind and path.is_file() and not path.is_symlink()
         fine = fine and not path.parent.is_symlink()

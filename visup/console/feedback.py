@@ -1,7 +1,6 @@
-"""Feedback on alerts: seen, right, false alarm, muted; stored beside the journal, one line each.
+"""Feedback on alerts: seen, right, false alarm, muted; stored next to the journal, one line each.
 
-Nothing is ever changed in the file: the last line on an alert counts, and the ones before tell who said
-what, and when.
+The file is append-only: the last line on an alert counts, and the earlier ones are its history.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from visup.agent.storage.file_lock import only_writer
 FEEDBACK = "feedback.jsonl"
 LONGEST_NOTE = 500
 LARGEST_FILE = 2**22
-"""Bytes that are read of a file of feedback."""
+"""Maximum size of a feedback file, bytes."""
 
 
 class Opinion(StrEnum):
@@ -40,10 +39,10 @@ class AlertFeedback:
 
     Attributes:
         alert: Its number within the run.
-        kind: Of the alert.
-        opinion: What is said.
-        note: Why, in free words.
-        said: Seconds since the epoch.
+        kind: Kind of the alert.
+        opinion: The feedback.
+        note: Reason, free text.
+        said: Time of the feedback, seconds since the epoch.
     """
 
     alert: int
@@ -54,17 +53,17 @@ class AlertFeedback:
 
 
 def read_feedback(folder: Path) -> dict[int, AlertFeedback]:
-    """The last word on each alert of a run; lines that cannot be read are passed over."""
+    """The latest feedback on each alert of a run; invalid lines are skipped."""
     path = folder / FEEDBACK
     if not path.is_file() or path.stat().st_size > LARGEST_FILE:
         return {}
     found = {}
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         try:
-            told = _feedback(json.loads(line))
+            feedback = _feedback(json.loads(line))
         except (ValueError, KeyError, TypeError):
             continue
-        found[told.alert] = told
+        found[feedback.alert] = feedback
     return found
 
 
@@ -82,10 +81,10 @@ def say(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFe
     """Store feedback on an alert.
 
     Args:
-        folder: Of the run.
+        folder: Folder of the run.
         alert: The alert.
-        opinion: What is said; muting an alert needs a reason.
-        note: Why.
+        opinion: The feedback; muting an alert needs a reason.
+        note: Reason.
 
     Raises:
         SettingsError: A reason is missing, or too long.
@@ -96,29 +95,29 @@ def say(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFe
         raise SettingsError("muting an alert needs a reason", expected="a few words")
     if len(note) > LONGEST_NOTE:
         raise SettingsError("this note is too long", expected=f"at most {LONGEST_NOTE} letters")
-    told = AlertFeedback(alert.id, alert.kind, opinion, note, time.time())
+    feedback = AlertFeedback(alert.id, alert.kind, opinion, note, time.time())
     try:
         with (
             only_writer(folder / FEEDBACK, "feedback on this run"),
             (folder / FEEDBACK).open("a", encoding="utf-8") as out,
         ):
-            out.write(json.dumps(asdict(told), ensure_ascii=False, sort_keys=True) + "\n")
+            out.write(json.dumps(asdict(feedback), ensure_ascii=False, sort_keys=True) + "\n")
     except OSError as fault:
         raise OutputError(
             f"the note cannot be kept: {fault.strerror}", where=str(folder / FEEDBACK)
         ) from fault
-    return told
+    return feedback
 
 
 @dataclass(frozen=True, slots=True)
 class KindPrecision:
-    """How alerts of one kind were judged.
+    """The feedback on alerts of one kind.
 
     Attributes:
-        kind: Of the alerts.
-        alerts: How many there were.
-        right: How many were said to be right.
-        false: How many were said to be false alarms.
+        kind: Kind of the alerts.
+        alerts: Number of alerts.
+        right: Number confirmed.
+        false: Number of false alarms.
     """
 
     kind: str
@@ -128,7 +127,7 @@ class KindPrecision:
 
     @property
     def precision(self) -> float | None:
-        """Share of right ones among the judged; None while none was judged."""
+        """Share of confirmed alerts among those with feedback; None without feedback."""
         judged = self.right + self.false
         return self.right / judged if judged else None
 
@@ -136,7 +135,7 @@ class KindPrecision:
 def precisions(
     runs: Iterable[tuple[Iterable[Alert], Mapping[int, AlertFeedback]]],
 ) -> tuple[KindPrecision, ...]:
-    """How each kind of alert was judged over some runs, the most frequent first."""
+    """The precision of each kind of alert over some runs, the most frequent first."""
     alerts: Counter[str] = Counter()
     said: Counter[tuple[str, Opinion]] = Counter()
     for opened, feedback in runs:

@@ -1,4 +1,4 @@
-"""The runs that a console shows: found below the folders it was given, and nowhere else."""
+"""Finds the runs that a console shows, only below the given folders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, is_run
 
 DEEPEST = 6
-"""Folders below the given ones that are looked into."""
+"""Search depth below the given folders."""
 
 MOST_RUNS = 10_000
 KEY_LETTERS = 16
@@ -24,16 +24,16 @@ class RunEntry:
     """A run in the list.
 
     Attributes:
-        key: Stands for the run in addresses, which so never hold a path.
-        folder: Of the run.
-        source: What was watched, as it was named; empty where that is not known.
+        key: Key of the run in URLs, so that they contain no path.
+        folder: Folder of the run.
+        source: The source as named; empty if not known.
         camera: Name of the camera, for runs of a service.
         tasks: Names of its tasks.
-        verdict: As in the journal; None while it goes on, or where nothing was judged.
-        alerts: How many were opened.
-        seconds: From its first step to its last one.
+        verdict: Verdict of the journal; None while the run goes on, or without a task.
+        alerts: Number of alerts opened.
+        seconds: From its first step to its last.
         written: When it was last written to, seconds since the epoch.
-        ended: Whether it is over.
+        ended: Whether it has ended.
         problem: Why it cannot be read, or empty.
     """
 
@@ -51,7 +51,7 @@ class RunEntry:
 
     @property
     def name(self) -> str:
-        """What it is called in the list."""
+        """Its name in the list."""
         return self.folder.name
 
 
@@ -63,7 +63,7 @@ class RunLibrary:
         places: Run folders, or folders of run folders.
 
     Raises:
-        OutputError: A place is not there, or holds no run.
+        OutputError: A folder does not exist or contains no run.
     """
 
     places: Sequence[Path]
@@ -81,16 +81,16 @@ class RunLibrary:
         self.scan()
 
     def scan(self) -> tuple[RunEntry, ...]:
-        """All runs there are now, the latest first; a new one is known from then on."""
+        """All present runs, latest first; new ones become known by their keys."""
         self._known = {run_key(run): run for place in self.places for run in _runs_below(place)}
         found = [self._entry(key, run) for key, run in self._known.items()]
         return tuple(sorted(found, key=lambda e: (-e.written, e.name)))
 
     def _entry(self, key: str, run: Path) -> RunEntry:
-        """What the list says of a run; one that is over is read again only when it was written to."""
-        held = self._over.get(key)
-        if held is not None and held.written == _written(run):
-            return held
+        """The list entry of a run; an ended run is read again only if it was written to."""
+        cached = self._over.get(key)
+        if cached is not None and cached.written == _written(run):
+            return cached
         entry = entry_of(key, run)
         if entry.ended:
             self._over[key] = entry
@@ -126,7 +126,7 @@ def run_key(folder: Path) -> str:
 
 
 def _runs_below(place: Path) -> Iterator[Path]:
-    """Run folders, without following links out of the place."""
+    """Run folders, without following links out of the folder."""
     found = 0
     for at, folders, names in os.walk(place):
         folder = Path(at)
@@ -138,7 +138,7 @@ def _runs_below(place: Path) -> Iterator[Path]:
 
 
 def entry_of(key: str, folder: Path) -> RunEntry:
-    """What the list says of one run; of an unreadable one, why it is."""
+    """The list entry of a run; for an unreadable one, with the reason."""
     try:
         recording = Recording.open(folder)
         facts, ends = recording.facts(), recording.first_and_last()
@@ -162,8 +162,8 @@ def entry_of(key: str, folder: Path) -> RunEntry:
 def _tasks(facts: Mapping[str, Any]) -> tuple[str, ...]:
     settings = facts.get("settings")
     tasks = settings.get("tasks") if isinstance(settings, Mapping) else None
-    named = tasks if isinstance(tasks, list) else []
-    return tuple(Path(t).stem for t in named if isinstance(t, str))
+    names = tasks if isinstance(tasks, list) else []
+    return tuple(Path(t).stem for t in names if isinstance(t, str))
 
 
 def _text(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Pages without a program: that one may not look, that there is no such page."""
+"""Static pages: access denied, page not found."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ h1 {{ font-size: 1.15rem; margin: 0 0 8px; }} p {{ margin: 0 0 8px; }} a {{ colo
 
 
 def plain_page(title: str, text: str, *, back: bool = False) -> bytes:
-    """A page that says one thing.
+    """A static page with one message.
 
     Args:
         title: Its heading.
-        text: What it says.
-        back: Whether it leads to the list of runs.
+        text: The message.
+        back: Whether to link to the list of runs.
     """
     link = '<p><a href="/">All runs</a></p>' if back else ""
     return _PAGE.format(title=escape(title), text=escape(text), link=link).encode()

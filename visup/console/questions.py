@@ -8,12 +8,12 @@ from visup.agent import Event, Question
 
 
 def questions_at(events: Iterable[Event], now: float) -> tuple[Question, ...]:
-    """The questions that waited for an answer at a time, by object.
+    """The questions open at a time, by object.
 
-    A journal does not keep when a question settled by itself; such a one waits to the end here.
+    A journal does not record when a question settled by itself; here such a question stays open to the end.
 
     Args:
-        events: Of the run, by time.
+        events: Events of the run, by time.
         now: Seconds.
     """
     waiting: dict[int, Question] = {}

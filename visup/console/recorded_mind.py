@@ -1,7 +1,7 @@
-"""What was believed at one moment of a recorded run, from the summary that its journal keeps.
+"""Reconstructs the mind at one moment of a recorded run from the summary in its journal.
 
-Nothing is reasoned again, so it comes at once, however long the run. It knows less than the mind did:
-no relations but couplings, no poses, no likelihoods of names; of what is out of sight only where it was.
+Nothing is replayed, so it is fast however long the run. It holds less than the original mind: of relations
+only couplings, no poses, no likelihoods of names; of hidden objects only their last positions.
 """
 
 from __future__ import annotations
@@ -32,40 +32,42 @@ from visup.agent.model.records import Health, HealthStatus
 
 
 def recorded_mind(
-    told: Mapping[str, Any],
-    seen: Observation,
+    summary: Mapping[str, Any],
+    observation: Observation,
     alerts: Iterable[Alert] = (),
     actors: Mapping[str, tuple[str, ...]] | None = None,
 ) -> Mind:
-    """What was believed after one step.
+    """The mind after one step.
 
     Args:
-        told: Its summary, as `Recording.step_at` gives it.
-        seen: What was perceived in it.
-        alerts: All alerts of the run; those that were open then are open in it.
-        actors: Actor -> models that stand for it.
+        summary: Summary of the step, from `Recording.step_at`.
+        observation: Observation of the step.
+        alerts: All alerts of the run; those open at the time are included.
+        actors: Actor -> its models.
 
     Raises:
-        OutputError: The summary is not as it should be.
+        OutputError: The summary is not valid.
     """
     try:
-        regions = {r.id: r for r in seen.of("region")}
-        objects = [_belief(o, regions, seen) for o in told["objects"]]
+        regions = {r.id: r for r in observation.of("region")}
+        objects = [_belief(o, regions, observation) for o in summary["objects"]]
         return Mind(
-            time=seen.time,
-            frame_index=seen.frame_index,
-            frame_size=seen.frame_size,
+            time=observation.time,
+            frame_index=observation.frame_index,
+            frame_size=observation.frame_size,
             objects=MappingProxyType({b.id: b for b in objects}),
-            couplings=tuple(_coupling(c) for c in told["couplings"]),
-            tasks=tuple(_task(t) for t in told["tasks"]),
-            alerts=tuple(a for a in alerts if open_at(a, seen.time)),
-            health=Health(HealthStatus(told["health"]["status"]), str(told["health"]["detail"])),
-            unknown=frozenset(map(str, told["unknown"])),
+            couplings=tuple(_coupling(c) for c in summary["couplings"]),
+            tasks=tuple(_task(t) for t in summary["tasks"]),
+            alerts=tuple(a for a in alerts if open_at(a, observation.time)),
+            health=Health(
+                HealthStatus(summary["health"]["status"]), str(summary["health"]["detail"])
+            ),
+            unknown=frozenset(map(str, summary["unknown"])),
             actors=MappingProxyType(dict(actors or {})),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as fault:
         raise OutputError(
-            f"what was believed in frame {seen.frame_index} cannot be read"
+            f"what was believed in frame {observation.frame_index} cannot be read"
         ) from fault
 
 
@@ -75,25 +77,25 @@ def open_at(alert: Alert, time: float) -> bool:
 
 
 def _belief(
-    line: Mapping[str, Any], regions: Mapping[int, Region], seen: Observation
+    line: Mapping[str, Any], regions: Mapping[int, Region], observation: Observation
 ) -> ObjectBelief:
     presence = Presence(line["presence"])
     region = regions.get(line["region"]) if presence is Presence.SEEN else None
     shares = [(str(name), float(share)) for name, share in line["candidates"]]
     return ObjectBelief(
         int(line["id"]),
-        region or _outline_lost(line, seen.frame_size),
+        region or _box_region(line, observation.frame_size),
         presence,
-        first_seen=seen.time,
-        last_seen=seen.time,
+        first_seen=observation.time,
+        last_seen=observation.time,
         confirmed=bool(line["confirmed"]),
         candidates=tuple(Candidate(name, 0.0, share, share) for name, share in shares),
         depth=None if line["depth"] is None else float(line["depth"]),
     )
 
 
-def _outline_lost(line: Mapping[str, Any], size: tuple[int, int]) -> Region:
-    """Where something was last seen: its box, since the outline is not recorded."""
+def _box_region(line: Mapping[str, Any], size: tuple[int, int]) -> Region:
+    """The last seen region: its bounding box, since the outline is not recorded."""
     x, y, w, h = (int(n) for n in line["bbox"])
     corners = [(x, y), (x + w - 1, y), (x + w - 1, y + h - 1), (x, y + h - 1)]
     return Region(

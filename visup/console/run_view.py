@@ -1,4 +1,4 @@
-"""One run as the console reads it: moments by time, what was believed in each, its events and alerts."""
+"""One run as read by the console: moments by time with their beliefs, events and alerts."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ from visup.tasks.tools.diagram import Flow
 
 KEPT_MOMENTS = 64
 THUMBNAIL = 224
-"""Width of a small picture, pixels."""
+"""Width of a thumbnail, pixels."""
 
 TRAIL_S = 4.0
-"""How much of where objects were is drawn, seconds."""
+"""Length of a trail, seconds."""
 
 MOST_TRAIL = 60
-"""Moments of a trail at most."""
+"""Maximum number of moments in a trail."""
 
 LOOKED_BACK = 20
-"""Moments back to the last time that somebody looked what an object is."""
+"""How many moments back to search for the last match of an object."""
 
 MOST_SAMPLES = 240
-"""Moments at which what changes slowly is looked up for its curve or row."""
+"""Maximum number of samples for a curve or row."""
 
 
 class RunView:
-    """A run, read as far as it was written when it was opened; `refreshed` reads on.
+    """A run as far as it was written when opened; `refreshed` reads on.
 
     Args:
-        folder: Of the run.
+        folder: Folder of the run.
 
     Attributes:
         folder: The same.
-        frames: Numbers of the frames that were judged, in order.
+        frames: Numbers of the processed frames, in order.
         times: Their times, seconds.
 
     Raises:
@@ -75,24 +75,24 @@ class RunView:
         ends = self._run.recording.first_and_last()
         if ends is None or (self.frames and ends[1] == self.frames[-1]):
             return self
-        again = RunView(self.folder)
+        refreshed_view = RunView(self.folder)
         if "pictures" in self.__dict__:
-            again.__dict__["pictures"] = self.pictures
-        return again
+            refreshed_view.__dict__["pictures"] = self.pictures
+        return refreshed_view
 
     @property
     def ended(self) -> bool:
-        """Whether the run is over."""
+        """Whether the run has ended."""
         return "ended" in self._run.facts
 
     @property
     def verdict(self) -> str | None:
-        """What it came to, or None."""
+        """The verdict, or None."""
         return None if self._run.verdict is None else self._run.verdict.value
 
     @property
     def source(self) -> str:
-        """What was watched."""
+        """The source."""
         told = self._run.facts.get("source")
         return told if isinstance(told, str) else ""
 
@@ -103,33 +103,33 @@ class RunView:
 
     @property
     def start(self) -> float:
-        """Time of the first moment: a run that follows another goes on with its time."""
+        """Time of the first moment: a run that follows another continues its time."""
         return self.times[0] if self.times else 0.0
 
     def share(self, time: float) -> float:
-        """How much of the run is over at a time, 0 to 1."""
+        """The position of a time in the run, 0 to 1."""
         return min(1.0, max(0.0, (time - self.start) / max(self.seconds - self.start, 1e-6)))
 
     @property
     def name(self) -> str:
-        """What pages call it."""
+        """Its name on pages."""
         camera = self._run.facts.get("camera")
         return f"{camera} · {self.folder.name}" if isinstance(camera, str) else self.folder.name
 
     @cached_property
     def clock(self) -> WallClock:
-        """When its moments were; one that knows nothing of a run that no camera made."""
+        """The wall clock of the run; empty for a run without a camera."""
         return WallClock.read(self._run.facts.get("clock"))
 
     def when(self, time: float) -> str:
-        """A time as pages show it: in UTC where it is known, with the day when that is not the last one's."""
+        """A time for pages: in UTC if known, with the date if it differs from the last day."""
         told, last = self.clock.text(time), self.clock.text(self.seconds)
         if told is None or last is None:
             return clock_text(time)
         return told[11:19] if told[:10] == last[:10] else f"{told[5:10]} {told[11:19]}"
 
     def now(self, time: float) -> str:
-        """Where a cursor is, as pages show it."""
+        """The time of the cursor for pages."""
         told = self.clock.text(time)
         if told is None:
             return f"{clock_text(time)} / {clock_text(self.seconds)}"
@@ -142,12 +142,12 @@ class RunView:
 
     @cached_property
     def alerts(self) -> tuple[Alert, ...]:
-        """All alerts, as they were last."""
+        """All alerts in their last state."""
         return tuple(self._run.alerts)
 
     @cached_property
     def tracks(self) -> tuple[TimelineTrack, ...]:
-        """What happened, laid out over time."""
+        """The rows of the timeline."""
         told = tracks_of(self.events, self.alerts, self.seconds, self.actors)
         states = ((t, _states(told)) for t, told in self._samples())
         return (*told, *behaviour_tracks(states, self.seconds))
@@ -167,7 +167,7 @@ class RunView:
 
     @cached_property
     def models(self) -> ModelDatabase | None:
-        """What its objects were compared with; None where that was nothing.
+        """The model database of the run, or None.
 
         Raises:
             DatabaseError: They cannot be read.
@@ -177,12 +177,12 @@ class RunView:
 
     @cached_property
     def flows(self) -> Mapping[str, Flow]:
-        """Task -> what follows what in it."""
+        """Task -> its flow."""
         return flows_of(self.settings)
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
-        """Parts of the scene that its rules could name."""
+        """The zones of the run."""
         return zones_of(self.settings)
 
     @property
@@ -191,15 +191,15 @@ class RunView:
         return dict(self.settings.actors) if self.settings else {}
 
     def at(self, time: float) -> int:
-        """Number of the last moment that is not after a time, from 0; the first where all are."""
+        """Number of the last moment not after a time, from 0; the first if all are later."""
         return max(0, bisect_right(self.times, time + 1e-6) - 1)
 
     def of_frame(self, frame: int) -> int:
-        """Number of the last moment whose frame is not after one."""
+        """Number of the last moment whose frame is not after the given one."""
         return max(0, bisect_right(self.frames, frame) - 1)
 
     def mind(self, number: int) -> Mind:
-        """What was believed at a moment.
+        """The mind at a moment.
 
         Raises:
             OutputError: There is no such moment, or it is damaged.
@@ -223,7 +223,7 @@ class RunView:
         return self.last_look(number, object_id)[1]
 
     def last_look(self, number: int, object_id: int) -> tuple[int | None, tuple[Hypothesis, ...]]:
-        """The last time at which an object was matched, or None, and the result."""
+        """Frame of the last match of an object, or None, and its result."""
         for at in range(number, max(-1, number - LOOKED_BACK), -1):
             mind, seen = self._moment(at)
             belief = mind.objects.get(object_id)
@@ -234,12 +234,12 @@ class RunView:
         return None, ()
 
     def trails(self, number: int) -> Mapping[int, list[tuple[float, float]]]:
-        """Where each object in view was in the seconds before a moment: centres of its boxes, pixels."""
+        """The trails of visible objects before a moment: centres of their boxes, pixels."""
         begin = self.at(self.times[number] - TRAIL_S)
-        kept = set(self.frames[number : begin : -(1 + (number - begin) // MOST_TRAIL)])
+        sampled = set(self.frames[number : begin : -(1 + (number - begin) // MOST_TRAIL)])
         found: dict[int, list[tuple[float, float]]] = {}
         for told in self._run.recording.summaries(self.frames[begin], self.frames[number]):
-            for line in told["objects"] if told["frame_index"] in kept else ():
+            for line in told["objects"] if told["frame_index"] in sampled else ():
                 if line["presence"] == "seen" and line["confirmed"]:
                     x, y, w, h = line["bbox"]
                     found.setdefault(line["id"], []).append((x + w / 2, y + h / 2))
@@ -251,8 +251,8 @@ class RunView:
         return self.pictures.drawn(self.mind(number), plain=plain)
 
     def thumbnail(self) -> bytes:
-        """A small picture of the middle of the run, as JPEG; of a camera, of its latest alert."""
-        image = self._kept_picture()
+        """A thumbnail of the middle of the run, or of a camera's latest alert, as JPEG."""
+        image = self._alert_picture()
         if image is None:
             mind = self.mind(len(self.frames) // 2)
             image = annotate(self.pictures.frame(mind), mind)
@@ -260,25 +260,24 @@ class RunView:
         size = (THUMBNAIL, max(1, height))
         return jpeg(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8))
 
-    def _kept_picture(self) -> NDArray[np.uint8] | None:
-        """What was kept of the latest alert, where frames cannot be had."""
+    def _alert_picture(self) -> NDArray[np.uint8] | None:
+        """The saved picture of the latest alert, if frames are not available."""
         number = latest_snapshot(self.folder) if self.pictures.problem else None
         path = None if number is None else evidence_of(self.folder, number).snapshot
         image = None if path is None else cv2.imread(str(path))
         return None if image is None else np.asarray(image, np.uint8)
 
     def shares(self, object_id: int) -> Iterator[tuple[float, Mapping[str, float]]]:
-        """How sure each identity of an object was over time: time, and name -> share of the votes."""
+        """The identity votes of an object over time: time, and name -> share of the votes."""
         for time, told in self._samples():
             for line in told.get("objects", ()):
                 if line.get("id") == object_id:
                     yield time, {str(n): float(s) for n, s in line["candidates"]}
 
     def _samples(self) -> Iterator[tuple[float, Mapping[str, Any]]]:
-        """What was believed, in short, at a few hundred moments.
+        """Summaries at a few hundred moments.
 
-        An approximation, for runs of days: changes that are shorter than that may not show. Moments that
-        cannot be read any more are left out.
+        An approximation for runs of days: shorter changes may be missed. Unreadable moments are left out.
         """
         step = max(1, len(self.frames) // MOST_SAMPLES)
         for number in range(0, len(self.frames), step):
@@ -299,7 +298,7 @@ def clock_text(seconds: float) -> str:
 
 
 def _states(told: Mapping[str, Any]) -> Mapping[str, str]:
-    """Behaviour -> what became of it in a step."""
+    """Behaviour -> its state in a step."""
     found = told.get("behaviours")
     rows = found.items() if isinstance(found, Mapping) else ()
     return {str(name): str(said[0]) for name, said in rows if isinstance(said, list) and said}

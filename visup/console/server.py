@@ -1,4 +1,4 @@
-"""The console's application: pages, pictures, and the guard before them."""
+"""The web application of the console: pages, pictures and the access guard."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from visup.console.state import ConsoleState
 
 FAVICON = "◉"
 CLOSING_S = 1
-"""How long pages that are open may hold up its end, seconds."""
+"""How long open pages may delay the shutdown, seconds."""
 
 _PICTURE = {"Cache-Control": "private, max-age=60", "X-Content-Type-Options": "nosniff"}
 _KINDS = {"jpg": "image/jpeg", "webm": "video/webm"}
 
 
 def build_application(state: ConsoleState, access: Access) -> AccessGuard:
-    """The application; one console a process, since NiceGUI's pages are the process's."""
+    """Build the application; at most one per process, since NiceGUI's pages are global."""
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
     _pictures(app, state)
     _pages(state)
@@ -42,7 +42,7 @@ def build_application(state: ConsoleState, access: Access) -> AccessGuard:
 
 
 def _pictures(app: FastAPI, state: ConsoleState) -> None:
-    """Pictures are drawn in threads, so that a large one does not hold up the pages."""
+    """Serve pictures; they are drawn in threads, so that a large one does not block the pages."""
 
     @app.get("/picture/{key}/{number}.jpg")
     def picture(key: str, number: int, plain: bool = False) -> Response:
@@ -105,11 +105,11 @@ def serve_console(
     """Serve the console until it is interrupted.
 
     Args:
-        state: What it shows.
+        state: Shared state of all pages.
         access: Access by tokens and host names.
-        host: Address to listen at.
-        port: Port; 0 for any that is free.
-        ready: Told the address, with the token, once it listens.
+        host: Address to listen on.
+        port: Port; 0 for any free one.
+        ready: Receives the address with the token once it listens.
 
     Raises:
         SettingsError: It cannot listen there.
@@ -135,7 +135,7 @@ def _listening(host: str, port: int) -> socket.socket:
         made = socket.socket(family, socket.SOCK_STREAM)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind((host, port))
-        made.listen()  # whoever is told the address may ask at once
+        made.listen()  # requests may come as soon as the address is announced
     except (OSError, OverflowError) as fault:
         raise SettingsError(
             f"the console cannot listen at {host}:{port} ({fault})",

@@ -1,4 +1,4 @@
-"""What all pages share: the library, and the runs that are open."""
+"""Shared state of all pages: the library and the open runs."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from visup.console.run_view import RunView
 
 MOST_VIEWS = 16
 MOST_INQUIRIES = 4
-"""Inquiries hold all minds of a run, so few are kept."""
+"""Inquiries hold all minds of a run, so only a few are cached."""
 
-Kept = TypeVar("Kept")
+Cached = TypeVar("Cached")
 RunIdentity = tuple[str, int]
-"""A folder, and which file its journal is: another run may take the place of one that was deleted."""
+"""A folder and the inode of its journal: another run may replace a deleted one."""
 
 
 class ConsoleState:
-    """The library, and the runs that are open; safe for many pages at once.
+    """The library and the open runs; thread-safe.
 
     Args:
         library: Finds runs.
-        save_to: Folder into which operators may save what they write; None for nowhere.
+        save_to: Folder in which operators may save texts; None for none.
     """
 
     def __init__(self, library: RunLibrary, save_to: Path | None = None) -> None:
@@ -38,39 +38,39 @@ class ConsoleState:
         self._lock, self._asking = Lock(), Lock()
 
     def view(self, key: str, *, refresh: bool = False) -> RunView:
-        """A run as it is read.
+        """The view of a run.
 
         Args:
-            key: Of the run.
-            refresh: Whether to read on in a run that has grown.
+            key: Key of the run.
+            refresh: Whether to read on if it has grown.
 
         Raises:
             OutputError: There is no such run, or it cannot be read.
         """
         with self._lock:
             folder = self.library.folder(key)
-            which = _identity(folder)
-            made = _kept(self._views, which, lambda: RunView(folder), MOST_VIEWS)
+            identity = _identity(folder)
+            view = _cached(self._views, identity, lambda: RunView(folder), MOST_VIEWS)
             if refresh:
-                made = self._views[which] = made.refreshed()
-            return made
+                view = self._views[identity] = view.refreshed()
+            return view
 
     def inquiry(self, key: str) -> Inquiry:
-        """What answers questions about a run.
+        """The inquiry of a run.
 
         Raises:
-            VisupError: There is no such run, or it cannot be reasoned about again.
+            VisupError: There is no such run, or its reasoning cannot be replayed.
         """
         with self._lock:
             folder = self.library.folder(key)
-        with self._asking:  # tasks, rules and models are loaded: other pages need not wait for that
-            return _kept(
+        with self._asking:  # loads tasks, rules and models without blocking other pages
+            return _cached(
                 self._inquiries, _identity(folder), lambda: _opened(folder), MOST_INQUIRIES
             )
 
 
 def _opened(folder: Path) -> Inquiry:
-    """What answers questions about a run; no line is quoted of a file that only its folder names.
+    """The inquiry of a run; errors quote no line of files named only by its folder.
 
     A folder from a stranger may name any file as its task.
     """
@@ -90,13 +90,13 @@ def _identity(folder: Path) -> RunIdentity:
         return str(folder), 0
 
 
-def _kept(
-    held: OrderedDict[RunIdentity, Kept], key: RunIdentity, make: Callable[[], Kept], most: int
-) -> Kept:
-    """What is held under a key, made when it is not there; the ones used longest ago go."""
-    if key not in held:
-        held[key] = make()
-    held.move_to_end(key)
-    while len(held) > most:
-        held.popitem(last=False)
-    return held[key]
+def _cached(
+    cache: OrderedDict[RunIdentity, Cached], key: RunIdentity, make: Callable[[], Cached], most: int
+) -> Cached:
+    """An entry of an LRU cache, created if missing; the least recently used are evicted."""
+    if key not in cache:
+        cache[key] = make()
+    cache.move_to_end(key)
+    while len(cache) > most:
+        cache.popitem(last=False)
+    return cache[key]

@@ -1,4 +1,4 @@
-"""A run laid out over time: stages, alerts, objects in view, camera health."""
+"""The timeline of a run: stages, alerts, objects in view, camera health."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ PRESENCE: Mapping[str, str] = MappingProxyType(
         "exit": "left",
     }
 )
-"""Kind of event -> where its object is from then on, as of `visup.agent.Presence`."""
+"""Kind of event -> presence of its object from then on, as in `visup.agent.Presence`."""
 
 NOTHING = ("left", "pending")
-"""States that need no bar."""
+"""States without a bar."""
 
 MOST_OBJECTS = 40
 
@@ -34,8 +34,8 @@ class TrackSpan:
     Attributes:
         start: Seconds.
         end: Seconds.
-        state: What it was: a status, a presence, a severity.
-        text: The sentence that told it.
+        state: A status, a presence or a severity.
+        text: The text of its event.
     """
 
     start: float
@@ -50,9 +50,9 @@ class TimelineTrack:
 
     Attributes:
         group: 'stage', 'alert', 'object', 'health' or 'behaviour'.
-        label: What it is of.
-        spans: By time.
-        object_id: The object that it is of, or None.
+        label: Its name.
+        spans: Spans by time.
+        object_id: Its object, or None.
     """
 
     group: str
@@ -67,33 +67,33 @@ def tracks_of(
     seconds: float,
     actors: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> tuple[TimelineTrack, ...]:
-    """The rows of a timeline, from the events.
+    """The rows of a timeline.
 
     Args:
-        events: Of the run, by time.
-        alerts: Of the run.
-        seconds: Where the run ends.
-        actors: Actor -> models; an object of such a model is called by the actor.
+        events: Events of the run, by time.
+        alerts: Alerts of the run.
+        seconds: End of the run.
+        actors: Actor -> models; an object of such a model is labelled with the actor.
 
     Returns:
-        Stages in the order in which they began, then alerts by kind, objects that stayed longest, health.
+        Stages by their beginning, then alerts by kind, the objects longest in view, health.
     """
-    told = tuple(events)
-    several = len({e.data.get("task") for e in told if _status(e)}) > 1
-    stages = _rows("stage", _stage_changes(told, several=several), seconds)
-    objects = _rows("object", _presence_changes(told, actors), seconds)
-    health = _rows("health", _health_changes(told), seconds)
+    ordered = tuple(events)
+    several = len({e.data.get("task") for e in ordered if _status(e)}) > 1
+    stages = _rows("stage", _stage_changes(ordered, several=several), seconds)
+    objects = _rows("object", _presence_changes(ordered, actors), seconds)
+    health = _rows("health", _health_changes(ordered), seconds)
     return (*stages, *_alert_rows(alerts, seconds), *_longest(objects), *health)
 
 
 def behaviour_tracks(
     states: Iterable[tuple[float, Mapping[str, str]]], seconds: float
 ) -> tuple[TimelineTrack, ...]:
-    """Rows of the behaviours that did not always run: when they ran, and when what kept them from it.
+    """Rows of the behaviours that did not always run, with their states.
 
     Args:
-        states: Seconds, and behaviour -> what became of it then, as of `visup.agent.ReportState`; by time.
-        seconds: Where the run ends.
+        states: Time, and behaviour -> state, as in `visup.agent.ReportState`; by time.
+        seconds: End of the run.
     """
     changes: list[Change] = []
     last: dict[str, str] = {}
@@ -107,7 +107,7 @@ def behaviour_tracks(
 
 
 Change = tuple[str, int | None, float, str, str]
-"""Label, object, seconds, state from then on, and sentence."""
+"""Label, object, seconds, state from then on, and text."""
 
 
 def _stage_changes(events: Sequence[Event], *, several: bool) -> Iterator[Change]:
@@ -119,7 +119,7 @@ def _stage_changes(events: Sequence[Event], *, several: bool) -> Iterator[Change
 
 
 def _status(event: Event) -> str | None:
-    """The status in an event of a stage, or None."""
+    """The status in a stage event, or None."""
     status = event.data.get("status") if event.kind.startswith("stage_") else None
     return str(status) if status in _STATUSES else None
 
@@ -138,10 +138,10 @@ def _presence_changes(
 
 
 def _last_names(events: Sequence[Event], actors: Mapping[str, Sequence[str]]) -> dict[int, str]:
-    """What each object was last identified as."""
+    """The last identity of each object."""
     called = {model: actor for actor, models in sorted(actors.items()) for model in models}
-    named = (e for e in events if e.kind in ("identified", "answer") and e.objects)
-    last = {e.objects[0]: str(e.data.get("name") or "") for e in named}
+    identifications = (e for e in events if e.kind in ("identified", "answer") and e.objects)
+    last = {e.objects[0]: str(e.data.get("name") or "") for e in identifications}
     return {number: f"{number} {called.get(name, name)}" for number, name in last.items() if name}
 
 
@@ -153,7 +153,7 @@ def _health_changes(events: Sequence[Event]) -> Iterator[Change]:
 
 
 def _rows(group: str, changes: Iterable[Change], seconds: float) -> Iterator[TimelineTrack]:
-    """One row for each label and object: each state lasts until the next one of the same."""
+    """One row per label and object: each state lasts until the next."""
     rows: dict[tuple[str, int | None], list[TrackSpan]] = {}
     for label, number, time, state, text in changes:
         spans = rows.setdefault((label, number), [])
@@ -161,9 +161,9 @@ def _rows(group: str, changes: Iterable[Change], seconds: float) -> Iterator[Tim
             spans[-1] = replace(spans[-1], end=time)
         spans.append(TrackSpan(time, seconds, state, text))
     for (label, number), spans in rows.items():
-        kept = tuple(s for s in spans if s.state not in NOTHING)
-        if kept:
-            yield TimelineTrack(group, label, kept, number)
+        shown = tuple(s for s in spans if s.state not in NOTHING)
+        if shown:
+            yield TimelineTrack(group, label, shown, number)
 
 
 def _alert_rows(alerts: Iterable[Alert], seconds: float) -> Iterator[TimelineTrack]:
@@ -178,7 +178,7 @@ def _alert_rows(alerts: Iterable[Alert], seconds: float) -> Iterator[TimelineTra
 
 
 def _longest(rows: Iterable[TimelineTrack]) -> list[TimelineTrack]:
-    """The objects that were in view longest, in the order of their first sight."""
+    """The objects longest in view, in the order of their first appearance."""
     found = list(rows)
     stayed = sorted(found, key=lambda t: -sum(s.end - s.start for s in t.spans))[:MOST_OBJECTS]
     return [track for track in found if track in stayed]

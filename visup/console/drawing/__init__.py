@@ -1,1 +1,1 @@
-"""What the console draws: frames, and over time, over the picture and over the task what is believed."""
+"""The drawings of the console: frames, overlays, the timeline and flow charts of tasks."""

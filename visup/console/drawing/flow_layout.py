@@ -1,4 +1,4 @@
-"""Layout of a task's flow chart: rows of boxes from its beginning down to its end."""
+"""Layout of a task's flow chart: rows of boxes from beginning to end."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ ROW_GAP = 26.0
 LINE = 15.0
 PAD = 8.0
 DOT = 14.0
-"""Size of the beginning and the end."""
+"""Size of the dots for beginning and end."""
 
 MARGIN = 46.0
-"""At both sides, for arrows that go past boxes."""
+"""On both sides, for arrows that pass boxes."""
 
 Edge = tuple[str, str]
 
@@ -28,9 +28,9 @@ class FlowBox:
     """Position of a box.
 
     Attributes:
-        node: Number of the node of the flow, or its beginning or end.
-        x: Of its left side.
-        y: Of its top.
+        node: Number of the node in the flow, or its beginning or end.
+        x: Left side.
+        y: Top.
         width: Its width.
         height: Its height.
     """
@@ -47,11 +47,11 @@ class FlowLayout:
     """The layout of the flow chart.
 
     Attributes:
-        boxes: By node.
-        back: Arrows that lead back.
+        boxes: Node -> box.
+        back: Back edges.
         rank: Node -> number of its row.
-        width: Of all of it.
-        height: Of all of it.
+        width: Total width.
+        height: Total height.
     """
 
     boxes: Mapping[str, FlowBox]
@@ -62,9 +62,9 @@ class FlowLayout:
 
 
 def layout_of(flow: Flow) -> FlowLayout:
-    """Lay out a flow: each box is below all from which an arrow leads to it, but for those that lead back."""
+    """Lay out a flow: each box is below its predecessors, except for back edges."""
     nodes = [BEGIN, *flow.nodes, END]
-    back = _leading_back(nodes, flow.edges)
+    back = _back_edges(nodes, flow.edges)
     rank = _ranks(nodes, [e for e in flow.edges if e not in back])
     last = 1 + max((rank[n] for n in flow.nodes), default=0)
     rank[END] = max(last, rank[END])
@@ -96,8 +96,8 @@ def _height(flow: Flow, node: str) -> float:
     return 2 * PAD + LINE * len(flow.nodes[node].lines) + 6
 
 
-def _leading_back(nodes: list[str], edges: Iterable[Edge]) -> frozenset[Edge]:
-    """Arrows to a box that was on the way there."""
+def _back_edges(nodes: list[str], edges: Iterable[Edge]) -> frozenset[Edge]:
+    """Back edges: arrows to a box on the current path of a depth-first search."""
     after: dict[str, list[str]] = {n: [] for n in nodes}
     for a, b in edges:
         after[a].append(b)
@@ -120,7 +120,7 @@ def _leading_back(nodes: list[str], edges: Iterable[Edge]) -> frozenset[Edge]:
 
 
 def _ranks(nodes: list[str], edges: list[Edge]) -> dict[str, int]:
-    """The longest way to each box."""
+    """The length of the longest path to each box."""
     rank = dict.fromkeys(nodes, 0)
     for _ in nodes:
         changed = False

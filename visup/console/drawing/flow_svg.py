@@ -1,4 +1,4 @@
-"""The flow chart of a task with the beliefs about it: status of each stage, confidence, prospects."""
+"""The flow chart of a task with the beliefs about it: status and confidence of stages, likely successors."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from visup.tasks.tools.diagram import BEGIN, END, Flow, Node
 from visup.wording import printable
 
 LETTER = 6.4
-"""Width of a letter, about, in the units of the picture."""
+"""Approximate width of a letter, in SVG units."""
 
 ROOMY = 200.0
-"""Width of a box that has room beside the name of its stage."""
+"""Least width of a box with room for a label beside the stage name."""
 
 Labels = tuple[tuple[tuple[str, str], str], ...]
-"""Arrows with what is written at them."""
+"""Arrows and their labels."""
 
 
 def flow_svg(flow: Flow, belief: TaskBelief) -> str:
     """Draw a flow.
 
     Args:
-        flow: Of the task.
-        belief: How the task stands.
+        flow: Flow of the task.
+        belief: Belief about the task.
 
     Returns:
-        An SVG element with text; colours are those of the page.
+        An SVG element with text; colours are set by the page.
     """
     placed = _placed(tuple(flow.nodes.items()), tuple(flow.edges.items()))
     chances = {p.stage: p.probability for p in belief.prospects}
@@ -53,11 +53,11 @@ class StageMark:
     """How a box shows its stage.
 
     Attributes:
-        kind: 'box', with 'here' or 'next' behind it.
-        colour: As CSS writes it.
-        sure: How sure its status is, 0 to 1.
-        said: What stands at its right.
-        title: The same at length.
+        kind: CSS class: 'box', perhaps with 'here' or 'next'.
+        colour: CSS colour.
+        sure: Confidence of its status, 0 to 1.
+        said: Label at its right.
+        title: Tooltip.
     """
 
     kind: str = "box"
@@ -83,7 +83,7 @@ def _mark(stage: StageBelief, belief: TaskBelief, chances: Mapping[str, float]) 
 
 
 def flow_in_words(belief: TaskBelief) -> str:
-    """The same for those who cannot see it."""
+    """The flow chart as a text for screen readers."""
     stages = [f"{s.stage}: {s.status.value}{_sure(s, belief)}" for s in belief.stages]
     after = [f"{p.stage or 'the end'} {percent(p.probability)}" for p in belief.prospects]
     said = [*stages, *([f"may come next: {', '.join(after)}"] if after else [])]
@@ -91,7 +91,7 @@ def flow_in_words(belief: TaskBelief) -> str:
 
 
 def _sure(stage: StageBelief, belief: TaskBelief) -> str:
-    """How sure a status is; older journals, and tasks that nobody follows, do not tell."""
+    """The confidence of a status as text; empty for older journals and tasks that are not followed."""
     return "" if belief.success is None else f" {percent(stage.confidence)}"
 
 
@@ -112,7 +112,7 @@ _HEAD = (
 
 
 def _dots(placed: FlowLayout, chances: Mapping[str, float]) -> str:
-    """The beginning, and the end with how likely it is next."""
+    """The dots for the beginning, and for the end with its probability of being next."""
     parts = []
     for name, kind in ((BEGIN, "begin"), (END, "end")):
         b = placed.boxes[name]
@@ -135,7 +135,7 @@ def _box(box: FlowBox, node: Node, mark: StageMark) -> str:
     return (
         f'<g><title>{escape(printable(mark.title))}</title><rect class="{mark.kind}" {place} rx="6"/>'
         f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="6" height="{box.height:.1f}" rx="3" '
-        f'fill="{mark.colour}"/>{foot}{_lines(box, node)}{_said(box, mark)}</g>'
+        f'fill="{mark.colour}"/>{foot}{_lines(box, node)}{_label(box, mark)}</g>'
     )
 
 
@@ -155,8 +155,8 @@ def _lines(box: FlowBox, node: Node) -> str:
     return "".join(rows)
 
 
-def _said(box: FlowBox, mark: StageMark) -> str:
-    """Status with confidence, or the probability of being next, on the right."""
+def _label(box: FlowBox, mark: StageMark) -> str:
+    """The label at the right: status with confidence, or probability of being next."""
     if box.width <= ROOMY or not mark.said:
         return ""
     kind = "likely" if mark.kind.endswith("next") else "sure"
@@ -180,7 +180,7 @@ def _arrow(placed: FlowLayout, edge: tuple[str, str], said: str) -> str:
 
 
 def _past(a: FlowBox, b: FlowBox, x: float, u: float, by: float) -> tuple[str, tuple[float, float]]:
-    """A curve past what stands between two boxes."""
+    """A curve past the boxes between two boxes."""
     y, v = a.y + a.height / 2, b.y + b.height / 2
     far = (max(x, u) if by > 0 else min(x, u)) + by
     return (

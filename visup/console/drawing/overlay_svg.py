@@ -1,4 +1,4 @@
-"""What is drawn over a picture and can be switched: zones, trails, relations as lines between bodies."""
+"""The switchable overlays of the picture: zones, trails, relations as lines between objects."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from visup.agent import Mind, ObjectBelief, Presence, Truth, Zone
 from visup.report.palette import css, object_colour
 
 DRAWN = ("coupled", "touching", "moving_together", "converging", "diverging", "keeping_distance")
-"""Relations that are drawn, the closest first: of two bodies the first one that holds."""
+"""Relations that are drawn, closest first; for two objects the first that holds."""
 
 MOST_VECTORS = 14
 LETTERS = 0.026
-"""Size of letters, as a share of the picture's height."""
+"""Font size as a share of the picture's height."""
 
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class RelationVector:
-    """A relation that holds between two bodies.
+    """A relation that holds between two objects.
 
     Attributes:
-        name: Of the relation.
+        name: Name of the relation.
         objects: Ids.
-        ends: Their centres, pixels.
+        ends: Centres of the objects, pixels.
     """
 
     name: str
@@ -35,31 +35,33 @@ class RelationVector:
 
 
 def vectors_of(mind: Mind) -> tuple[RelationVector, ...]:
-    """What holds between those in view: of each pair the closest relation, the closest pairs first."""
-    seen = {b.id: b for b in mind.present() if b.presence is Presence.SEEN}
-    ids = sorted(seen)
+    """The closest relation of each pair of visible objects, the closest pairs first."""
+    visible = {b.id: b for b in mind.present() if b.presence is Presence.SEEN}
+    ids = sorted(visible)
     pairs = [(a, b) for i, a in enumerate(ids) for b in ids[i + 1 :]]
     found = [(rank, pair) for pair in pairs if (rank := _closest(mind, *pair)) is not None]
-    chosen = sorted(found, key=lambda f: (f[0], _apart(*(seen[i] for i in f[1]))))[:MOST_VECTORS]
+    chosen = sorted(found, key=lambda f: (f[0], _distance(*(visible[i] for i in f[1]))))[
+        :MOST_VECTORS
+    ]
     return tuple(
-        RelationVector(DRAWN[rank], pair, (_centre(seen[pair[0]]), _centre(seen[pair[1]])))
+        RelationVector(DRAWN[rank], pair, (_centre(visible[pair[0]]), _centre(visible[pair[1]])))
         for rank, pair in chosen
     )
 
 
 def _closest(mind: Mind, a: int, b: int) -> int | None:
-    """Number of the first relation that holds between two bodies, or None."""
+    """Index of the first relation of `DRAWN` that holds between two objects, or None."""
     if mind.coupled(a, b):
         return 0
-    held = (k for k, name in enumerate(DRAWN) if mind.truth(name, a, b) is Truth.TRUE)
-    return next(held, None)
+    indices = (k for k, name in enumerate(DRAWN) if mind.truth(name, a, b) is Truth.TRUE)
+    return next(indices, None)
 
 
 def _centre(belief: ObjectBelief) -> Point:
     return belief.region.centroid
 
 
-def _apart(a: ObjectBelief, b: ObjectBelief) -> float:
+def _distance(a: ObjectBelief, b: ObjectBelief) -> float:
     (ax, ay), (bx, by) = _centre(a), _centre(b)
     return float((ax - bx) ** 2 + (ay - by) ** 2)
 
@@ -71,17 +73,17 @@ def overlay_svg(
     drawn: Sequence[Point] = (),
     chosen: int | None = None,
 ) -> str:
-    """What lies over the picture of a moment.
+    """The overlay of a moment.
 
     Args:
-        mind: What was believed; its zones are drawn.
+        mind: The beliefs; its zones are drawn.
         vectors: Relations.
-        trails: Object -> where it was, pixels, oldest first.
+        trails: Object -> past positions, pixels, oldest first.
         drawn: Corners of a zone that is being drawn.
         chosen: The object that was clicked.
 
     Returns:
-        An SVG element that is fitted into its place as the picture is.
+        An SVG element that scales like the picture.
     """
     width, height = mind.frame_size
     letters = max(9.0, LETTERS * height)
@@ -121,10 +123,10 @@ def _vector(vector: RelationVector, letters: float) -> str:
     knobs = "".join(
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{letters / 4:.1f}"/>' for x, y in vector.ends
     )
-    said = _text(vector.name.replace("_", " "), ((ax + bx) / 2, (ay + by) / 2), letters)
+    label = _text(vector.name.replace("_", " "), ((ax + bx) / 2, (ay + by) / 2), letters)
     return (
         f'<g class="vector {escape(vector.name, quote=True)}"><line class="edge" {ends}/>'
-        f"<line {ends}/>{knobs}{said}</g>"
+        f"<line {ends}/>{knobs}{label}</g>"
     )
 
 
@@ -146,7 +148,7 @@ def _drawn(points: Sequence[Point], letters: float) -> str:
 
 
 def _frame(belief: ObjectBelief | None) -> str:
-    """Corners round who was clicked."""
+    """Corner marks around the clicked object."""
     if belief is None:
         return ""
     x, y, w, h = belief.region.bbox

@@ -1,4 +1,4 @@
-"""The frames of a run that was watched, from its source where that is still there."""
+"""The frames of a recorded run, read from its source if that still exists."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Picture = NDArray[np.uint8]
 class RunPictures:
     """Frames of one source, for any number of pages at once.
 
-    Only a file or folder of this machine is opened, never a camera, a pipe or an address: a run may come
-    from a stranger, and looking at it must not make this machine call anybody.
+    Only local files and folders are opened, never a camera, a pipe or a URL: a run may come from a stranger,
+    and viewing it must not make this machine connect anywhere.
 
     Args:
-        source: As the run names it.
+        source: The source as named by the run.
 
     Attributes:
         problem: Why there are no frames, or empty.
@@ -45,16 +45,16 @@ class RunPictures:
             self.problem = str(fault)
 
     def frame(self, mind: Mind) -> Picture:
-        """The frame of a moment; a grey one where it cannot be had.
+        """The frame of a moment; a grey one if it is not available.
 
         Returns:
-            (H, W, 3) uint8 BGR, of the size that was watched.
+            (H, W, 3) uint8 BGR, of the size that was processed.
         """
         found = self.source_frame(mind)
         return np.full((*mind.frame_size[::-1], 3), GREY, np.uint8) if found is None else found
 
     def source_frame(self, mind: Mind) -> Picture | None:
-        """The frame of a moment, or None where it cannot be had; (H, W, 3) uint8 BGR."""
+        """The frame of a moment, or None; (H, W, 3) uint8 BGR."""
         if self._frames is None:
             return None
         try:
@@ -66,7 +66,7 @@ class RunPictures:
         return found if found.shape[:2] == mind.frame_size[::-1] else None
 
     def drawn(self, mind: Mind, *, plain: bool = False) -> bytes:
-        """A moment as JPEG, with what is believed drawn over it unless it shall be plain."""
+        """A moment as JPEG, with the beliefs drawn over it unless `plain`."""
         image = self.frame(mind)
         return jpeg(image if plain else annotate(image, mind))
 

@@ -1,4 +1,4 @@
-"""The timeline as SVG: one row for each track; no text in it, so that it may be stretched."""
+"""The timeline as SVG: one row per track, without text, so that it can be stretched."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ WIDTH = 1000
 ROW = 22
 BAR = 14
 LEAST_WIDTH = 2.0
-"""Of a bar, in units of the picture, so that what was short is seen."""
+"""Least width of a bar, in SVG units, so that short spans are visible."""
 
 HEALTH_COLOUR = "#96769e"
 RAN_COLOUR = "#7a8b99"
 FAINT = {"hidden": 0.35, "active": 0.55, "paused": 0.45, "rested": 0.25, "blind": 0.25}
-"""Opacity of states in which less is known, or nothing happens."""
+"""Opacity of states in which little is known or happens."""
 
 _STATUS = {s.value: css(STATUS_COLOURS[s]) for s in Status}
 _SEVERITY = {s.name.lower(): css(SEVERITY_COLOURS[s]) for s in Severity}
 
 
 def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float, start: float = 0.0) -> str:
-    """All rows over one axis of time.
+    """All rows over one time axis.
 
     Args:
         tracks: From top to bottom.
-        seconds: Where the axis ends.
-        start: Where it begins, seconds: a run that follows another goes on with its time.
+        seconds: End of the axis.
+        start: Begin of the axis, seconds: a run that follows another continues its time.
 
     Returns:
-        An SVG element of `ROW` pixels a track, as wide as its place.
+        An SVG element of `ROW` pixels per track and the full width.
     """
     height = ROW * max(1, len(tracks))
     axis = start, max(seconds - start, 1e-6)
@@ -45,9 +45,9 @@ def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float, start: float =
 
 
 def in_words(tracks: Sequence[TimelineTrack]) -> str:
-    """The same for those who cannot see it."""
-    told = [f"{t.label}: {_spans_in_words(t.spans)}" for t in tracks if t.group != "object"]
-    return "; ".join(told) or "No events."
+    """The timeline as a text for screen readers."""
+    text = [f"{t.label}: {_spans_in_words(t.spans)}" for t in tracks if t.group != "object"]
+    return "; ".join(text) or "No events."
 
 
 def _spans_in_words(spans: Sequence[TrackSpan]) -> str:
@@ -64,16 +64,16 @@ def _bar(track: TimelineTrack, span: TrackSpan, top: int, axis: tuple[float, flo
     start, length = axis
     left = WIDTH * min(1.0, max(0.0, (span.start - start) / length))
     wide = max(LEAST_WIDTH, WIDTH * min(1.0, (span.end - start) / length) - left)
-    told = f"{track.label}: {span.state}, {span.start:.1f} to {span.end:.1f} s. {span.text}"
+    text = f"{track.label}: {span.state}, {span.start:.1f} to {span.end:.1f} s. {span.text}"
     return (
         f'<rect x="{left:.2f}" y="{top + (ROW - BAR) // 2}" width="{wide:.2f}" height="{BAR}" '
         f'fill="{colour_of(track, span)}" opacity="{FAINT.get(span.state, 1.0)}">'
-        f"<title>{escape(told)}</title></rect>"
+        f"<title>{escape(text)}</title></rect>"
     )
 
 
 def colour_of(track: TimelineTrack, span: TrackSpan) -> str:
-    """The colour of a bar, as CSS writes it."""
+    """The CSS colour of a bar."""
     if track.group == "stage":
         return _STATUS[span.state]
     if track.group == "alert":

@@ -1,5 +1,5 @@
-"""What is seen in the browser: the list of runs, and the page of one run.
+"""The web pages of the console: the list of runs, and the page of one run.
 
-Pages are laid out with NiceGUI, which keeps each page's elements on the server; what they show comes from
-`visup.console` alone.
+Pages are built with NiceGUI, which keeps the elements of each page on the server; their content comes only
+from `visup.console`.
 """

@@ -1,4 +1,4 @@
-"""An alert as pages show it: when, what, its picture and clip, what people said of it."""
+"""An alert on a page: time, text, picture, clip and feedback."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from visup.wording import prose
 
 @dataclass(frozen=True, slots=True)
 class AlertRow:
-    """One alert with where it belongs.
+    """One alert and its run.
 
     Attributes:
-        key: Of its run.
+        key: Key of its run.
         run: Its run.
         alert: The alert.
-        said: What was said of it last, or None.
-        camera: Whose it is; empty where that is clear.
+        said: The latest feedback, or None.
+        camera: Name of its camera; empty if that is clear.
     """
 
     key: str
@@ -44,9 +44,9 @@ def show_alert(
 
     Args:
         row: The alert.
-        role: Of whoever looks; only operators may say something of it.
-        go: Goes to its moment.
-        again: Shows all rows anew.
+        role: Role of the user; only operators may give feedback.
+        go: Moves the cursor to the alert.
+        again: Redraws all rows.
     """
     with ui.element("div").classes("alert"):
         _thumbnail(row)
@@ -63,9 +63,9 @@ def _below(row: AlertRow, role: ConsoleRole, again: Callable[[], object]) -> Non
     """Objects, duration, feedback so far, and buttons for feedback."""
     alert = row.alert
     until = "still open" if alert.closed is None else f"until {row.run.when(alert.closed)}"
-    told = [row.camera, alert.kind.replace("_", " "), until]
+    facts = [row.camera, alert.kind.replace("_", " "), until]
     with ui.row().classes("items-center gap-2 under-line"):
-        ui.label(shown_text(", ".join(filter(None, told)))).classes("dim")
+        ui.label(shown_text(", ".join(filter(None, facts)))).classes("dim")
         if row.said:
             note = f": {row.said.note}" if row.said.note else ""
             ui.label(shown_text(f"{row.said.opinion.value}{note}")).classes("dim opinion")
@@ -74,7 +74,7 @@ def _below(row: AlertRow, role: ConsoleRole, again: Callable[[], object]) -> Non
 
 
 def _thumbnail(row: AlertRow) -> None:
-    """Its picture, small; a click shows it large, with the clip."""
+    """A thumbnail; a click shows the picture and the clip."""
     if not evidence_of(row.run.folder, row.alert.id).snapshot:
         return
     button = ui.element("button").classes("plain evidence")
@@ -86,28 +86,28 @@ def _thumbnail(row: AlertRow) -> None:
 
 
 def _show_evidence(row: AlertRow) -> None:
-    kept = evidence_of(row.run.folder, row.alert.id)
+    evidence = evidence_of(row.run.folder, row.alert.id)
     place = f"/evidence/{row.key}/{row.alert.id}"
     with ui.dialog() as dialog, ui.card().classes("card evidence-large"):
         ui.label(shown_text(f"{row.run.when(row.alert.opened)}  {prose(row.alert.cause)}"))
-        if kept.clip:
+        if evidence.clip:
             video = ui.element("video").props(
                 "controls autoplay muted playsinline preload=metadata"
             )
             video.props["src"], video.props["poster"] = f"{place}.webm", f"{place}.jpg"
             video.props["aria-label"] = "Clip of the alert"
-        if kept.snapshot:
+        if evidence.snapshot:
             picture = ui.element("img")
             picture.props["src"] = f"{place}.jpg"
             picture.props["alt"] = "The picture when the alert was opened"
-        if kept.awaited:
+        if evidence.awaited:
             ui.label("The clip is still being made.").classes("dim")
         worded_button("Close", dialog.close, main=True)
     dialog.open()
 
 
 def _opinions(row: AlertRow, again: Callable[[], object]) -> None:
-    """What an operator can say of an alert."""
+    """The feedback buttons of an operator."""
 
     def keep(opinion: Opinion, note: str = "") -> None:
         try:

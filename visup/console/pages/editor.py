@@ -1,4 +1,4 @@
-"""A text field for tasks, rules and zones: mistakes are marked in it, and words put in where one writes."""
+"""A text editor for tasks, rules and zones with marked mistakes and completion at the caret."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from visup.console.workbench.drafts import DraftFault, begun_word
 from visup.tasks.tools.editing import Completion
 
 WAIT_S = 2.0
-"""For the browser to say where one writes."""
+"""Timeout for the browser to report the caret, seconds."""
 
 _NAMED = (
     "(async () => {{ for (let k = 0; k < 50; k++) {{ const c = getElement({id});"
@@ -36,7 +36,7 @@ class DraftEditor:
 
     @property
     def text(self) -> str:
-        """What stands in it."""
+        """The content."""
         return str(self._field.value or "")
 
     @text.setter
@@ -47,7 +47,7 @@ class DraftEditor:
         self.changed = True
 
     def name(self) -> None:
-        """Set its accessible name, each time it is shown."""
+        """Set its accessible name each time it is shown."""
         ui.run_javascript(_NAMED.format(id=self._field.id))
 
     def mark(self, faults: Sequence[DraftFault]) -> None:
@@ -56,8 +56,8 @@ class DraftEditor:
         lines: dict[int, str] = {}
         for fault in faults:
             if 0 < fault.line <= last:
-                held = lines.get(fault.line)
-                lines[fault.line] = f"{held}\n{fault.text}" if held else fault.text
+                earlier = lines.get(fault.line)
+                lines[fault.line] = f"{earlier}\n{fault.text}" if earlier else fault.text
         self._field.decorations = [
             {"kind": "line", "line": n, "class": "fault-line"} for n in sorted(lines)
         ]
@@ -69,19 +69,21 @@ class DraftEditor:
             self._field.reveal_line(line)
 
     async def place(self) -> int:
-        """Before which letter one writes, from 0; the end where the browser does not say."""
+        """Offset of the caret in characters; the end if the browser does not report it."""
         code = f"getElement({self._field.id})?.editor?.state.selection.main.head"
         try:
-            said = await ui.run_javascript(code, timeout=WAIT_S)
+            caret = await ui.run_javascript(code, timeout=WAIT_S)
         except TimeoutError:
-            said = None
-        units = self.text.encode("utf-16-le")  # the browser counts so
+            caret = None
+        units = self.text.encode("utf-16-le")  # browsers count UTF-16 units
         return len(
-            units[: 2 * said].decode("utf-16-le", "ignore") if isinstance(said, int) else self.text
+            units[: 2 * caret].decode("utf-16-le", "ignore")
+            if isinstance(caret, int)
+            else self.text
         )
 
     async def put(self, word: Completion) -> None:
-        """Put a word in where one writes, in place of what is begun of it."""
+        """Insert a word at the caret in place of its typed beginning."""
         before = self.text[: await self.place()]
         begun = begun_word(before)
         text = word.text

@@ -1,4 +1,4 @@
-"""What all pages have: the bar at the top, the style, and words for states."""
+"""Common elements of all pages: the bar at the top, the style, and words for states."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OTHER_COLOUR = "#5a6573"
 
 @contextmanager
 def page_frame(title: str) -> Iterator[None]:
-    """The bar at the top, with room for more in it; the page's own elements come after."""
+    """The bar at the top, to which the caller can add; the page's own elements follow."""
     ui.add_css(STYLE)
     ui.add_head_html('<script>document.documentElement.lang = "en"</script>')
     ui.page_title(f"{title} · visup")
@@ -49,7 +49,7 @@ def part_heading(title: str) -> None:
 
 
 def button(icon: str, says: str, act: Callable[[], object]) -> ui.button:
-    """A round button with an icon, and words for those who point at it or cannot see it."""
+    """A round icon button with a tooltip and an accessible name."""
     made = ui.button(icon=icon, on_click=act, color=None)
     made.props(f'flat round dense aria-label="{says}"').classes("icon")
     made.tooltip(says)
@@ -57,22 +57,22 @@ def button(icon: str, says: str, act: Callable[[], object]) -> ui.button:
 
 
 def worded_button(text: str, act: Callable[[], object], *, main: bool = False) -> ui.button:
-    """A button with a word; the main one of its place stands out."""
+    """A button with a text; the main one is highlighted."""
     made = ui.button(text, on_click=act, color=None).props("dense no-caps unelevated")
     return made.classes("act main" if main else "act")
 
 
 def badge(text: str, colour: str) -> ui.label:
-    """A word on a coloured ground."""
+    """A word on a coloured background."""
     return ui.label(shown_text(text)).classes("state").style(f"background:{colour}")
 
 
 def verdict_badge(verdict: str | None, *, ended: bool) -> ui.label:
-    """How a run ended, or that it has not."""
+    """The verdict of a run, or that it goes on."""
     words = (verdict or ("no task" if ended else "running")).replace("_", " ")
     return badge(words, VERDICT_COLOURS.get(verdict or "", OTHER_COLOUR))
 
 
 def shown_text(text: str) -> str:
-    """A text as a page may show it: without marks that turn the reading order."""
+    """A text that is safe to show: without bidirectional control characters."""
     return printable(text)

@@ -1,4 +1,4 @@
-"""The keys of a run's page, as a table."""
+"""The table of keyboard shortcuts of a run's page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The list of runs: what was watched, how it ended, how many alerts; searched as one types."""
+"""The list of runs with source, verdict and alerts; filtered while typing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from visup.console.state import ConsoleState
 MOST_SHOWN = 200
 HEADINGS = ("", "run", "tasks", "verdict", "alerts", "length", "last written")
 WIDE = ("tasks", "length", "last written")
-"""Columns that a narrow window leaves out."""
+"""Columns hidden in narrow windows."""
 
 
 def library_page(state: ConsoleState) -> None:
@@ -40,7 +40,7 @@ def library_page(state: ConsoleState) -> None:
 
 
 def _matches(entry: RunEntry, wanted: str) -> bool:
-    """Whether all words that were typed stand somewhere in a line."""
+    """Whether an entry contains all typed words."""
     told = (
         entry.name,
         entry.source,

@@ -1,4 +1,4 @@
-"""The picture of a run with what lies over it: zones, trails, relations, and what was clicked."""
+"""The picture of a run with its overlays: zones, trails, relations and the clicked object."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ POINTED = (
 
 @dataclass(slots=True)
 class ShownLayers:
-    """What is switched on.
+    """The visible layers.
 
     Attributes:
         plain: The picture without contours and names.
         relations: Lines for relations.
-        trails: Where everybody was.
+        trails: Past positions of objects.
         zones: Zones.
     """
 
@@ -40,12 +40,12 @@ class ShownLayers:
 
 
 class RunPicture:
-    """The frame at the cursor with what is believed over it.
+    """The frame at the cursor with the beliefs drawn over it.
 
     Args:
-        state: What all pages share.
+        state: Shared state of all pages.
         head: The cursor.
-        key: Of the run.
+        key: Key of the run.
     """
 
     def __init__(self, state: ConsoleState, head: Playhead, key: str) -> None:
@@ -111,7 +111,7 @@ class RunPicture:
         self._over.set_content(overlay_svg(mind, shown, trails, head.drawn, head.chosen))
 
     async def _relate(self) -> None:
-        """Relations of the moment: the mind that reasoned knows them, so it is asked beside the page."""
+        """Fetch the relations of the moment: they come from replayed reasoning, in the background."""
         self._busy = True
         self._said.set_text("" if self._vectors[0] >= 0 else "reasoning up to here ...")
         try:

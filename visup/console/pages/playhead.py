@@ -1,4 +1,4 @@
-"""Where a page is in its run, and how it moves: one cursor over picture, timeline and text."""
+"""The playhead of a page: one cursor for picture, timeline and text."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from visup.console.run_view import RunView
 
 Listener = Callable[[], object]
 TICK_S = 0.125
-"""How often a page moves on while it plays, seconds."""
+"""Interval of updates during playback, seconds."""
 
 SLIDER_STEP = 1e-3
-"""Between two places of a slider, share of the run."""
+"""Resolution of a slider, share of the run."""
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
 @dataclass(slots=True)
 class Playhead:
-    """One page's place in a run.
+    """The position of one page in a run.
 
     Attributes:
         run: The run.
         number: Number of the moment, from 0.
-        playing: Whether it moves on by itself.
-        speed: Seconds of the run in one second.
-        time: Where it is, seconds; while it plays, between two moments.
-        panel: Name of the panel that is open.
+        playing: Whether it plays.
+        speed: Playback speed, 1 for real time.
+        time: Position, seconds; during playback between two moments.
+        panel: Name of the open panel.
         chosen: The object that was clicked, or None.
         drawn: Corners of a zone that is being drawn, pixels.
         pen: Whether clicks on the picture draw.
@@ -46,19 +46,19 @@ class Playhead:
     _listeners: list[tuple[Listener, str | None]] = field(default_factory=list)
 
     def listen(self, listener: Listener, panel: str | None = None) -> None:
-        """Have something called whenever the place changes; what belongs to a panel, while that is open."""
+        """Call a listener on every move; with `panel`, only while that panel is open."""
         self._listeners.append((listener, panel))
 
     def open_panel(self, name: str) -> None:
-        """Open another panel: what belongs to it is brought up to the cursor."""
+        """Open another panel and update it."""
         self.panel = name
-        self._tell()
+        self._notify()
 
     def point(self, x: float, y: float) -> None:
-        """Click on the picture, pixels: draw a corner, or choose the smallest object there."""
+        """Handle a click on the picture, pixels: draw a corner, or choose the smallest object there."""
         if self.pen:
             self.drawn.append((round(x, 1), round(y, 1)))
-            self._tell()
+            self._notify()
             return
         here = [
             b
@@ -70,76 +70,76 @@ class Playhead:
         self.choose(None if smallest is None else smallest.id)
 
     def draw(self, corners: list[tuple[float, float]] | None = None) -> None:
-        """Have other corners of a zone drawn; none when left out."""
+        """Replace the corners of the zone being drawn; none by default."""
         self.drawn = corners or []
-        self._tell()
+        self._notify()
 
     def choose(self, object_id: int | None) -> None:
-        """Choose an object, or none if it was chosen already."""
+        """Choose an object, or clear the choice if it was chosen already."""
         self.chosen = None if self.chosen == object_id else object_id
-        self._tell()
+        self._notify()
 
     def go(self, number: int) -> None:
-        """Be at a moment; the nearest one there is."""
+        """Move to a moment, or to the nearest existing one."""
         number = min(max(0, number), max(0, len(self.run.frames) - 1))
         changed, self.number = number != self.number, number
         self.time = self.run.times[number] if self.run.times else 0.0
         if changed:
-            self._tell()
+            self._notify()
 
     def go_to_time(self, seconds: float) -> None:
-        """Be at the last moment that is not after a time."""
+        """Move to the last moment not after a time."""
         self.go(self.run.at(seconds))
 
     def go_to_share(self, share: float) -> None:
-        """Be where so much of the run is over, 0 to 1."""
+        """Move to a share of the run, 0 to 1."""
         self.go_to_time(self.run.start + share * (self.run.seconds - self.run.start))
 
     def pull(self, share: float) -> None:
-        """Follow a slider: as `go_to_share`, but by one moment at least, since it has fewer places."""
+        """Follow a slider: as `go_to_share`, but by at least one moment, since the slider is coarser."""
         before, number = self.run.share(self.time), self.number
         self.go_to_share(share)
         if self.number == number and abs(share - before) > SLIDER_STEP / 2:
             self.step(1 if share > before else -1)
 
     def step(self, by: int) -> None:
-        """Go some moments forth or back."""
+        """Move some moments forward or back."""
         self.go(self.number + by)
 
     def tick(self, seconds: float = TICK_S) -> None:
-        """Move on, if it plays; it stops at the end."""
+        """Advance during playback; stops at the end."""
         if not self.playing:
             return
         self.time += seconds * self.speed
         number = self.run.at(self.time)
         if number != self.number:
             self.number = number
-            self._tell()
+            self._notify()
         if self.time >= self.run.seconds:
             self.playing = False
-            self._tell()
+            self._notify()
 
     def toggle(self) -> None:
-        """Play or pause; at the end, start again."""
+        """Play or pause; at the end restart."""
         if not self.playing and self.number >= len(self.run.frames) - 1:
             self.go(0)
         self.playing = not self.playing
-        self._tell()
+        self._notify()
 
     def next_event(self, forth: bool = True) -> None:
         """Jump to the next or the previous moment with an event."""
-        told = sorted({e.time for e in self.run.events})
+        times = sorted({e.time for e in self.run.events})
         here = self.run.times[self.number] if self.run.times else 0.0
         if forth:
-            at = bisect_right(told, here + 1e-6)
-            found = told[at] if at < len(told) else None
+            at = bisect_right(times, here + 1e-6)
+            found = times[at] if at < len(times) else None
         else:
-            at = bisect_left(told, here - 1e-6)
-            found = told[at - 1] if at else None
+            at = bisect_left(times, here - 1e-6)
+            found = times[at - 1] if at else None
         if found is not None:
             self.go_to_time(found)
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         for listener, panel in self._listeners:
             if panel in (None, self.panel):
                 listener()

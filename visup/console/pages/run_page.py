@@ -23,17 +23,17 @@ from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
 
 REFRESH_S = 2.0
-"""How often a page asks whether a run that goes on has grown, seconds."""
+"""Interval of checks whether a live run has grown, seconds."""
 
 
 def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> None:
     """Lay out the page.
 
     Args:
-        state: What all pages share.
-        key: Of the run.
-        role: Of whoever looks.
-        begin: Where to begin, seconds.
+        state: Shared state of all pages.
+        key: Key of the run.
+        role: Role of the user.
+        begin: Initial position, seconds.
     """
     try:
         run = state.view(key, refresh=True)
@@ -92,7 +92,7 @@ def _controls(head: Playhead) -> None:
 
 
 def _timeline(head: Playhead) -> None:
-    """Rows over time with one cursor; a click goes there."""
+    """The timeline with the cursor; a click moves it."""
     with ui.element("div").classes("timeline"):
         ui.element("div")
         slider = ui.slider(min=0, max=1.0, step=SLIDER_STEP, value=0.0)
@@ -145,7 +145,7 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
 
 
 def _keys(head: Playhead) -> None:
-    """Keys for everything that is done often."""
+    """Keyboard shortcuts."""
 
     def pressed(e: events.KeyEventArguments) -> None:
         if not e.action.keydown or e.modifiers.ctrl or e.modifiers.alt or e.modifiers.meta:

@@ -17,12 +17,12 @@ STATES = {"open": "open", "unseen": "not seen yet", "all": "all"}
 
 @dataclass(slots=True)
 class AlertFilter:
-    """Which alerts are wanted.
+    """The filter of the alert list.
 
     Attributes:
         state: One of `STATES`.
-        words: That stand in the camera, the kind or the sentence.
-        critical: Whether only critical ones.
+        words: Words searched for in camera, kind and text.
+        critical: Whether to show only critical alerts.
     """
 
     state: str = "open"
@@ -42,7 +42,7 @@ class AlertFilter:
 def alert_rows(
     state: ConsoleState, entries: Iterable[RunEntry], wanted: AlertFilter
 ) -> list[AlertRow]:
-    """The alerts of some runs that are wanted, the gravest and then the latest first."""
+    """The alerts of some runs that pass the filter, by severity and then latest first."""
     found: list[AlertRow] = []
     for entry in entries:
         try:
@@ -59,6 +59,6 @@ def alert_rows(
 
 
 def _opened(row: AlertRow) -> float:
-    """When an alert opened, by the clock of the wall where that is known."""
+    """When an alert opened, in wall-clock time if known."""
     wall = row.run.clock.seconds(row.alert.opened)
     return row.alert.opened if wall is None else wall

@@ -1,4 +1,4 @@
-"""All cameras: the latest run of each with its state, and the alerts of all."""
+"""The wall: the latest run of each camera with its state, and the alerts of all."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
     for entry in entries:
         name = entry.camera or ("" if entry.ended else str(entry.folder))
         if name and not entry.problem:
-            held = chosen.get(name)
-            chosen[name] = entry if held is None or entry.written > held.written else held
+            latest = chosen.get(name)
+            chosen[name] = entry if latest is None or entry.written > latest.written else latest
     return [chosen[name] for name in sorted(chosen)]
 
 
@@ -52,7 +52,7 @@ def wall_page(state: ConsoleState, role: ConsoleRole) -> None:
 
 
 class _Wall:
-    """What one page shows of all cameras, and what it showed last."""
+    """The content of one wall page, and what it showed last."""
 
     def __init__(self, state: ConsoleState, role: ConsoleRole) -> None:
         self.wanted = AlertFilter()
@@ -60,20 +60,20 @@ class _Wall:
         self._shown: tuple[object, object] = (None, None)
 
     def look(self) -> None:
-        """Look anew."""
+        """Refresh."""
         found = latest_by_camera(self._state.library.scan())[:MOST_TILES]
         runs = [(e.key, e.written, e.ended) for e in found]
         if self._shown[0] != runs:
             self.tiles.refresh(found)
         rows = alert_rows(self._state, found, self.wanted)
-        told = [(r.key, r.alert, r.said) for r in rows]
-        if self._shown[1] != told:
+        shown_alerts = [(r.key, r.alert, r.said) for r in rows]
+        if self._shown[1] != shown_alerts:
             self.alerts.refresh(rows)
-        self._shown = runs, told
+        self._shown = runs, shown_alerts
 
     @ui.refreshable_method
     def tiles(self, found: Sequence[RunEntry] = ()) -> None:
-        """A tile for each camera."""
+        """Draw a tile for each camera."""
         with ui.element("div").classes("wall"):
             for entry in found:
                 _tile(self._state, entry)
@@ -84,7 +84,7 @@ class _Wall:
 
     @ui.refreshable_method
     def alerts(self, rows: Sequence[AlertRow] = ()) -> None:
-        """A row for each alert."""
+        """Draw a row for each alert."""
         for row in rows[:MOST_ROWS]:
             moment = f"/run/{row.key}?t={row.alert.opened:.2f}"
             show_alert(row, self._role, partial(ui.navigate.to, moment), self.look)
@@ -125,7 +125,7 @@ def _tile(state: ConsoleState, entry: RunEntry) -> None:
 
 
 def _latest_picture(run: RunView, entry: RunEntry) -> None:
-    """The last frame; of a camera, which only its own process sees, the latest picture of an alert."""
+    """The last frame; for a camera, which only its own process can read, the latest picture of an alert."""
     picture = ui.element("img").classes("picture")
     picture.props["alt"] = ""
     number = latest_snapshot(run.folder) if run.pictures.problem else None
@@ -139,7 +139,7 @@ def _latest_picture(run: RunView, entry: RunEntry) -> None:
 
 
 def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
-    """Verdict, stage and open alerts."""
+    """Show verdict, stage and open alerts."""
     with ui.element("div").classes("line"):
         ui.link(
             shown_text(entry.camera or entry.name), f"/run/{entry.key}?t={mind.time:.2f}"

@@ -1,1 +1,1 @@
-"""What needs the mind that reasoned: why, what if, where to stop, and the steps inside a step."""
+"""Functions that replay the reasoning: why, what-if, breakpoints, and the phases of a step."""

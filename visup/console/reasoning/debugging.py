@@ -1,4 +1,4 @@
-"""Where a run next does something, and what each phase of a step changes: `visup.stepping` for pages."""
+"""Breakpoints and the changes of each phase of a step: `visup.stepping` for pages."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from visup.stepping.cursor import PausedStep
 from visup.stepping.diff import MindChange, mind_diff
 
 CHUNK = 100
-"""Steps at a time: in between, others may ask, and whoever waits may think better of it."""
+"""Steps between two chances for other questions and for cancelling."""
 
 MOST_CONDITIONS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class FoundStop:
-    """Where a search ended.
+    """The result of a search.
 
     Attributes:
-        number: Of the step.
-        reasons: Which conditions were met; empty where the run ended before, or it was given up.
-        ended: Whether there is nothing more.
+        number: Number of the step.
+        reasons: The conditions met; empty if the run ended or the search was cancelled.
+        ended: Whether the run ended.
     """
 
     number: int
@@ -37,13 +37,13 @@ class FoundStop:
 
 @dataclass(frozen=True, slots=True)
 class PhaseRecord:
-    """What one phase of a step did.
+    """The effects of one phase of a step.
 
     Attributes:
-        phase: Which.
-        percepts: Kind -> how many, of what was perceived.
-        changes: What is believed otherwise than before the phase.
-        told: Sentences of its events.
+        phase: The phase.
+        percepts: Kind -> number of percepts.
+        changes: Changes of belief by the phase.
+        told: Texts of its events.
     """
 
     phase: Phase
@@ -53,17 +53,17 @@ class PhaseRecord:
 
 
 def stop_conditions(stepper: Stepper, words: Sequence[str]) -> AnyStop:
-    """One condition out of several, in the words of `break` in `visup step`.
+    """The disjunction of several conditions in the syntax of `break` in `visup step`.
 
     Raises:
-        VisupError: Nothing is meant by one of them, or there is none.
+        VisupError: One of them is not valid, or there is none.
     """
-    given = [w.strip() for w in words if w.strip()]
-    if not 0 < len(given) <= MOST_CONDITIONS:
+    conditions = [w.strip() for w in words if w.strip()]
+    if not 0 < len(conditions) <= MOST_CONDITIONS:
         raise SettingsError(
-            f"there are {len(given)} conditions to stop at", expected=f"1 to {MOST_CONDITIONS}"
+            f"there are {len(conditions)} conditions to stop at", expected=f"1 to {MOST_CONDITIONS}"
         )
-    return AnyStop("; ".join(given), tuple(_condition(stepper, w) for w in given))
+    return AnyStop("; ".join(conditions), tuple(_condition(stepper, w) for w in conditions))
 
 
 def _condition(stepper: Stepper, words: str) -> StopCondition:
@@ -78,13 +78,13 @@ def _condition(stepper: Stepper, words: str) -> StopCondition:
 def searched(
     stepper: Stepper, number: int, until: AnyStop, given_up: Callable[[], bool]
 ) -> Iterator[FoundStop]:
-    """Go on from a step until a condition is met; gives the place after each chunk, the last one found.
+    """Step on until a condition is met; yields the position after each chunk, finally the one found.
 
     Args:
-        stepper: Of the run; others may move it between two chunks.
-        number: Of the step.
+        stepper: Stepper of the run; others may move it between two chunks.
+        number: Number of the step.
         until: The condition.
-        given_up: Whether nobody waits any more.
+        given_up: Whether the search was cancelled.
     """
     at, found = number, False
     while not found and not given_up():
@@ -96,16 +96,16 @@ def searched(
 
 
 def phases_of(stepper: Stepper, number: int) -> tuple[PhaseRecord, ...]:
-    """What each phase of a step did.
+    """The effects of each phase of a step.
 
     Args:
-        stepper: Of the run.
-        number: Of the step, from 1.
+        stepper: Stepper of the run.
+        number: Number of the step, from 1.
 
     Raises:
         SettingsError: There is no such step.
     """
-    stepper.go(number)  # so that one that was not made yet is refused
+    stepper.go(number)  # raises if the step does not exist yet
     stepper.go(number - 1)
     mind, told, records = stepper.mind, 0, []
     for phase in Phase:

@@ -1,8 +1,8 @@
 """Why, why not and what-if for a recorded run: `visup.stepping` behind a lock, for many pages.
 
-The console adds no logic of its own here. Reasons come from the mind that reasoned, which a journal does not
-keep; so the run is reasoned again up to the moment that is asked about. That takes a second for a thousand
-frames, once, and goes on from there the next time.
+The console adds no logic of its own here. Explanations need the full mind, which a journal does not record,
+so the reasoning is replayed up to the moment in question. That takes about a second per thousand frames,
+once; the next question continues from there.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ _INCLUDE = re.compile(r"^[^#\n]*\binclude\b", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class AlternativeCourse:
-    """How a branch differs from the run.
+    """The difference between a branch and the run.
 
     Attributes:
-        assumed: What was assumed, in words.
-        differs: Events that only the one, or only the other told; and both verdicts.
-        until: Up to where both were compared, seconds.
+        assumed: The assumption, in words.
+        differs: Events of only one of the two, and both verdicts.
+        until: End of the comparison, seconds.
     """
 
     assumed: str
@@ -52,24 +52,24 @@ class Inquiry:
     """Questions about one run.
 
     Args:
-        folder: Of the run.
+        folder: Folder of the run.
 
     Raises:
-        VisupError: It cannot be reasoned about again.
+        VisupError: Its reasoning cannot be replayed.
     """
 
     def __init__(self, folder: Path) -> None:
         self._stepper, self._lock = Stepper.of_run(folder), Lock()
 
     def why(self, number: int, what: str) -> Why:
-        """Explain something after a step, as `why` in `visup step`; `not ...` asks why not.
+        """Explain a belief after a step, as `why` in `visup step`; `not ...` asks why not.
 
         Args:
-            number: Of the step, from 1.
+            number: Number of the step, from 1.
             what: Such as `alert 2`, `touching 1 2`, `identity 1`, `verdict`, `not coupled 1 2`.
 
         Raises:
-            VisupError: Nothing is known of it.
+            VisupError: There is nothing to explain.
         """
         text = " ".join(what.split())
         with self._lock:
@@ -79,10 +79,10 @@ class Inquiry:
             return self._stepper.why(text)
 
     def mind(self, number: int) -> Mind:
-        """All that was believed after a step, relations too.
+        """The full mind after a step, including relations.
 
         Args:
-            number: Of the step, from 1.
+            number: Number of the step, from 1.
 
         Raises:
             VisupError: There is no such step.
@@ -97,13 +97,13 @@ class Inquiry:
         """The next step after one at which a condition is met.
 
         Args:
-            number: Of the step, from 1.
-            words: Conditions, as `break` in `visup step` takes them: `alert`, `rule NAME`, `stage NAME`,
+            number: Number of the step, from 1.
+            words: Conditions in the syntax of `break` in `visup step`: `alert`, `rule NAME`, `stage NAME`,
                 `when gap(1, 2) < 20 px`.
-            given_up: Whether nobody waits any more.
+            given_up: Whether the search was cancelled.
 
         Raises:
-            VisupError: Nothing is meant by one of them.
+            VisupError: One of them is not valid.
         """
         with self._lock:
             self._stepper.go(number)
@@ -117,7 +117,7 @@ class Inquiry:
             found = place
 
     def phases(self, number: int) -> tuple[PhaseRecord, ...]:
-        """What each phase of a step did.
+        """The effects of each phase of a step.
 
         Raises:
             VisupError: There is no such step.
@@ -126,15 +126,15 @@ class Inquiry:
             return phases_of(self._stepper, number)
 
     def what_if(self, number: int, what: str, steps: int) -> AlternativeCourse:
-        """How the run would have gone on from a step, had something been otherwise.
+        """How the run would have continued after a step under an assumption.
 
         Args:
-            number: Of the step, from 1.
+            number: Number of the step, from 1.
             what: `object 2 satellite`, `touching 1 2 false`, `object 1 hidden`.
-            steps: How many steps there are.
+            steps: Number of steps of the run.
 
         Raises:
-            VisupError: It says nothing that can be assumed.
+            VisupError: It cannot be assumed.
         """
         words = what.split()
         if not words:
@@ -151,13 +151,13 @@ class Inquiry:
         """How the run would have continued if its operator had identified an object after a step.
 
         Args:
-            number: Of the step, from 1.
+            number: Number of the step, from 1.
             object_id: The object.
             name: A model, an actor, or 'unknown'.
-            steps: How many steps there are.
+            steps: Number of steps of the run.
 
         Raises:
-            VisupError: Nobody knows such an object or name.
+            VisupError: There is no such object or name.
         """
         with self._lock:
             self._stepper.go(number)
@@ -168,15 +168,15 @@ class Inquiry:
             )
 
     def judged_by(self, kind: str, text: str, steps: int) -> AlternativeCourse:
-        """How the whole run is judged by another task or other rules.
+        """The whole run with another task or other rules.
 
         Args:
             kind: 'task' or 'rules'.
-            text: Of the file; it may include no other file, since it comes from a page.
-            steps: How many steps there are.
+            text: Text of the file; includes are refused, since it comes from a page.
+            steps: Number of steps of the run.
 
         Raises:
-            VisupError: The text is not as it should be; every mistake in it is told.
+            VisupError: The text is not valid; every mistake is reported.
         """
         if kind == "task" and _INCLUDE.search(text):
             raise SettingsError(

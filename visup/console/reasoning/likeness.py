@@ -1,4 +1,4 @@
-"""Why an object was taken for a model: its silhouette beside the views that look most like it."""
+"""Pictures that explain an identification: the silhouette next to the most similar views."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from visup.percepts.shape.drawing.pictures import match_picture
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 BEST = 3
-"""Views that are shown."""
+"""Number of views shown."""
 
 
 def likeness_picture(run: RunView, number: int, object_id: int) -> bytes:
-    """The silhouette of an object, and the views that it matched when last matched.
+    """The silhouette of an object, and the most similar views at its last match.
 
-    The views are searched anew, among all: a run may have looked only for what its tasks name.
+    All views are searched again: the run may have searched only the models named by its tasks.
 
     Args:
         run: The run.
-        number: Of the moment, from 0.
+        number: Number of the moment, from 0.
         object_id: The object.
 
     Returns:
         A JPEG.
 
     Raises:
-        VisupError: The run has no models, they cannot be read, or nobody looked at the object.
+        VisupError: The run has no models, they cannot be read, or the object was never matched.
     """
     at, _ = run.last_look(number, object_id)
     belief = run.mind(at).objects.get(object_id) if at is not None else None

@@ -1,1 +1,1 @@
-"""Tasks, rules and zones that are written in the page: checked as they are typed, and saved where allowed."""
+"""Tasks, rules and zones edited in the page: checked while typing, and saved where allowed."""

@@ -1,4 +1,4 @@
-"""A text being edited in the page: its mistakes, its tree, and completions."""
+"""Checks a text edited in the page: mistakes, meaning, and completions."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from visup.tasks.tools.rule_editing import rule_completions, rule_faults
 
 LONGEST_DRAFT = 100_000
 NAME = "the text"
-"""What messages call it."""
+"""Its name in messages."""
 
 
 class DraftKind(StrEnum):
-    """What is written."""
+    """Kind of text."""
 
     TASK = "task"
     RULES = "rules"
@@ -35,8 +35,8 @@ class DraftFault:
     """A mistake.
 
     Attributes:
-        line: Where, from 1; 0 for the text as a whole.
-        text: What is wrong, what was expected, how to correct it.
+        line: Line, from 1; 0 for the whole text.
+        text: The mistake, what was expected, and how to correct it.
     """
 
     line: int
@@ -45,12 +45,12 @@ class DraftFault:
 
 @dataclass(frozen=True, slots=True)
 class DraftCheck:
-    """What there is to say of a text.
+    """The result of a check.
 
     Attributes:
-        faults: Its mistakes, in their order.
-        tree: What it means, where it has none.
-        zones: Those that it draws.
+        faults: Mistakes in order.
+        tree: Meaning of a text without mistakes.
+        zones: Its zones.
     """
 
     faults: tuple[DraftFault, ...] = ()
@@ -59,11 +59,11 @@ class DraftCheck:
 
 
 def check_draft(kind: DraftKind, text: str) -> DraftCheck:
-    """Check a text; an empty one is not wrong, but says nothing.
+    """Check a text; an empty one has neither mistakes nor meaning.
 
     Args:
-        kind: What it is.
-        text: The text; it may include no other file, since it comes from a page.
+        kind: Kind of text.
+        text: The text; includes are refused, since it comes from a page.
     """
     if not text.strip():
         return DraftCheck()
@@ -110,22 +110,22 @@ def _zones(text: str) -> DraftCheck:
 
 
 def _located(faults: Sequence[Diagnostic]) -> tuple[DraftFault, ...]:
-    return tuple(DraftFault(f.place.line, _said(f)) for f in faults)
+    return tuple(DraftFault(f.place.line, _message(f)) for f in faults)
 
 
-def _said(fault: Diagnostic) -> str:
+def _message(fault: Diagnostic) -> str:
     expected = f"; expected: {fault.expected}" if fault.expected else ""
     hint = f"; {fault.hint}" if fault.hint else ""
     return f"{fault.message}{expected}{hint}"
 
 
 def words_at(kind: DraftKind, text: str, place: int) -> list[Completion]:
-    """Completions at a position, given what has been typed there.
+    """Completions at a position.
 
     Args:
-        kind: What the text is.
+        kind: Kind of text.
         text: The text.
-        place: Number of the letter before which it would stand, from 0.
+        place: Offset of the caret in characters.
     """
     if kind is DraftKind.ZONES or len(text) > LONGEST_DRAFT:
         return []
@@ -141,7 +141,7 @@ def words_at(kind: DraftKind, text: str, place: int) -> list[Completion]:
 
 
 def begun_word(before: str) -> str:
-    """The word that is being written at the end of a text."""
+    """The unfinished word at the end of a text."""
     length = 0
     while length < len(before) and (before[-1 - length].isalnum() or before[-1 - length] == "_"):
         length += 1

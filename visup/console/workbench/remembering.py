@@ -1,4 +1,4 @@
-"""Objects that were clicked become models: what is seen of one at a moment is a taught view of it."""
+"""Teaches clicked objects: saves the view of an object at a moment to a model database."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from visup.percepts.taught.view import taught_mask
 from visup.teaching.lesson import Lesson, store
 
 MODELS = "console.models"
-"""The model database in the folder for what operators save; each further view is added to it."""
+"""The model database in the `save_to` folder; further views are added to it."""
 
 
 def remember(run: RunView, number: int, object_id: int, name: str, folder: Path) -> Lesson:
-    """Keep what an object looks like at a moment as a view of a model.
+    """Save the appearance of an object at a moment as a view of a model.
 
     Args:
         run: The run.
-        number: Of the moment, from 0.
+        number: Number of the moment, from 0.
         object_id: The object.
-        name: Of the model.
-        folder: Where the database is.
+        name: Name of the model.
+        folder: Folder of the database.
 
     Raises:
-        VisupError: The object is not seen then, the video is gone, or the database cannot be written.
+        VisupError: The object is not visible, the video is missing, or the database cannot be written.
     """
     mind = run.mind(number)
     belief = mind.objects.get(object_id)

@@ -1,4 +1,4 @@
-"""Saving what was written in the page: into one folder that was named for it, under a plain name."""
+"""Saves texts edited in the page under plain names in one configured folder."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 
 
 def save_draft(folder: Path, kind: DraftKind, name: str, text: str, *, replace: bool) -> Path:
-    """Write a text that has no mistakes.
+    """Save a text without mistakes.
 
     Args:
-        folder: Where.
-        kind: What it is, which gives the ending.
-        name: Of the file, without its ending.
+        folder: The folder.
+        kind: Kind of text, which determines the suffix.
+        name: File name without suffix.
         text: The text.
-        replace: Whether a file of that name is written over.
+        replace: Whether to overwrite an existing file.
 
     Returns:
         The file.
 
     Raises:
-        SettingsError: The name or the text is not as it should be, or there is such a file.
+        SettingsError: The name or the text is not valid, or the file exists.
         OutputError: It cannot be written.
     """
     if not _NAME.fullmatch(name):
@@ -47,6 +47,6 @@ def save_draft(folder: Path, kind: DraftKind, name: str, text: str, *, replace: 
     try:
         write_whole(path, text.encode() if text.endswith("\n") else f"{text}\n".encode())
     except (OSError, UnicodeEncodeError) as fault:
-        said = getattr(fault, "strerror", None) or fault
-        raise OutputError(f"it cannot be saved: {said}", where=path.name) from fault
+        reason = getattr(fault, "strerror", None) or fault
+        raise OutputError(f"it cannot be saved: {reason}", where=path.name) from fault
     return path

@@ -1,1 +1,1 @@
-"""The panels beside the picture of a run, one for each tab."""
+"""The panels next to the picture of a run, one per tab."""

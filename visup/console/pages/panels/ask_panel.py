@@ -1,4 +1,4 @@
-"""Why, and why not, at the cursor: the answer is a tree whose leaves are frames."""
+"""Explanations (why, why not) at the cursor, shown as a tree down to frames."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
             _say(str(fault))
             return
         answer.clear()
-        if why is None:  # the console is being stopped
+        if why is None:  # the console is stopping
             return
         with answer:
             ui.label(f"{what}, at {head.run.when(head.run.times[asked])}").classes("dim")
@@ -63,7 +63,7 @@ def ask_panel(state: ConsoleState, head: Playhead, key: str) -> None:
 
 
 def proposals(head: Playhead) -> list[str]:
-    """What one may well ask at the cursor."""
+    """Suggested questions at the cursor."""
     mind = head.run.mind(head.number)
     opened = [a for a in head.run.alerts if a.severity > Severity.INFO and open_at(a, mind.time)]
     alerts = [f"alert {a.id}" for a in opened[:3]]
@@ -74,7 +74,7 @@ def proposals(head: Playhead) -> list[str]:
 
 
 def _tree(why: Why, head: Playhead, deep: int = 0, left: list[int] | None = None) -> None:
-    """The answer, indented; what speaks of a frame goes there when it is clicked."""
+    """The explanation, indented; a click on a line with a frame moves the cursor there."""
     left = [MOST_LINES] if left is None else left
     if left[0] <= 0:
         return

@@ -1,4 +1,4 @@
-"""Events and alerts with their times; a click goes there."""
+"""Events and alerts with their times; a click moves the cursor."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from visup.console.recorded_mind import open_at
 from visup.wording import prose, worded_once
 
 MOST_LINES = 200
-"""Events on the page at once; those around the cursor."""
+"""Maximum number of events on the page, around the cursor."""
 
 
 def events_panel(head: Playhead) -> None:
     """Lay out the events; those up to the cursor are marked."""
-    told = worded_once(head.run.events)
+    worded = worded_once(head.run.events)
 
     @ui.refreshable
     def lines() -> None:
         now = head.run.times[head.number]
-        for event in _around(told, now):
+        for event in _around(worded, now):
             last = event.time <= now < event.time + 1.0
             _line(event.time, event.text, event.severity, head, marked=last)
-        if not told:
+        if not worded:
             ui.label("No events.").classes("dim")
 
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Events"'):
@@ -38,13 +38,13 @@ def events_panel(head: Playhead) -> None:
     head.listen(lines.refresh, "Events")
 
 
-def _around(told: Sequence[Event], now: float) -> Sequence[Event]:
-    """Events around a time, when there are too many."""
-    if len(told) <= MOST_LINES:
-        return told
-    at = sum(e.time <= now for e in told)
-    begin = min(max(0, at - MOST_LINES // 2), len(told) - MOST_LINES)
-    return told[begin : begin + MOST_LINES]
+def _around(worded: Sequence[Event], now: float) -> Sequence[Event]:
+    """The events around a time if there are too many."""
+    if len(worded) <= MOST_LINES:
+        return worded
+    at = sum(e.time <= now for e in worded)
+    begin = min(max(0, at - MOST_LINES // 2), len(worded) - MOST_LINES)
+    return worded[begin : begin + MOST_LINES]
 
 
 def _line(
@@ -59,18 +59,18 @@ def _line(
 
 
 def alerts_panel(head: Playhead, key: str, role: ConsoleRole) -> None:
-    """Lay out the alerts, with what people said of them."""
+    """Lay out the alerts with feedback."""
     wanted = {"open": False}
 
     @ui.refreshable
     def listed() -> None:
-        said = read_feedback(head.run.folder)
+        feedback = read_feedback(head.run.folder)
         now = head.run.times[head.number]
         found = [a for a in head.run.alerts if a.severity > Severity.INFO]
         if wanted["open"]:
             found = [a for a in found if open_at(a, now)]
         for alert in found:
-            row = AlertRow(key, head.run, alert, said.get(alert.id))
+            row = AlertRow(key, head.run, alert, feedback.get(alert.id))
             show_alert(row, role, partial(head.go_to_time, alert.opened), listed.refresh)
         if not found:
             ui.label("No alerts are open here." if wanted["open"] else "No alerts.").classes("dim")

@@ -1,4 +1,4 @@
-"""One object that was clicked: what it may be, how alike it looks, and how sure each name was over time."""
+"""The clicked object: candidate names, similarity of views, and votes over time."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Samples = Sequence[tuple[float, Mapping[str, float]]]
 
 
 def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None:
-    """Lay out what is known of an object at the cursor.
+    """Lay out an object at the cursor.
 
     Args:
         head: The cursor.
-        key: Of the run.
-        number: Of the object.
-        samples: How sure each of its names was over time.
+        key: Key of the run.
+        number: Number of the object.
+        samples: Shares of its names over time.
     """
     part_heading(f"Identity of object {number}")
     peaks: dict[str, float] = {}
@@ -55,17 +55,17 @@ def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None
 
 
 def _show_likeness(address: str, number: int) -> None:
-    """The silhouette and the views that it looks like, large, over the page."""
-    told = f"Silhouette of object {number} beside the views that it looks like"
+    """Show the silhouette and the most similar views in a dialog."""
+    description = f"Silhouette of object {number} beside the views that it looks like"
     with ui.dialog(value=True) as dialog, ui.card().classes("likeness"):
-        dialog.props(f'aria-label="{told}"')
-        ui.element("img").props(f'src="{address}" alt="{told}"')
+        dialog.props(f'aria-label="{description}"')
+        ui.element("img").props(f'src="{address}" alt="{description}"')
         worded_button("Close", dialog.close)
     dialog.on("hide", dialog.delete)
 
 
 def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypothesis]) -> None:
-    """Each name with its share of the votes and how alike the best view of it looks."""
+    """A table of names with their shares of the votes and the similarity of their best views."""
     likest = {h.name: h for h in reversed(looks)}
     with ui.element("table").classes("candidates"):
         with ui.element("thead"), ui.element("tr"):
@@ -75,7 +75,7 @@ def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypot
         with ui.element("tbody"):
             for name, colour in zip(names, CANDIDATE_COLOURS, strict=False):
                 look = likest.get(name)
-                said = (
+                cells = (
                     name,
                     percent(now.get(name, 0.0)),
                     f"{look.similarity:.2f}" if look else "",
@@ -84,22 +84,22 @@ def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypot
                 with ui.element("tr"):
                     with ui.element("td"):
                         ui.element("span").classes("swatch block").style(f"background:{colour}")
-                    for text in said:
+                    for text in cells:
                         with ui.element("td"):
                             ui.label(shown_text(text))
 
 
 def _curves(samples: Samples, names: Sequence[str], seconds: float, place: float) -> str:
-    """The shares of some names over time with the cursor, as SVG."""
+    """The shares of names over time with the cursor, as SVG."""
     lines = "".join(
         _curve(samples, name, colour, max(seconds, 1e-6))
         for name, colour in zip(names, CANDIDATE_COLOURS, strict=False)
     )
-    told = escape(f"Share of the votes over time for {', '.join(names)}", quote=True)
+    description = escape(f"Share of the votes over time for {', '.join(names)}", quote=True)
     x = f"{1000 * place:.1f}"
     return (
         f'<svg viewBox="0 0 1000 {CURVE_HEIGHT}" preserveAspectRatio="none" width="100%" '
-        f'height="{CURVE_HEIGHT}" role="img" aria-label="{told}">{lines}'
+        f'height="{CURVE_HEIGHT}" role="img" aria-label="{description}">{lines}'
         f'<line class="now" x1="{x}" x2="{x}" y1="0" y2="{CURVE_HEIGHT}"/></svg>'
     )
 

@@ -1,6 +1,6 @@
 """Questions of the run to its operator, with answers as buttons.
 
-While the run goes on it is told; and in any run one may see what would have followed from it.
+In a live run an answer is passed on to it; in any run its consequences can be tried.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from visup.runs.inputs.answer_box import put_answer
 
 
 class QuestionsPart:
-    """The questions that wait at the cursor.
+    """The questions open at the cursor.
 
     Args:
-        state: What all pages share.
+        state: Shared state of all pages.
         head: The cursor.
-        key: Of the run.
-        role: Of whoever looks; only operators may try answers.
+        key: Key of the run.
+        role: Role of the user; only operators may try answers.
     """
 
     def __init__(self, state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:

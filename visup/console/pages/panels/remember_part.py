@@ -1,4 +1,4 @@
-"""A clicked object is given a name, and is known from then on: a taught view of a model."""
+"""Teaching: saves the clicked object under a name as a view of a model."""
 
 from __future__ import annotations
 
@@ -18,20 +18,22 @@ def remember_part(head: Playhead, number: int, folder: Path) -> None:
     Args:
         head: The cursor.
         number: Of the object.
-        folder: Where the model database is kept.
+        folder: Folder of the model database.
     """
     with ui.row().classes("items-center gap-2"):
         name = ui.input(placeholder="name").props('dense outlined aria-label="Name of the model"')
 
         async def keep() -> None:
-            told = str(name.value or "").strip()
+            model_name = str(name.value or "").strip()
             try:
-                lesson = await run.io_bound(remember, head.run, head.number, number, told, folder)
+                lesson = await run.io_bound(
+                    remember, head.run, head.number, number, model_name, folder
+                )
             except VisupError as fault:
                 ui.notify(shown_text(str(fault)), type="negative", multi_line=True)
                 return
             if lesson is not None:
-                said = f"'{told}' is known from now on: --models {MODELS}"
-                ui.notify(shown_text(said), type="positive")
+                text = f"'{model_name}' is known from now on: --models {MODELS}"
+                ui.notify(shown_text(text), type="positive")
 
         worded_button("Remember as a model", keep)

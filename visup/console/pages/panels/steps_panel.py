@@ -1,4 +1,4 @@
-"""Breakpoints, and the inside of a step: where the run next does something, and what each phase changes."""
+"""Breakpoints, and the changes made by each phase of a step."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def steps_panel(state: ConsoleState, head: Playhead, key: str) -> None:
 
 
 class _Breakpoints:
-    """Where to stop, and the search for the next place."""
+    """The breakpoints, and the search for the next one."""
 
     def __init__(self, state: ConsoleState, head: Playhead, key: str) -> None:
         self._state, self._head, self._key = state, head, key
@@ -87,7 +87,7 @@ class _Breakpoints:
         begin, asked = self._head.number, [w for w, on in self._words.items() if on]
         try:
             found = await run.io_bound(self._search, begin, asked)
-            if found is not None:  # else the console is being stopped
+            if found is not None:  # else the console is stopping
                 self._arrive(found)
         except VisupError as fault:
             self._said.set_text(shown_text(str(fault)))
@@ -114,7 +114,7 @@ def _stages(head: Playhead) -> list[str]:
 
 
 class _PhaseWalk:
-    """The phases of the step at the cursor, one after the other, and on into the next step."""
+    """Steps through the phases at the cursor and on into the next step."""
 
     def __init__(self, state: ConsoleState, head: Playhead, key: str) -> None:
         self._state, self._head, self._key = state, head, key

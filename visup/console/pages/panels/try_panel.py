@@ -1,4 +1,4 @@
-"""What if: another belief from the cursor on; both courses side by side."""
+"""What-if analysis: a changed belief from the cursor on, compared with the run."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ async def show_tried(
     *,
     assumed: bool = False,
 ) -> None:
-    """Think an alternative course through beside the page, and show it or why there is none.
+    """Compute an alternative course in the background, and show it or the reason for its failure.
 
     Args:
-        course: Thinks it through.
-        answer: Where it is shown.
+        course: Computes it.
+        answer: Element for the result.
         head: The cursor.
-        assumed: Whether to say what was assumed.
+        assumed: Whether to show the assumption.
     """
     answer.clear()
     with answer:
@@ -68,7 +68,7 @@ async def show_tried(
         found = await run.io_bound(course)
     except VisupError as fault:
         said = str(fault)
-    if answer.is_deleted:  # the page was left meanwhile
+    if answer.is_deleted:  # the page was closed meanwhile
         return
     answer.clear()
     with answer:
@@ -76,7 +76,7 @@ async def show_tried(
             if assumed:
                 ui.label(shown_text(found.assumed)).classes("dim")
             _show_course(found, head)
-        elif said:  # with neither, the console is being stopped
+        elif said:  # with neither, the console is stopping
             ui.label(shown_text(said)).classes("why")
 
 

@@ -1,4 +1,4 @@
-"""The workbench: a task, rules or zones written in the page, checked, tried on the run, and saved."""
+"""The workbench: edits a task, rules or zones, checks them, tries them on the run, and saves them."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class _Workbench:
         self.editor.changed = True
         self._words.clear()
 
-    # What is wrong, and what it means
+    # Mistakes and meaning
 
     async def _look(self) -> None:
         if not self.editor.changed or self._head.panel != "Write":
@@ -106,7 +106,7 @@ class _Workbench:
             if not found:
                 ui.label("No completions.").classes("dim")
 
-    # Zones on the picture
+    # Drawing zones on the picture
 
     def _drawing(self) -> None:
         ui.switch("draw", on_change=lambda e: setattr(self._head, "pen", bool(e.value))).props(
@@ -127,7 +127,7 @@ class _Workbench:
         self.editor.text = f"{before}\n\n{made}" if before else made
         self._head.draw()
 
-    # On the run, and to a file
+    # Trying on the run, and saving
 
     async def _judge(self) -> None:
         kind, text, steps = self._kind, self.editor.text, len(self._head.run.frames)
@@ -144,8 +144,8 @@ class _Workbench:
     def _saving(self) -> None:
         folder = self._state.save_to
         if folder is None:
-            told = "To save texts, name a folder: visup console --save-to FOLDER"
-            ui.label(told).classes("dim")
+            hint = "To save texts, name a folder: visup console --save-to FOLDER"
+            ui.label(hint).classes("dim")
             return
         with ui.row().classes("items-center gap-2"):
             name = ui.input(placeholder="name").props(
