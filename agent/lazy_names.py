@@ -1,6 +1,6 @@
-"""Public names of a package that are loaded when they are first used.
+"""Lazy public names of a package.
 
-A package that gathers names from all its modules would load them all for whoever needs one; the command's
+A package that re-exports names of all its modules would load all of them for a single name; the command's
 `--help` needs only the errors.
 """
 
@@ -21,11 +21,11 @@ def lazy_names(
 
     Args:
         package: Name of the package.
-        homes: For each module the names that are found there; `Name as Other` gives one another name.
-        before: Called with the name of a module before that is imported.
+        homes: Module -> the names it provides; `Name as Other` renames one.
+        before: Called with the name of a module before it is imported.
 
     Returns:
-        What gives a name's object and keeps it in the package; a name without a home is an AttributeError.
+        A function that loads a name and caches it in the package; raises AttributeError for unknown names.
     """
     home_of = {
         name.rpartition(" as ")[2]: (module, name.partition(" as ")[0])

@@ -1,4 +1,4 @@
-"""Room for the libraries: what cannot have the memory that it takes ends a process without a word."""
+"""Checks the memory limit before libraries are loaded, which would otherwise crash without a message."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from visup.agent.model.errors import SettingsError
 
 LEAST_MEMORY_MB = 1200
 MEMORY_A_CORE_MB = 100
-"""Address space that libraries take when they are loaded: measured with 2 cores at 1.2 GB; each core has
-threads, which have stacks."""
+"""Address space of the loaded libraries: 1.2 GB measured with 2 cores; each core adds threads with stacks."""
 
 
 def check_memory() -> None:
-    """See that libraries will have the memory that they take when they are loaded.
+    """Check that the libraries can be loaded.
 
     Raises:
-        SettingsError: A limit is set (`ulimit -v`), and it is too low.
+        SettingsError: The address space is limited (`ulimit -v`) too low.
     """
     try:
         import resource

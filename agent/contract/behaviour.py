@@ -1,4 +1,4 @@
-"""The interfaces of what runs inside the cycle: behaviours perceive, reasoners reason."""
+"""The interfaces of the parts of the cycle: behaviours perceive, reasoners reason."""
 
 from __future__ import annotations
 

@@ -77,13 +77,15 @@ class Contract:
         self._expect("gives", bool(self.gives), "at least one kind of percept")
         self._expect("awake", isinstance(self.awake, str), 'a condition, such as "expected(a)"')
         self._expect("relieves", self.name not in self.relieves, "names of other behaviours")
-        self._expect("every_s", _number(self.every_s, 0.0), "seconds, 0 for every frame")
+        self._expect("every_s", _is_number_from(self.every_s, 0.0), "seconds, 0 for every frame")
         for field in ("cost_ms", "hang_s", "memory_mb"):
             value = getattr(self, field)
-            fine = value is None or (_number(value, 0.0) and value > 0)
-            self._expect(field, fine, "a number above 0, or None")
-        self._expect("history", _whole(self.history, 0, MOST_HISTORY), f"0 to {MOST_HISTORY}")
-        self._expect("most_percepts", _whole(self.most_percepts, 1, 10**6), "1 to 1000000")
+            valid = value is None or (_is_number_from(value, 0.0) and value > 0)
+            self._expect(field, valid, "a number above 0, or None")
+        self._expect(
+            "history", _is_integer_in(self.history, 0, MOST_HISTORY), f"0 to {MOST_HISTORY}"
+        )
+        self._expect("most_percepts", _is_integer_in(self.most_percepts, 1, 10**6), "1 to 1000000")
         for field in ("deterministic", "isolate"):
             self._expect(field, isinstance(getattr(self, field), bool), "True or False")
 
@@ -102,15 +104,15 @@ class Contract:
 
     def _expect_kinds(self, field: str) -> None:
         kinds = getattr(self, field)
-        fine = isinstance(kinds, tuple) and all(isinstance(k, str) and k for k in kinds)
+        valid = isinstance(kinds, tuple) and all(isinstance(k, str) and k for k in kinds)
         hint = (
             f"a tuple of one has a comma: {field}=({kinds!r},)" if isinstance(kinds, str) else None
         )
-        self._expect(field, fine, "a tuple of words, such as ('region',)", hint)
+        self._expect(field, valid, "a tuple of words, such as ('region',)", hint)
         self._expect(field, len(set(kinds)) == len(kinds), "each kind once")
 
-    def _expect(self, field: str, fine: bool, expected: str, hint: str | None = None) -> None:
-        if not fine:
+    def _expect(self, field: str, valid: bool, expected: str, hint: str | None = None) -> None:
+        if not valid:
             raise BehaviourError(
                 f"`{field}` is {getattr(self, field)!r}",
                 where=f"contract of '{self.name}'",
@@ -122,10 +124,10 @@ class Contract:
 _VERSION = "this behaviour was written for another version of visup; see docs/plugins.md"
 
 
-def _number(value: object, least: float) -> bool:
+def _is_number_from(value: object, least: float) -> bool:
     plain = isinstance(value, int | float) and not isinstance(value, bool)
     return plain and isfinite(value) and value >= least  # type: ignore[arg-type, operator]
 
 
-def _whole(value: object, least: int, most: int) -> bool:
+def _is_integer_in(value: object, least: int, most: int) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most

@@ -1,18 +1,16 @@
-"""How an agent holds its behaviours to limits of time and memory.
+"""Limits of time and memory for behaviours.
 
 The policy, in one place:
 
-- *By default no decision hangs on how fast the machine is.* A run may take as long as it likes up to
-  `hang_s`, which is so long that only a hang reaches it, even where others keep the machine or its disk
-  busy; the same frames give the same steps.
-- *Budgets are asked for* (`budgets=True`), when frames come in real time: then a run that takes
-  longer than its contract's `cost_ms` is given up, and its output is unavailable in that step.
-- *Within the process* a run goes to a thread that serves this behaviour alone. The step waits for it
-  no longer than the limit. Python cannot kill a thread: one that was given up is asked to stop, which
-  stops Python code but not code that is stuck in a library; the behaviour counts as late until it
-  is out of it, and its late answer is dropped.
-- *In a process of its own* (`isolate`) the limits are hard: a run that takes too long, or too much
-  memory, is killed with its process, and a new process is started in the state of the beginning.
+- *By default no decision depends on the speed of the machine.* A run may take up to `hang_s`, which is so
+  long that only a hang exceeds it, even on a busy machine or disk; the same frames give the same steps.
+- *Budgets are optional* (`budgets=True`), for frames in real time: a run that takes longer than its
+  contract's `cost_ms` is abandoned, and its output is unavailable in that step.
+- *Within the process* a behaviour runs in a thread of its own. The step waits for it no longer than the
+  limit. Python cannot kill a thread: an abandoned one is asked to stop, which stops Python code but not code
+  that is stuck in a library; the behaviour counts as late until it returns, and its late answer is dropped.
+- *In a process of its own* (`isolate`) the limits are hard: a run that takes too much time or memory is
+  killed with its process, and a new process is started in the initial state.
 """
 
 from __future__ import annotations
@@ -26,22 +24,22 @@ from visup.agent.contract.contract import Contract
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What behaviours are held to.
+    """The limits of all behaviours.
 
     Attributes:
-        hang_s: A run that takes longer is given up, seconds. None runs behaviours in the thread of
-            the caller, without any limit: for debuggers and profilers.
-        patient: Whether a contract may ask for a longer `hang_s`, for what is compiled in its first runs. Not
-            for live sources, where a hang must be reported soon.
-        start_s: How long a behaviour may take to start: to import libraries and load models, seconds.
-        budgets: Whether each run is also held to its contract's `cost_ms`.
+        hang_s: A run that takes longer is abandoned, seconds. None runs behaviours in the caller's thread
+            without any limit: for debuggers and profilers.
+        patient: Whether a contract may request a longer `hang_s`, for compilation in its first runs. Not for
+            live sources, where a hang must be reported soon.
+        start_s: Time for a behaviour to start (import libraries, load models), seconds.
+        budgets: Whether the contract's `cost_ms` limits each run as well.
         budget_ms: Budget of behaviours that declare none, milliseconds.
-        memory_mb: How much memory a behaviour may take that declares nothing, megabytes.
-        isolate: Names of behaviours that run in processes of their own, whatever their contracts say.
+        memory_mb: Memory limit of behaviours that declare none, megabytes.
+        isolate: Names of behaviours that run in their own processes, whatever their contracts say.
         here: Whether all run in this process, whatever contracts say: for debuggers and checkers.
         wakeful: Names of behaviours that never sleep, whatever their contracts say: those that safety
             rules need (`rules/activation/activation.py`).
-        clock: Seconds, by which the time of a run is measured.
+        clock: Clock for the time of a run, seconds.
     """
 
     hang_s: float | None = 60.0
@@ -56,7 +54,7 @@ class Limits:
     clock: Callable[[], float] = time.perf_counter
 
     def seconds(self, contract: Contract) -> float | None:
-        """How long one run may take; None without limit."""
+        """Time limit of one run, seconds; None for no limit."""
         if not self.budgets:
             if self.hang_s is None or not self.patient:
                 return self.hang_s
@@ -69,9 +67,9 @@ class Limits:
         return bool(contract.awake) and contract.name not in self.wakeful
 
     def megabytes(self, contract: Contract) -> float:
-        """How much memory it may take."""
+        """Memory limit, megabytes."""
         return contract.memory_mb or self.memory_mb
 
     def isolated(self, contract: Contract) -> bool:
-        """Whether it runs in a process of its own."""
+        """Whether it runs in its own process."""
         return not self.here and (contract.isolate or contract.name in self.isolate)

@@ -1,6 +1,6 @@
-"""Whether a value makes sense for its kind of percept: of the kinds of visup, and of plug-ins' own.
+"""Checks the values of percepts, of visup's kinds and of plug-ins' own.
 
-Asked of what a behaviour reports (`validation.py`), and of what a journal says that one reported.
+Applied to the reports of behaviours (`validation.py`) and to those read from a journal.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from visup.agent.model.records import CameraMotion, Depth, Health, HealthStatus,
 DEEPEST = 8
 """Values of plug-ins' own kinds may nest this deep."""
 MOST_BITS = 1024
-"""Whole numbers are no longer: they could not be written down and read back."""
+"""Longest integer, bits: longer ones could not be written and read back as JSON."""
 LARGEST_SIDE = 2**16
-"""Pixels of a frame's side."""
+"""Largest width or height of a frame, pixels."""
 
 
 def check_value(kind: str, value: Any, size: tuple[int, int], who: str) -> None:
-    """Refuse a value that makes no sense.
+    """Check the value of a percept.
 
     Args:
-        kind: Of percept.
-        value: What was perceived.
+        kind: Kind of percept.
+        value: Its value.
         size: Width and height of the frame, pixels.
-        who: Who says so, for the message.
+        who: Name of the behaviour, for the message.
 
     Raises:
-        BehaviourError: It is nonsense.
+        BehaviourError: It is not valid.
     """
     check = VALUE_CHECKS.get(kind)
     if check is None:
-        _own(value, who)
+        _check_plain(value, who)
         return
     kind_type, judge = check
     expect(isinstance(value, kind_type), f"{who} as {a_kind(value)}", _a_type(kind_type))
@@ -49,12 +49,12 @@ def check_value(kind: str, value: Any, size: tuple[int, int], who: str) -> None:
 def _region(r: Region, size: tuple[int, int]) -> None:
     who = f"region {brief(r.id)}"
     expect(
-        isinstance(r.id, int) and _integer(r.id) and r.id >= 1,
+        isinstance(r.id, int) and _is_integer(r.id) and r.id >= 1,
         f"{who} has no number",
         "an id from 1",
     )
     expect(
-        isinstance(r.bbox, tuple) and len(r.bbox) == 4 and all(_integer(v) for v in r.bbox),
+        isinstance(r.bbox, tuple) and len(r.bbox) == 4 and all(_is_integer(v) for v in r.bbox),
         f"{who} has box {brief(r.bbox)}",
         "(x, y, width, height) in whole pixels",
     )
@@ -75,16 +75,18 @@ def _region(r: Region, size: tuple[int, int]) -> None:
         pair = isinstance(value, tuple) and len(value) == 2 and all(is_finite(v) for v in value)
         expect(pair, f"{who} has {name} {brief(value)}", "(x, y), two finite numbers")
     for name, number in (("area", r.area), ("velocity_sigma", r.velocity_sigma)):
-        expect(_least(number, 0.0), f"{who} has {name} {brief(number)}", "a number, at least 0")
-    expect(_share(r.confidence), f"{who} has confidence {brief(r.confidence)}", "0 to 1")
+        expect(
+            _is_at_least(number, 0.0), f"{who} has {name} {brief(number)}", "a number, at least 0"
+        )
+    expect(_is_share(r.confidence), f"{who} has confidence {brief(r.confidence)}", "0 to 1")
 
 
 def _hypothesis(h: Hypothesis, size: tuple[int, int]) -> None:
     who = f"hypothesis of region {brief(h.region_id)}"
-    expect(_integer(h.region_id), f"{who} has no region", "the id of a region of this frame")
+    expect(_is_integer(h.region_id), f"{who} has no region", "the id of a region of this frame")
     expect(isinstance(h.name, str) and bool(h.name), f"{who} has no name", "the name of a model")
-    expect(_integer(h.view), f"{who} has view {brief(h.view)}", "the number of a view")
-    expect(_share(h.similarity), f"{who} has similarity {brief(h.similarity)}", "0 to 1")
+    expect(_is_integer(h.view), f"{who} has view {brief(h.view)}", "the number of a view")
+    expect(_is_share(h.similarity), f"{who} has similarity {brief(h.similarity)}", "0 to 1")
     for name, value in (("rotation", h.rotation), ("scale", h.scale)):
         fine = value is None or is_finite(value)
         expect(fine, f"{who} has {name} {brief(value)}", "a finite number, or None")
@@ -95,11 +97,11 @@ def _hypothesis(h: Hypothesis, size: tuple[int, int]) -> None:
 
 def _depth(d: Depth, size: tuple[int, int]) -> None:
     who = f"depth of region {brief(d.region_id)}"
-    expect(_integer(d.region_id), f"{who} has no region", "the id of a region of this frame")
+    expect(_is_integer(d.region_id), f"{who} has no region", "the id of a region of this frame")
     expect(isinstance(d.name, str), f"{who} has name {brief(d.name)}", "the name of a model")
     positive = is_finite(d.depth) and d.depth > 0
     expect(positive, f"{who} is {brief(d.depth)}", "a finite number above 0")
-    expect(_least(d.sigma, 0.0), f"{who} has sigma {brief(d.sigma)}", "a number, at least 0")
+    expect(_is_at_least(d.sigma, 0.0), f"{who} has sigma {brief(d.sigma)}", "a number, at least 0")
 
 
 def _camera(c: CameraMotion, size: tuple[int, int]) -> None:
@@ -122,11 +124,11 @@ VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] 
     "camera": (CameraMotion, _camera),
     "health": (Health, _health),
 }
-"""Kinds with a fixed type of value, and what judges one of them."""
+"""Kind -> type of its values, and their check."""
 
 
-def _own(value: object, who: str, depth: int = 0) -> None:
-    """A value of a plug-in's own kind: data, in which all numbers are finite; what is missing is None."""
+def _check_plain(value: object, who: str, depth: int = 0) -> None:
+    """Check a value of a plug-in's own kind: plain data with finite numbers; missing values are None."""
     expect(depth <= DEEPEST, f"{who} nested too deep", f"at most {DEEPEST} levels")
     if isinstance(value, int) and not isinstance(value, Enum):
         expect(
@@ -140,10 +142,10 @@ def _own(value: object, who: str, depth: int = 0) -> None:
     if isinstance(value, float | np.floating):
         expect(bool(np.isfinite(value)), f"{who} as {value}", "a finite number, or None")
     elif isinstance(value, np.ndarray):
-        _own_array(value, who)
+        _check_plain_array(value, who)
     else:
         for part in _parts(value, who):
-            _own(part, who, depth + 1)
+            _check_plain(part, who, depth + 1)
 
 
 def _parts(value: object, who: str) -> Iterable[object]:
@@ -159,10 +161,10 @@ def _parts(value: object, who: str) -> Iterable[object]:
     )
 
 
-def _own_array(value: NDArray[Any], who: str) -> None:
+def _check_plain_array(value: NDArray[Any], who: str) -> None:
     expect(value.dtype.kind in "biufSU", f"{who} as an array of {value.dtype}", "numbers or text")
     if value.dtype.kind == "f":
-        # A masked array says where nothing was measured.
+        # The masked elements of a masked array are missing values.
         known = value.compressed() if isinstance(value, np.ma.MaskedArray) else value
         expect(
             bool(np.isfinite(known).all()),
@@ -175,7 +177,7 @@ def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
     try:
         found = np.asarray(value)
     except ValueError:
-        found = np.empty((), dtype=object)  # rows of unlike lengths
+        found = np.empty((), dtype=object)  # rows of different lengths
     like = len(found.shape) == len(shape) and all(
         wanted in (None, given) for wanted, given in zip(shape, found.shape, strict=True)
     )
@@ -186,36 +188,36 @@ def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
 
 
 def expect(fine: bool, what: str, expected: str) -> None:
-    """Refuse what is not fine.
+    """Raise unless a condition holds.
 
     Raises:
-        BehaviourError: It is not.
+        BehaviourError: It does not.
     """
     if not fine:
         raise BehaviourError(what, expected=expected)
 
 
 def is_finite(value: object) -> bool:
-    """Whether something is a number that is neither infinite nor none at all."""
+    """Whether a value is a finite number."""
     plain = isinstance(value, int | float | np.integer | np.floating)
     return plain and not isinstance(value, bool) and math.isfinite(value)  # type: ignore[arg-type]
 
 
-def _least(value: object, least: float) -> bool:
+def _is_at_least(value: object, least: float) -> bool:
     return is_finite(value) and value >= least  # type: ignore[operator]
 
 
-def _share(value: object) -> bool:
+def _is_share(value: object) -> bool:
     return is_finite(value) and 0.0 <= value <= 1.0  # type: ignore[operator]
 
 
-def _integer(value: object) -> bool:
+def _is_integer(value: object) -> bool:
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     return whole and abs(int(value)) < 2**63  # type: ignore[call-overload]
 
 
 def a_kind(value: object) -> str:
-    """What something is, with its article."""
+    """The type of a value with its article."""
     return "nothing (None)" if value is None else _a_type(type(value))
 
 
@@ -224,6 +226,6 @@ def _a_type(kind: type) -> str:
 
 
 def brief(value: object) -> str:
-    """A value for a message: whatever it is, short and on one line."""
+    """A value for a message, short and on one line."""
     text = value if isinstance(value, str) else repr(value)
     return " ".join(text.split())[:60]

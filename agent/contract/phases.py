@@ -23,16 +23,16 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AgentSnapshot:
-    """All that an agent has come to believe and ask for: with what was perceived since, its later steps.
+    """The reasoning state of an agent: with the observations that followed, it determines all later steps.
 
-    What behaviours hold is not part of it: they are not needed to reason again about what was
-    perceived. `visup.agent.storage.checkpoint` keeps them too.
+    The state of behaviours is not part of it, since replaying recorded observations does not need them.
+    `visup.agent.storage.checkpoint` saves that too.
 
     Attributes:
         mind: The mind.
-        directives: What behaviours were asked for.
-        alerts_opened: How many alerts were ever opened, from which new ones are numbered.
-        answers: What the operator has said since the last step.
+        directives: Pending requests to behaviours.
+        alerts_opened: Number of alerts opened so far, from which new ones are numbered.
+        answers: Answers of the operator since the last step.
     """
 
     mind: Mind

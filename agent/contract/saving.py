@@ -1,4 +1,4 @@
-"""What a behaviour offers so that its state can be saved in a checkpoint and restored."""
+"""The interface of behaviours whose state can be saved in a checkpoint and restored."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from typing import Any, Protocol, runtime_checkable
 
 @runtime_checkable
 class Saveable(Protocol):
-    """A behaviour whose state can be saved, so that a run that was killed can be resumed from it."""
+    """A behaviour whose state can be saved, so that a killed run can be resumed."""
 
     def save(self) -> Mapping[str, Any]:
-        """All that it holds from frame to frame, by name; what its settings determine is left out."""
+        """Its state between frames by name, without what its settings determine."""
         ...
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on a state that an object of the same settings gave."""
+        """Restore a state saved by an object with the same settings."""
         ...
 
 
 class Stateless:
-    """A behaviour that holds nothing from frame to frame: saved, it is as it was made."""
+    """A behaviour without state between frames."""
 
     def save(self) -> Mapping[str, Any]:
-        """No state: each frame is processed on its own."""
+        """An empty state: each frame is processed on its own."""
         return {}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Nothing is remembered."""
+        """Nothing to restore."""
 
 
 def saved_attributes(it: object, *left_out: str) -> dict[str, Any]:
-    """The attributes of an object besides those left out: what most `save` methods give."""
+    """The attributes of an object except those left out: the result of most `save` methods."""
     return {name: value for name, value in vars(it).items() if name not in left_out}

@@ -153,7 +153,8 @@ class Agent:
                         outcome, reasoner(outcome.mind, observation), observation
                     )
                 except (Exception, SystemExit) as fault:
-                    # The unfinished mind is dropped: beliefs stay as they were, and observations are unknown.
+                    # The unfinished mind is dropped: beliefs stay unchanged, and all observations count as
+                    # unknown.
                     yield (
                         phase,
                         replace(

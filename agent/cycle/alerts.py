@@ -1,4 +1,4 @@
-"""The last phase of a step: alerts open, are renewed, and close, as conditions come and go."""
+"""The last phase of a step: opens, renews and closes alerts as their conditions come and go."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import FAULT_STATES, Observation, ReportState
 
 GRACE_S = 1.0
-"""A condition may be silent this long before its alert closes: alerts must not flicker."""
+"""Time without its condition after which an alert closes, seconds: alerts must not flicker."""
 
 SETTLE_S = 3.0
-"""After a kind of percept was unknown, rules need so long to see again what they had seen; until
-then no alert that needs it is told to be over."""
+"""Time that rules need to recover after a kind of percept was unknown, seconds; until then alerts that need
+it stay open."""
 
 Key = tuple[str, tuple[int, ...], str]
 
 
 def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
-    """Concerns about behaviours that failed, are late or suspended: their part of the mind is unknown."""
+    """Alert conditions for behaviours that failed, are late or suspended, whose output is unknown."""
     return tuple(
         AlertCondition(
             BEHAVIOUR_FAILED,
@@ -50,21 +50,21 @@ def update_alerts(
     """Alerts after the conditions of one step.
 
     Args:
-        alerts: Those that were open, in the order in which they opened.
-        conditions: Those that hold now; of two alike the graver stays.
+        alerts: Open alerts in the order of opening.
+        conditions: Conditions that hold now; of two with the same key the more severe counts.
         time: Seconds.
         next_id: Number of the next alert that opens.
-        unknown: Kinds of percept that are unknown now: an alert that needs one of them stays open,
-            for nobody can tell that it is over.
+        unknown: Kinds of percept that are unknown now: an alert that needs one of them stays open, because it
+            is unknown whether it is over.
 
     Returns:
-        The alerts that are open now, those that opened, those that closed.
+        Open alerts, newly opened ones, newly closed ones.
     """
-    fresh = _by_key(conditions)
+    opened_now = _by_key(conditions)
     still: list[Alert] = []
     closed: list[Alert] = []
     for alert in alerts:
-        condition = fresh.pop(_key(alert), None)
+        condition = opened_now.pop(_key(alert), None)
         if condition is not None:
             still.append(_renew(alert, condition, time))
             continue
@@ -73,7 +73,7 @@ def update_alerts(
             closed.append(replace(silent, closed=time))
         else:
             still.append(silent)
-    opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(fresh.values()))
+    opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(opened_now.values()))
     return (*still, *opened), opened, tuple(closed)
 
 

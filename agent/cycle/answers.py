@@ -1,4 +1,4 @@
-"""What the operator says: checked when it is said, a fact in the mind from the next step on."""
+"""The operator's answers: checked when given, facts in the mind from the next step on."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Cast = Mapping[str, tuple[str, ...]]
 
 NOBODY_PLAYS: Cast = MappingProxyType({})
 NOBODY = ("unknown", UNKNOWN_OBJECT)
-"""Answers that say that an object is none of the models."""
+"""Answers meaning that an object is none of the models."""
 
 
 def resolve_answer(
@@ -27,20 +27,20 @@ def resolve_answer(
     models: Iterable[str] = (),
     cast: Cast = NOBODY_PLAYS,
 ) -> str:
-    """The model, or the actor, that an answer means.
+    """The model or actor that an answer means.
 
     Args:
         mind: The mind.
-        object_id: Whom the answer is about.
-        name: A model, an actor that stands for one, or 'unknown'.
-        models: Models that are known besides those that anybody has spoken of.
-        cast: Actors of tasks, with the models that they may be.
+        object_id: The object of the answer.
+        name: A model, an actor, or 'unknown'.
+        models: Known models that do not occur in the mind.
+        cast: Actors of tasks with the models that they may be.
 
     Returns:
-        As of `resolve_model`.
+        As `resolve_model`.
 
     Raises:
-        SettingsError: Nobody knows such an object or such a name.
+        SettingsError: There is no such object or name.
     """
     belief = mind.objects.get(object_id)
     if belief is None:
@@ -58,32 +58,32 @@ def resolve_model(
     own: Sequence[str] = (),
     cast: Cast = NOBODY_PLAYS,
 ) -> str:
-    """The model, or the actor, that a name means.
+    """The model or actor that a name means.
 
     Args:
-        mind: The mind, which knows the actors and what was spoken of.
+        mind: The mind, which has actors and candidate names.
         name: A model, an actor, or 'unknown'.
-        models: Further models that are known.
-        own: Models that the object may be, most likely first, for actors that stand for several.
-        cast: Actors of tasks, with the models that they may be.
+        models: Further known models.
+        own: Models that the object may be, most likely first, for actors with several models.
+        cast: Actors of tasks with the models that they may be.
 
     Returns:
-        The model's name, or 'unknown object'. The actor's own where its models do not tell it: it
-        has none, or shares them with another.
+        The model's name, or 'unknown object'; the actor's name if its models do not identify it (it has none,
+        or shares them with another).
 
     Raises:
-        SettingsError: Nobody knows such a name.
+        SettingsError: There is no such name.
     """
     said = " ".join(name.split())
     if said in NOBODY:
         return UNKNOWN_OBJECT
-    meant = {_plain(m): m for m in _models(mind) | set(models)}
+    meant = {_normalised(m): m for m in _models(mind) | set(models)}
     played = {**cast, **{a: found for a, found in mind.actors.items() if found}}
-    meant |= {_plain(a): a if _shared(a, played) else _model(played[a], own) for a in played}
-    if _plain(said) in meant:
-        return meant[_plain(said)]
-    spelt = {_plain(n): n for n in (*sorted(_models(mind) | set(models)), *played)}
-    near = closest(_plain(said), spelt)
+    meant |= {_normalised(a): a if _shared(a, played) else _model(played[a], own) for a in played}
+    if _normalised(said) in meant:
+        return meant[_normalised(said)]
+    spelt = {_normalised(n): n for n in (*sorted(_models(mind) | set(models)), *played)}
+    near = closest(_normalised(said), spelt)
     raise SettingsError(
         f"'{said}' is neither a model nor an actor",
         expected=f"one of: {', '.join([*sorted(spelt.values()), 'unknown'])}",
@@ -92,11 +92,11 @@ def resolve_model(
 
 
 def apply_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[Event, ...]]:
-    """A mind that takes answers as facts, and the events that report them.
+    """Add answers to a mind as facts; returns the mind and the events that report them.
 
     Args:
-        mind: At the beginning of a step.
-        answers: Object id -> model name, as `resolve_answer` gives it.
+        mind: The mind at the beginning of a step.
+        answers: Object id -> model name from `resolve_answer`.
     """
     if not answers:
         return mind, ()
@@ -105,7 +105,7 @@ def apply_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[E
             "answer",
             mind.time,
             mind.frame_index,
-            f"The operator says that object {i} is {_spoken(mind, name)}.",
+            f"The operator says that object {i} is {_display_name(mind, name)}.",
             (i,),
             data=MappingProxyType({"name": name}),
         )
@@ -120,28 +120,28 @@ def apply_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[E
 
 
 def _models(mind: Mind) -> set[str]:
-    """Every model that anybody has spoken of."""
+    """Every model that occurs in a mind."""
     named = {c.name for b in mind.objects.values() for c in b.candidates}
     named |= {n for q in mind.questions for n in q.names} | set(mind.answers.values())
     return (named | {m for models in mind.actors.values() for m in models}) - {UNKNOWN_OBJECT}
 
 
 def _model(models: Sequence[str], own: Sequence[str]) -> str:
-    """Which of an actor's models is meant: the likeliest of the object's names, else the first."""
+    """The actor's model that is meant: the object's most likely one, else the first."""
     return next((n for n in own if n in models), models[0])
 
 
 def _shared(actor: str, cast: Cast) -> bool:
-    """Whether an actor's models do not tell it from others."""
+    """Whether another actor has the same models."""
     own = set(cast[actor])
     return not own or any(own & set(found) for a, found in cast.items() if a != actor)
 
 
-def _plain(name: str) -> str:
+def _normalised(name: str) -> str:
     return name.replace("_", " ").lower()
 
 
-def _spoken(mind: Mind, name: str) -> str:
+def _display_name(mind: Mind, name: str) -> str:
     if name == UNKNOWN_OBJECT:
         return "none of the models"
     actor = next((a for a, models in sorted(mind.actors.items()) if name in models), name)

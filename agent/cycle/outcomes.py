@@ -1,4 +1,4 @@
-"""What a reasoner concludes is taken over only if it makes sense: phases are all or nothing."""
+"""Merges the outcomes of reasoners after validation: phases are all or nothing."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from visup.agent.model.records import Observation
 
 
 def merge_outcomes(so_far: Outcome, more: Outcome, observation: Observation) -> Outcome:
-    """What reasoners before concluded, and one more.
+    """Merge the outcome of one more reasoner.
 
     Args:
-        so_far: Of those before.
-        more: Of the one more; its mind takes the place of theirs.
-        observation: What they thought about.
+        so_far: Merged outcome of the reasoners before.
+        more: The outcome to add; its mind replaces the previous one.
+        observation: The observation of the step.
 
     Raises:
-        TypeError: It is no outcome, or holds what is none of its parts.
+        TypeError: It is no outcome, or has parts of a wrong type.
         ValueError: Its mind is of another moment, or a confidence or time is not a number.
     """
     _expect(more, Outcome, "the reasoner returned")

@@ -1,8 +1,8 @@
-"""A behaviour in its place in an agent: when it runs, and what comes of its conduct.
+"""The slot of a behaviour in an agent: scheduling, failures and suspension.
 
-After three failures in a row a behaviour is suspended for a while, twice as long each time; what
-hangs, dies or takes too much memory is suspended at once. Its output is unavailable from its
-failure until it has run again, also in the steps in which it would not have run.
+After three failures in a row a behaviour is suspended, twice as long each time; one that hangs, dies or takes
+too much memory is suspended at once. Its output is unavailable from its failure until it has run again, even
+in steps in which it was not due.
 """
 
 from __future__ import annotations
@@ -45,25 +45,25 @@ NEVER = float("-inf")
 
 
 _SETTLED = frozenset({"behaviour", "contract", "limits", "runner", "relieved_by"})
-"""What of a slot is settled when the agent is made; all else is conduct."""
+"""Fields fixed when the agent is created; all others are state."""
 
 
 @dataclass(slots=True)
 class BehaviourSlot:
-    """A behaviour in its place in an agent, with what the agent knows of its conduct.
+    """A behaviour with its runner and its failure state.
 
     Attributes:
-        behaviour: What runs.
-        contract: As it was when the behaviour was plugged in.
-        limits: What it is held to.
-        runner: How it runs.
-        relieved_by: Names of behaviours that do its work more closely while they run.
-        last_run: Seconds of the latest frame on which it ran.
-        failures: In a row.
-        error: Of the latest failure; empty once it has run again.
-        suspended_at: Seconds of the frame at which it was suspended.
-        grown_mb: By how much its runs have made this process grow, megabytes.
-        past: As many past frames as it asked for.
+        behaviour: The behaviour.
+        contract: Its contract when it was plugged in.
+        limits: Its limits.
+        runner: Its runner.
+        relieved_by: Names of finer behaviours that replace it while they run.
+        last_run: Time of the latest frame on which it ran, seconds.
+        failures: Failures in a row.
+        error: Error of the latest failure; empty once it has run again.
+        suspended_at: Time of the frame at which it was suspended, seconds.
+        grown_mb: Growth of this process during its runs, megabytes.
+        past: The past frames that it requested.
     """
 
     behaviour: Behaviour
@@ -80,36 +80,36 @@ class BehaviourSlot:
 
     @property
     def is_saveable(self) -> bool:
-        """Whether the state of the behaviour can be saved; one in another process is out of reach."""
+        """Whether the state of the behaviour can be saved; not if it runs in another process."""
         return isinstance(self.behaviour, Saveable) and not self.limits.isolated(self.contract)
 
     def state_dict(self) -> dict[str, Any]:
-        """What the agent knows of its behaviour's conduct, for a checkpoint."""
+        """The state of the slot for a checkpoint."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SETTLED}
 
     def load_state_dict(self, conduct: Mapping[str, Any]) -> None:
-        """Go on from the conduct that another slot told."""
+        """Restore the state of another slot."""
         for name, value in conduct.items():
             setattr(self, name, value)
 
     @property
     def suspension_s(self) -> float:
-        """How long it rests after its latest failure, seconds."""
+        """Duration of the suspension after its latest failure, seconds."""
         over = self.failures - PATIENCE
         return 0.0 if over < 0 else min(FIRST_SUSPENSION_S * 2.0**over, LONGEST_SUSPENSION_S)
 
     def run(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Report:
-        """Run it on a frame, if it is its turn.
+        """Run it on a frame if it is due.
 
         Args:
             frame: The frame.
-            observation: What others reported of it before.
-            directives: What the last step asked for.
+            observation: Reports of earlier behaviours on it.
+            directives: Requests of the last step.
 
         Returns:
-            What became of it; never an exception.
+            Its report; exceptions are reported, never raised.
         """
         contract = self.contract
         idle = Report(contract.name, ReportState.RESTED, contract.gives)
@@ -137,7 +137,7 @@ class BehaviourSlot:
                 frame, replace(observation, past=tuple(self.past)), directives, begin
             )
         except Exception as fault:
-            # Containment: whatever a plug-in raises is its own failure, never the supervisor's.
+            # Containment: any exception of a plug-in is a failure of that plug-in alone.
             self._fail(fault, frame.time)
             state = ReportState.LATE if isinstance(fault, RunTimeoutError) else ReportState.FAILED
             return replace(idle, state=state, error=self.error, elapsed_ms=self._ms(begin))
@@ -145,7 +145,7 @@ class BehaviourSlot:
         return replace(idle, state=ReportState.RAN, percepts=percepts, elapsed_ms=self._ms(begin))
 
     def remember(self, frame: Frame, observation: Observation) -> None:
-        """Keep a past frame, if the contract requests any."""
+        """Store a past frame if the contract requests any."""
         if self.past.maxlen:
             self.past.append(PastFrame(frame, observation))
 
@@ -155,7 +155,7 @@ class BehaviourSlot:
         return self.limits.sleeps(self.contract) and next(asked, None) is None
 
     def _waiting(self, now: float, asleep: bool) -> ReportState | None:
-        """Why a behaviour that failed does not run now; None when it may."""
+        """Why the behaviour does not run now after a failure; None if it may."""
         if self.runner.maintain():
             return ReportState.LATE
         if self._within(now, self.suspended_at, self.suspension_s):
@@ -166,20 +166,20 @@ class BehaviourSlot:
 
     @staticmethod
     def _within(now: float, since: float, seconds: float) -> bool:
-        # A clock that was set back must not keep anybody waiting; rounding must not cost a frame.
+        # A clock that was set back must not prolong the wait; rounding must not cost a frame.
         return 0.0 <= now - since < seconds - 1e-9
 
     def _held(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive], begin: float
     ) -> tuple[Percept, ...]:
-        """Run it, held to its limits."""
+        """Run it within its limits."""
         seconds = self.limits.seconds(self.contract)
         before = resident_mb()
         percepts = self.runner.run(frame, observation, directives, seconds)
         taken = self.limits.clock() - begin
         if self.limits.budgets and seconds is not None and taken > seconds:
             raise RunTimeoutError(f"it took longer than its budget of {duration_text(seconds)}")
-        # What others kept may be given back while it runs: that must not pay for what it keeps later.
+        # Memory freed by others during the run must not offset its later growth.
         self.grown_mb = max(0.0, self.grown_mb + resident_mb() - before)
         most = self.limits.megabytes(self.contract)
         if self.grown_mb > most:
@@ -196,7 +196,7 @@ class BehaviourSlot:
             self.suspended_at = now
 
     def _grave(self, fault: Exception) -> bool:
-        """Whether another try is too dear: each hang costs its whole limit again."""
+        """Whether a retry is too expensive: each hang costs its whole limit again."""
         if isinstance(fault, RunTimeoutError):
             return not self.limits.budgets
         return isinstance(fault, ProcessDiedError | MemoryLimitError | MemoryError)
@@ -210,9 +210,9 @@ def _ran(report: Report) -> bool:
 
 
 def superseded(report: Report, by: BehaviourSlot) -> Report:
-    """The report of a behaviour that failed, once one that it relieves has run in its place.
+    """The report of a failed behaviour after one that it relieves has run in its place.
 
-    What both give is known.
+    The kinds that both give are known.
     """
     if report.state not in FAULT_STATES or report.behaviour not in by.relieved_by:
         return report
@@ -221,10 +221,10 @@ def superseded(report: Report, by: BehaviourSlot) -> Report:
 
 
 def make_slot(behaviour: Behaviour, limits: Limits) -> BehaviourSlot:
-    """A behaviour in its place, with what runs it as its contract and the limits say.
+    """Create the slot of a behaviour, with the runner that its contract and the limits require.
 
     Raises:
-        BehaviourError: It shall run in a process of its own, but cannot be sent to one.
+        BehaviourError: It must run in its own process, but cannot be sent to one.
     """
     contract = behaviour.contract
     runner: Runner

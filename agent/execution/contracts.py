@@ -1,4 +1,4 @@
-"""The contracts of behaviours of the user's own, read in another process: nothing of theirs runs here."""
+"""Reads the contracts of user behaviours in another process, so that none of their code runs here."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from visup.agent.model import errors
 from visup.agent.model.errors import BehaviourError, ErrorGroup, VisupError
 
 READING_S = 60.0
-"""How long importing a file of behaviours may take, seconds."""
+"""Time limit for importing a file of behaviours, seconds."""
 
 
 def read_contracts(
     where: str, settings: Mapping[str, Mapping[str, Any]] | None = None
 ) -> list[Contract]:
-    """The contracts of what a file or a module offers, once it is made with its settings.
+    """The contracts of the behaviours of a file or module, created with their settings.
 
     Args:
         where: `FILE.py`, or `package.module:Class`.
         settings: Name of a behaviour -> values for its settings.
 
     Raises:
-        BehaviourError: It is missing, does not run, ends its process, or holds no behaviour.
-        SettingsError: A setting is not as it should be.
+        BehaviourError: It is missing, does not run, ends its process, or has no behaviour.
+        SettingsError: A setting is not valid.
     """
     asked = {"do": "contracts", "where": where, "settings": _plain(settings or {})}
     child = ChildProcess(asked)
@@ -39,7 +39,7 @@ def read_contracts(
     if "fault" in answer:
         raise _refused(answer, where)
     try:
-        return [Contract(**_tuples(told)) for told in answer["contracts"]]
+        return [Contract(**_tuples(fields)) for fields in answer["contracts"]]
     except (KeyError, TypeError, AttributeError) as fault:
         raise BehaviourError("its contract cannot be read", where=where) from fault
 
@@ -48,14 +48,14 @@ def _plain(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any
     return {name: dict(values) for name, values in settings.items()}
 
 
-def _tuples(told: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in told.items()}
+def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
 
 
 def _refused(answer: Message, where: str) -> VisupError:
     """The error that the process reported, with all its parts."""
-    told = answer.get("refused")
-    faults = [_error(f, where) for f in told if isinstance(f, Mapping)] if told else []
+    fields = answer.get("refused")
+    faults = [_error(f, where) for f in fields if isinstance(f, Mapping)] if fields else []
     if len(faults) > 1:
         return ErrorGroup(faults)
     said = answer["fault"]
@@ -63,12 +63,12 @@ def _refused(answer: Message, where: str) -> VisupError:
     return faults[0] if faults else BehaviourError(f"it does not run: {words[:1000]}", where=where)
 
 
-def _error(told: Mapping[str, Any], where: str) -> VisupError:
-    kind = getattr(errors, str(told.get("kind")), BehaviourError)
+def _error(fields: Mapping[str, Any], where: str) -> VisupError:
+    kind = getattr(errors, str(fields.get("kind")), BehaviourError)
     if not (isinstance(kind, type) and issubclass(kind, VisupError)):
         kind = BehaviourError
     if kind in (ErrorGroup, errors.ExtraMissingError):
         kind = BehaviourError
-    texts = {k: str(told[k])[:1000] for k in ("where", "expected", "hint") if told.get(k)}
-    error: VisupError = kind(str(told.get("what"))[:1000], **{"where": where, **texts})
+    texts = {k: str(fields[k])[:1000] for k in ("where", "expected", "hint") if fields.get(k)}
+    error: VisupError = kind(str(fields.get("what"))[:1000], **{"where": where, **texts})
     return error

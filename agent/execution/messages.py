@@ -1,7 +1,7 @@
 """Messages between the supervisor and the process of an isolated behaviour: data, never code.
 
-A message is a JSON document of a bounded size, with its length before it. Reading and writing have
-deadlines: neither half a message nor an end that does not read holds anybody up.
+A message is a JSON document of bounded size, prefixed by its length. Reading and writing have deadlines, so
+that neither a partial message nor a peer that does not read blocks the caller.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pydantic_core import from_json, to_json
 from visup.agent.storage.text_file import check_room
 
 LARGEST_BYTES = 256 * 2**20
-"""Bytes of a message; a larger one is refused unread."""
+"""Maximum size of a message, bytes; a larger one is refused unread."""
 
 _LENGTH = struct.Struct("<Q")
 _CHUNK = 2**20
@@ -26,11 +26,11 @@ Message = Mapping[str, Any]
 
 
 class MessageError(Exception):
-    """What came is no message."""
+    """The received data are no message."""
 
 
 class Channel:
-    """One end of a connection; used by one thread.
+    """One end of a connection, for use by one thread.
 
     Args:
         end: A connected stream socket; it is closed with the channel.
@@ -45,7 +45,7 @@ class Channel:
         Raises:
             TimeoutError: The other end does not read.
             OSError: It is closed.
-            ValueError: The message is larger than a message may be, or holds what is no JSON.
+            ValueError: The message is too large, or is not JSON.
         """
         body = to_json(message, inf_nan_mode="constants")
         if len(body) > LARGEST_BYTES:
@@ -54,24 +54,24 @@ class Channel:
         self._end.sendall(_LENGTH.pack(len(body)) + body)
 
     def has_news(self) -> bool:
-        """Whether something came, or the other end was closed."""
+        """Whether data arrived or the other end was closed."""
         self._end.settimeout(0.0)
         try:
             self._end.recv(1, socket.MSG_PEEK)
         except BlockingIOError:
             return False
         except OSError:
-            return True  # it broke: whoever receives is told how
+            return True  # broken: `receive` will raise the error
         return True
 
     def receive(self, seconds: float | None = None) -> Any:
         """Wait for a complete message, with a time limit.
 
         Raises:
-            TimeoutError: It did not come in time.
+            TimeoutError: It did not arrive in time.
             EOFError: The other end is closed.
             OSError: The connection broke.
-            MessageError: What came is no message.
+            MessageError: The received data are no message.
         """
         deadline = None if seconds is None else time.monotonic() + seconds
         (length,) = _LENGTH.unpack(self._read(_LENGTH.size, deadline))
@@ -91,10 +91,10 @@ class Channel:
     def _read(self, count: int, deadline: float | None) -> bytes:
         got = bytearray()
         while len(got) < count:
-            left = None if deadline is None else deadline - time.monotonic()
-            if left is not None and left <= 0.0:
+            remaining = None if deadline is None else deadline - time.monotonic()
+            if remaining is not None and remaining <= 0.0:
                 raise TimeoutError
-            self._end.settimeout(left)
+            self._end.settimeout(remaining)
             part = self._end.recv(min(_CHUNK, count - len(got)))
             if not part:
                 raise EOFError

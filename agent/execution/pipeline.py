@@ -1,7 +1,7 @@
-"""The first phase of a step: the behaviours run on the frame, each contained.
+"""The first phase of a step: runs all behaviours on the frame, with fault containment.
 
-A behaviour that raises, hangs or breaks its contract never reaches the mind: its report says so,
-and its output is unavailable. `behaviour_slot.py` has one behaviour, `limits.py` the policy.
+The output of a behaviour that raises, hangs or breaks its contract is unavailable; its report says why.
+`behaviour_slot.py` runs one behaviour, `limits.py` has the policy.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from visup.agent.model.records import Frame, Observation, ReportState
 def ordered_slots(
     behaviours: Sequence[Behaviour], limits: Limits | None = None
 ) -> list[BehaviourSlot]:
-    """Behaviours so that each comes after those that give what it needs.
+    """Slots of behaviours in topological order: each after those that give what it needs.
 
     Args:
         behaviours: In any order.
-        limits: What they are held to; the defaults when left out.
+        limits: Their limits; the defaults if omitted.
 
     Raises:
-        BehaviourError: Two have one name, a need is given by none or only in a circle, or a name
-            that shall be isolated is not among them.
+        BehaviourError: Two have the same name, a need is given by none or only in a cycle, or a name to
+            isolate is not among them.
     """
     held = limits or Limits()
     named = {b.contract.name: b for b in behaviours}
@@ -56,7 +56,7 @@ def ordered_slots(
 
 
 def _closer(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
-    """Names of those that relieve one; they give all that it gives, so that nothing is lost."""
+    """Names of the behaviours that relieve one; they must give all that it gives."""
     coarse = behaviour.contract
     fine = [b.contract for b in behaviours if coarse.name in b.contract.relieves]
     for contract in fine:
@@ -70,7 +70,7 @@ def _closer(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
 
 
 def _providers(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
-    """Names of the others that give what one needs."""
+    """Names of the other behaviours that give what one needs."""
     contract = behaviour.contract
     others = [b.contract for b in behaviours if b is not behaviour]
     given = {kind for c in others for kind in c.gives}
@@ -92,7 +92,7 @@ def perceive(
     Args:
         slots: From `ordered_slots`.
         frame: The frame.
-        directives: What the last step asked for.
+        directives: Requests of the last step.
 
     Returns:
         One report for each behaviour, in order.
@@ -111,7 +111,7 @@ def perceive(
 
 
 def read_only(frame: Frame) -> Frame:
-    """The same frame with a read-only image, so that a behaviour that writes to it fails alone."""
+    """The same frame with a read-only image, so that a behaviour that writes to it fails by itself."""
     image = frame.image.view()
     image.flags.writeable = False
     return Frame(frame.index, frame.time, image)

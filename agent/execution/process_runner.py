@@ -1,9 +1,8 @@
 """A behaviour in its own process, with hard limits of time and memory.
 
-Images go over a file in memory, everything else as messages, which are data (`messages.py`): nothing that
-the process sends can run here. A process that hangs or dies is replaced by a new one, whose behaviour is as
-it was when it was plugged in: what it had learnt is lost. `sandbox.py` says how the process is started and
-ended, `worker.py` is what runs in it.
+Images are passed in a memory file, everything else as messages, which are data (`messages.py`): nothing that
+the process sends can execute here. A process that hangs or dies is replaced by a new one with the behaviour
+in its initial state. `sandbox.py` starts and ends the process, `worker.py` runs in it.
 """
 
 from __future__ import annotations
@@ -40,9 +39,9 @@ class ProcessRunner:
     """Runs a behaviour in its own process.
 
     Args:
-        behaviour: What is run; it must not have run before.
+        behaviour: The behaviour, which must not have run before.
         contract: Its contract.
-        limits: What it is held to.
+        limits: Its limits.
 
     Raises:
         BehaviourError: It cannot be sent to another process.
@@ -58,10 +57,10 @@ class ProcessRunner:
         self._sent = -1
 
     def maintain(self) -> bool:
-        """Start a new process in place of one that was killed, while the behaviour is suspended.
+        """Start a new process in place of a killed one, while the behaviour is suspended.
 
         Returns:
-            Whether it is still starting, where a step has no time to wait for that.
+            Whether it is still starting and the step must not wait for it.
         """
         if self._child is not None and self._child.killed:
             self._child = self._start(self._child)
@@ -80,10 +79,10 @@ class ProcessRunner:
         child = self._ready(seconds)
         answer = child.ask(self._request(child, frame, observation, directives), seconds)
         if "fault" in answer:
-            kind, said = _fault(answer)
+            kind, text = _fault(answer)
             if kind == MemoryError.__name__:
-                child.kill()  # what it holds is given back
-            raise EXCEPTIONS.get(kind, BehaviourError)(said)
+                child.kill()  # frees its memory
+            raise EXCEPTIONS.get(kind, BehaviourError)(text)
         percepts = collect_percepts(self._contract, _percepts(answer))
         check_percepts(self._contract, percepts, frame, observation)
         return percepts
@@ -104,7 +103,7 @@ class ProcessRunner:
     def _ready(self, seconds: float | None) -> ChildProcess:
         """The process, once its behaviour has started."""
         child = self._child = self._child or self._start()
-        # A budget says how long a step may wait; without one, waiting keeps runs repeatable.
+        # A budget limits the wait of a step; without one, waiting keeps runs reproducible.
         patient = not self._limits.budgets or not self._replaces
         try:
             child.await_start(self._limits.start_s if patient else seconds)
@@ -148,7 +147,7 @@ class ChildProcess:
     """A process with a behaviour.
 
     Args:
-        first: What it is told at once: which behaviour to start, or whose contracts are wanted.
+        first: The first message: the behaviour to start, or a request for contracts.
     """
 
     def __init__(self, first: Message) -> None:
@@ -161,12 +160,12 @@ class ChildProcess:
         self._channel.send(first)
 
     def kill(self) -> None:
-        """Stop it at once; it is cleared away later."""
+        """Kill it; it is reaped later."""
         self._sandbox.kill()
         self.killed = True
 
     def is_starting(self, patience_s: float) -> bool:
-        """Whether nothing has been heard of it yet, and less than that has passed."""
+        """Whether it has not answered yet, and the given time has not passed."""
         if self._started or time.monotonic() - self._begun > patience_s:
             return False
         return not self._channel.has_news()
@@ -181,15 +180,15 @@ class ChildProcess:
             return
         answer = self.receive(seconds, "it did not start")
         if "fault" in answer:
-            kind, said = _fault(answer)
-            raise BehaviourError(f"it does not start: {f'{kind}: ' if kind else ''}{said}")
+            kind, text = _fault(answer)
+            raise BehaviourError(f"it does not start: {f'{kind}: ' if kind else ''}{text}")
         self._started = True
 
     def ask(self, request: Message, seconds: float | None) -> Message:
-        """Send a request and wait for the answer; a process that gives none is killed.
+        """Send a request and wait for the answer; a process that does not answer is killed.
 
         Raises:
-            BehaviourError: It gave none in time, or ended, or its answer makes no sense.
+            BehaviourError: It did not answer in time, ended, or its answer is not valid.
         """
         try:
             try:
@@ -207,7 +206,7 @@ class ChildProcess:
         """The next message.
 
         Raises:
-            BehaviourError: None came in time, or the process ended, or it makes no sense.
+            BehaviourError: None arrived in time, the process ended, or it is not valid.
         """
         try:
             answer = self._channel.receive(seconds)
@@ -222,8 +221,8 @@ class ChildProcess:
         return answer
 
     def place(self, images: Sequence[NDArray[np.uint8]]) -> Iterator[list[int]]:
-        """Put images where the process finds them: offset and shape of each."""
-        # Written to, not mapped: a process that cuts the file off harms nobody but itself.
+        """Write images to the memory file; returns offset and shape of each."""
+        # Written, not mapped: a process that truncates the file harms only itself.
         offset, placed = 0, []
         for image in images:
             data = np.ascontiguousarray(image).data.cast("B")
@@ -242,9 +241,13 @@ class ChildProcess:
 
 
 def _fault(answer: Message) -> tuple[str, str]:
-    told = answer["fault"]
-    if isinstance(told, list) and len(told) == 2 and all(isinstance(t, str) for t in told):
-        return told[0], " ".join(told[1].split())[:1000]
+    document = answer["fault"]
+    if (
+        isinstance(document, list)
+        and len(document) == 2
+        and all(isinstance(t, str) for t in document)
+    ):
+        return document[0], " ".join(document[1].split())[:1000]
     raise ProcessDiedError("its answer is no message")
 
 
@@ -256,15 +259,15 @@ def _percepts(answer: Message) -> list[Percept]:
 
 
 def error_text(fault: Exception) -> str:
-    """An exception's own words, short."""
+    """The message of an exception, shortened."""
     return " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
 
 
 def origin_of(behaviour: Behaviour, contract: Contract) -> Message:
-    """How a process makes a behaviour: from its file, or again as it was made here.
+    """How a process recreates a behaviour: from its file, or from its class and attributes.
 
     Raises:
-        BehaviourError: It cannot be made there.
+        BehaviourError: It cannot be recreated.
     """
     if isinstance(behaviour, IsolatedBehaviour):
         name = contract.name
@@ -275,7 +278,7 @@ def origin_of(behaviour: Behaviour, contract: Contract) -> Message:
     file = str(getattr(module, "__file__", "") or "")
     own = kind.__module__.startswith(PLUG_IN) or kind.__module__ == "__main__"
     attributes = state_of(behaviour)
-    settings = _own_settings(kind, attributes.get("settings"))
+    settings = _settings_document(kind, attributes.get("settings"))
     if settings is not None:
         del attributes["settings"]
     try:
@@ -298,8 +301,8 @@ def origin_of(behaviour: Behaviour, contract: Contract) -> Message:
     }
 
 
-def _own_settings(kind: type, given: Any) -> Any:
-    """Settings of a plug-in's own model as JSON values, or None."""
+def _settings_document(kind: type, given: Any) -> Any:
+    """The settings of a plug-in as JSON values, or None."""
     model = getattr(kind, "Settings", None)
     if isinstance(model, type) and isinstance(given, model) and hasattr(given, "model_dump"):
         return given.model_dump(mode="json")

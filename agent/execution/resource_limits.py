@@ -1,4 +1,4 @@
-"""What the operating system holds an isolated behaviour's process to: memory, processes, no core files."""
+"""Resource limits of an isolated behaviour's process (setrlimit): memory, processes, no core files."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import os
 from pathlib import Path
 
 MOST_MORE_TASKS = 256
-"""Processes and threads that it may have besides those which its user has when it starts; libraries of linear
-algebra take one a core. The system does not count those of root."""
+"""Processes and threads beyond those of its user when it starts; linear algebra libraries use one per core.
+The system does not limit root."""
 
 STARTING_MB = 4096.0
-"""Memory that it may take for its libraries and models until it has started, megabytes."""
+"""Memory limit during the start, for its libraries and models, megabytes."""
 
 ADDRESSES_MB = 2048
-"""Addresses beyond its memory, megabytes: a thread reserves some 130 for its stack and its allocations."""
+"""Address space beyond its memory, megabytes: a thread reserves some 130 for its stack and allocations."""
 
 
 def limit_at_start(memory_mb: float) -> None:
-    """Bound this process before code of the user's own runs in it, where the platform can.
+    """Limit this process before user code runs in it, where the platform can.
 
     Args:
-        memory_mb: What a run of it may take, megabytes.
+        memory_mb: Memory limit of a run, megabytes.
     """
     try:
         import resource
@@ -33,14 +33,14 @@ def limit_at_start(memory_mb: float) -> None:
 
 
 def limit_memory(memory_mb: float, *, final: bool = True) -> None:
-    """Bound the memory of this process, where the platform can: what it has now and so much more.
+    """Limit the memory of this process to its present use plus an amount, where the platform can.
 
-    Memory that may be shared is no data to the system, and is bounded by addresses: in the end alone,
-    since a library that is loaded may reserve many of them (a GPU's).
+    Shared memory is not part of the data limit and is bounded by address space, only after the start, since
+    loading a library (such as a GPU's) may reserve a lot of it.
 
     Args:
-        memory_mb: How much more, megabytes.
-        final: Whether the process itself may not raise the bound again.
+        memory_mb: Additional memory, megabytes.
+        final: Whether the process cannot raise the limit again.
     """
     try:
         import resource
@@ -63,12 +63,12 @@ def _set(kind: int, most: int, *, final: bool = True) -> None:
 
 
 def _tasks() -> int:
-    """Processes and threads that this user has."""
+    """Number of processes and threads of this user."""
     count = 0
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             if folder.stat().st_uid == os.getuid():
                 count += sum(1 for _ in (folder / "task").iterdir())
         except OSError:
-            continue  # it ended meanwhile
+            continue  # ended meanwhile
     return count

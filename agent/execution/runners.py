@@ -1,6 +1,6 @@
-"""Running a behaviour on a frame: in the caller's thread, or in a thread that can be given up.
+"""Running a behaviour on a frame: in the caller's thread, or in a thread that can be abandoned.
 
-`process_runner.py` has the third way, a process of its own. All three keep one protocol, `Runner`.
+`process_runner.py` has the third kind, a separate process. All three implement `Runner`.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Observation, Percept
 
 STOPPING_S = 0.05
-"""How long a step waits for a thread that it has just asked to stop, seconds."""
+"""How long a step waits for a thread that was asked to stop, seconds."""
 
 
 class RunTimeoutError(BehaviourError):
-    """No answer came in time."""
+    """The behaviour did not answer in time."""
 
 
 class ProcessDiedError(BehaviourError):
@@ -37,17 +37,17 @@ class ProcessDiedError(BehaviourError):
 
 
 class MemoryLimitError(BehaviourError):
-    """It took more memory than it may."""
+    """The behaviour exceeded its memory limit."""
 
 
 class Runner(Protocol):
-    """Runs one behaviour; what it raises is the behaviour's failure."""
+    """Runs one behaviour; its exceptions are failures of the behaviour."""
 
     def maintain(self) -> bool:
-        """Look after it between runs: stop what was given up, replace what ended.
+        """Maintenance between runs: stop abandoned runs, replace processes that ended.
 
         Returns:
-            Whether a run that was given up is still under way.
+            Whether an abandoned run is still active.
         """
         ...
 
@@ -61,13 +61,13 @@ class Runner(Protocol):
         """Run it on a frame, with a time limit in seconds.
 
         Raises:
-            Exception: Whatever the behaviour raised, `BehaviourError` for nonsense, `RunTimeoutError`,
+            Exception: Whatever the behaviour raised, `BehaviourError` for invalid output, `RunTimeoutError`,
                 `ProcessDiedError` or `MemoryLimitError`.
         """
         ...
 
     def close(self) -> None:
-        """Let go of what was started."""
+        """Release its resources."""
         ...
 
 
@@ -78,14 +78,14 @@ def run_behaviour(
     observation: Observation,
     directives: Sequence[Directive],
 ) -> tuple[Percept, ...]:
-    """What a behaviour reports of a frame, known to make sense."""
+    """The validated percepts of a behaviour for a frame."""
     percepts = collect_percepts(contract, behaviour.perceive(frame, observation, directives))
     check_percepts(contract, percepts, frame, observation)
     return percepts
 
 
 def start_behaviour(behaviour: Behaviour) -> tuple[Percept, ...]:
-    """Call its method `start`, if it has one; nothing is perceived by that."""
+    """Call its method `start`, if it has one; returns no percepts."""
     begin = getattr(behaviour, "start", None)
     if callable(begin):
         begin()
@@ -93,7 +93,7 @@ def start_behaviour(behaviour: Behaviour) -> tuple[Percept, ...]:
 
 
 class DirectRunner:
-    """Runs a behaviour in the thread of the caller: nothing can stop it."""
+    """Runs a behaviour in the caller's thread, where nothing can stop it."""
 
     def __init__(self, behaviour: Behaviour, contract: Contract) -> None:
         self._behaviour = behaviour
@@ -101,7 +101,7 @@ class DirectRunner:
         self._started = False
 
     def maintain(self) -> bool:
-        """Nothing is ever given up."""
+        """Nothing to do: no run is ever abandoned."""
         return False
 
     def run(
@@ -111,7 +111,7 @@ class DirectRunner:
         directives: Sequence[Directive],
         seconds: float | None,
     ) -> tuple[Percept, ...]:
-        """See `Runner`; `seconds` is not kept."""
+        """See `Runner`; `seconds` is ignored."""
         try:
             if not self._started:
                 start_behaviour(self._behaviour)
@@ -121,12 +121,12 @@ class DirectRunner:
             raise _as_error(leaving) from leaving
 
     def close(self) -> None:
-        """Nothing was started."""
+        """Nothing to release."""
 
 
 @dataclass(slots=True)
 class _Job:
-    """One run that was handed to a thread."""
+    """One run passed to a thread."""
 
     work: Callable[[], tuple[Percept, ...]]
     done: threading.Event = field(default_factory=threading.Event)
@@ -137,13 +137,13 @@ class _Job:
     fault: BaseException | None = None
 
     def run(self) -> None:
-        """Do the work, once, and note what came of it."""
+        """Do the work once and store the result."""
         if not self.tried:
             self.tried = True
             try:
                 self.percepts = self.work()
             except BaseException as fault:
-                # Whatever it is, it is the behaviour's failure and belongs to whoever waits.
+                # Any exception is a failure of the behaviour and is re-raised in the waiting thread.
                 self.fault = fault if isinstance(fault, Exception) else _as_error(fault)
         with self.ending:
             self.done.set()
@@ -152,12 +152,12 @@ class _Job:
 class ThreadRunner:
     """Runs a behaviour in its own thread, which is abandoned if it takes too long.
 
-    The next run gets a new thread, once the one given up has ended.
+    The next run gets a new thread once the abandoned one has ended.
 
     Args:
-        behaviour: What is run.
+        behaviour: The behaviour.
         contract: Its contract.
-        start_s: How long its method `start` may take, seconds.
+        start_s: Time limit of its method `start`, seconds.
     """
 
     def __init__(self, behaviour: Behaviour, contract: Contract, start_s: float) -> None:
@@ -170,7 +170,7 @@ class ThreadRunner:
         self._given_up: tuple[threading.Thread, _Job] | None = None
 
     def maintain(self) -> bool:
-        """Ask what was given up to stop once more; whether it is still under way."""
+        """Ask an abandoned run to stop once more; returns whether it is still active."""
         if self._given_up is None:
             return False
         thread, job = self._given_up
@@ -229,32 +229,32 @@ class ThreadRunner:
         if self._thread is not None:
             self._given_up = self._thread, job
             _ask_to_stop(self._thread, job)
-            # Python code stops at once; whatever does not is looked at again in later steps.
+            # Python code stops at once; other code is checked again in later steps.
             self._thread.join(STOPPING_S)
 
 
 def _serve(jobs: SimpleQueue[_Job | None]) -> None:
     while (job := jobs.get()) is not None:
         while not job.done.is_set():
-            # Being asked to stop may come at any moment; the work itself is never done twice.
+            # The request to stop may arrive at any moment; the work is never repeated.
             with suppress(_StopAsked):
                 job.run()
         if job.given_up:
             return
-        del job  # a frame must not live on while the thread is idle
+        del job  # an idle thread must not keep a frame alive
 
 
 def _as_error(fault: BaseException) -> BehaviourError:
-    """A plug-in may end itself, never the supervisor."""
+    """Convert SystemExit and the like: a plug-in may end itself, never the supervisor."""
     return BehaviourError(f"it called for an exit ({type(fault).__name__})")
 
 
 class _StopAsked(SystemExit):
-    """Raised in a thread that was given up: behaviours that catch `Exception` let it pass."""
+    """Raised in an abandoned thread: it passes behaviours that catch `Exception`."""
 
 
 def _ask_to_stop(thread: threading.Thread, job: _Job) -> None:
-    """Raise in a thread, unless its work is done: then there is nothing left to stop."""
+    """Raise `_StopAsked` in a thread unless its work is done."""
     with job.ending:
         if thread.ident is not None and not job.done.is_set():
             ctypes.pythonapi.PyThreadState_SetAsyncExc(
@@ -263,18 +263,18 @@ def _ask_to_stop(thread: threading.Thread, job: _Job) -> None:
 
 
 def duration_text(seconds: float) -> str:
-    """A time for a message: milliseconds below a second."""
+    """A duration for a message: milliseconds below a second."""
     return f"{seconds:g} s" if seconds >= 1.0 else f"{seconds * 1000:g} ms"
 
 
 @cache
 def _statm(process: int) -> int:
-    """Where a process is told its own memory: opened once, for it is read in every step."""
+    """File descriptor of `/proc/self/statm`: opened once, because it is read in every step."""
     return os.open(f"/proc/{process}/statm", os.O_RDONLY)
 
 
 def resident_mb() -> float:
-    """Memory that this process holds now, megabytes; where that is not told, the most it ever held."""
+    """Resident memory of this process, megabytes; its peak where the present value is not available."""
     try:
         pages = int(os.pread(_statm(os.getpid()), 256, 0).split()[1])
     except OSError:
@@ -289,13 +289,13 @@ LONGEST_ERROR = 400
 
 
 def error_line(fault: BaseException) -> str:
-    """An exception in one short line, whatever its own text does."""
+    """An exception as one short line, even if its `__str__` fails."""
     if isinstance(fault, BehaviourError):
-        said = f"{fault.what}; expected {fault.expected}" if fault.expected else fault.what
+        text = f"{fault.what}; expected {fault.expected}" if fault.expected else fault.what
     else:
         try:
-            said = f"{type(fault).__name__}: {fault}"
+            text = f"{type(fault).__name__}: {fault}"
         except Exception:
-            # Even an exception's text is the plug-in's code.
-            said = f"{type(fault).__name__}: (its message cannot be read)"
-    return " ".join(said.split())[:LONGEST_ERROR]
+            # The text of an exception is code of the plug-in, too.
+            text = f"{type(fault).__name__}: (its message cannot be read)"
+    return " ".join(text.split())[:LONGEST_ERROR]

@@ -1,9 +1,9 @@
-"""A process for code of the user's own: its output is captured, and it is ended with its children.
+"""A process for user code: its output is captured, and it is ended with its children.
 
-On Linux, where the kernel lets users have namespaces (`unshare` of util-linux), it also has a user and a
-process namespace of its own: it cannot signal the supervisor, nor look into its memory, and whatever
-it started ends with it, as it does when the supervisor is killed. Elsewhere its process group is ended.
-What it may still do (read and write the user's files, talk to the network) is said in docs/security.md.
+On Linux, where the kernel allows user namespaces (`unshare` of util-linux), it also has its own user and
+process namespaces: it can neither signal the supervisor nor read its memory, and all its children end with
+it, or when the supervisor is killed. Elsewhere its process group is ended. What it may still do (access the
+user's files and the network) is described in docs/security.md.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from visup.agent.model.errors import BehaviourError
 
 CAN_ISOLATE = os.name == "posix"
 LARGEST_OUTPUT_BYTES = 16 * 2**20
-"""What it may write to its standard output and error together; the process is ended beyond."""
+"""Limit of its standard output and error together; beyond it the process is ended."""
 KEPT_OUTPUT_BYTES = 2000
 ENDING_S = 5.0
 PATIENCE_S = 1.0
 
 NAMESPACES = ("--user", "--map-current-user", "--pid", "--fork", "--kill-child=KILL")
 WARDEN = '(read none <&"$1"; kill -9 -1) 2>/dev/null & shift; "$@"; exit "$?"'
-"""First process of the namespace: runs the rest, and ends it all once the supervisor is gone."""
+"""First process of the namespace: runs the command, and ends all once the supervisor is gone."""
 
 
 class Sandbox:
-    """A process that runs `visup.agent.execution.worker`, and what is shared with it.
+    """A process that runs `visup.agent.execution.worker`, and its shared resources.
 
     Attributes:
         end: The supervisor's end of the connection, a stream socket.
-        frames: Descriptor of a file in memory that the process reads images from.
+        frames: Descriptor of the memory file for images.
     """
 
     def __init__(self) -> None:
@@ -70,16 +70,16 @@ class Sandbox:
         self.close = weakref.finalize(self, _end, self._lifeline, self.end, self.frames)
 
     def kill(self) -> None:
-        """End it at once, with all that it started; `close` clears it away."""
+        """Kill it with its children; `close` releases the resources."""
         self._lifeline.cut()
 
     def how_it_ended(self) -> str:
-        """Words for a process that ended by itself, with the last line that it wrote."""
+        """How a process ended by itself, with the last line of its output."""
         try:
             code = self._process.wait(1.0)
         except subprocess.TimeoutExpired:
             return "closed its connection"
-        number = -code if code < 0 else code - 128  # as a shell tells it
+        number = -code if code < 0 else code - 128  # shell convention
         how = f"by signal {number}" if number > 0 else f"with exit code {code}"
         return f"ended {how}{self.output.last_line()}"
 
@@ -89,41 +89,41 @@ WORKER = "visup.agent.execution.worker"
 
 @dataclass(frozen=True, slots=True)
 class _Lifeline:
-    """By which a process is ended.
+    """The means to end a process.
 
     Attributes:
-        process: The process, or in namespaces the one outside that waits for all of theirs to end.
-        held: While it is open the process may live.
+        process: The process, or with namespaces the outer one that waits for all inner ones.
+        held: A pipe end; closing it ends the process.
     """
 
     process: subprocess.Popen[bytes]
     held: IO[bytes]
 
     def cut(self) -> None:
-        """End the process at once."""
+        """Kill the process."""
         self.held.close()
         if not isolating():
             self._kill_group()
 
     def end(self) -> None:
-        """End it, and wait until it is gone with all that it started."""
+        """Kill it, and wait until it and its children have ended."""
         self.cut()
         for seconds in (PATIENCE_S, ENDING_S):
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(seconds)
                 break
-            self._kill_group()  # what should have ended it was ended itself
+            self._kill_group()  # the first process of the namespace was itself killed
         if not isolating():
-            self._kill_group()  # what was left behind
+            self._kill_group()  # children left behind
 
     def _kill_group(self) -> None:
-        # Its own session is its process group.
+        # Its session is its process group.
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.process.pid, signal.SIGKILL)
 
 
 class _Output:
-    """What a process writes, read all the time so that it never waits; only the end is kept."""
+    """The output of a process, read continuously so that it never blocks; only the end is stored."""
 
     def __init__(self, process: subprocess.Popen[bytes], lifeline: _Lifeline) -> None:
         self.exceeded = False
@@ -132,21 +132,21 @@ class _Output:
         self._thread.start()
 
     def last_line(self) -> str:
-        """': ' and the last line that was written, or nothing."""
+        """': ' and the last line of the output, or nothing."""
         self._thread.join(0.5)
         lines = self._kept.decode(errors="replace").split("\n")
         written = [line.strip() for line in lines if line.strip()]
         return f": {written[-1][:200]}" if written else ""
 
     def _drain(self, process: subprocess.Popen[bytes], lifeline: _Lifeline) -> None:
-        stream: IO[bytes] = process.stdout  # type: ignore[assignment]  # asked for above
+        stream: IO[bytes] = process.stdout  # type: ignore[assignment]  # requested above
         total = 0
         with suppress(OSError, ValueError):
             while part := os.read(stream.fileno(), 2**16):
                 total += len(part)
                 self._kept = (self._kept + part)[-KEPT_OUTPUT_BYTES:]
                 if total > LARGEST_OUTPUT_BYTES and not self.exceeded:
-                    # Read on until it is gone: a pipe that breaks first would be told as its fault.
+                    # Read until it has ended: a broken pipe would be reported as its fault.
                     self.exceeded = True
                     lifeline.cut()
         stream.close()
@@ -163,7 +163,7 @@ def namespace_command() -> list[str]:
 
 @cache
 def isolating() -> bool:
-    """Whether processes can have namespaces of their own here."""
+    """Whether processes can have their own namespaces here."""
     if not sys.platform.startswith("linux") or shutil.which("unshare") is None:
         return False
     try:

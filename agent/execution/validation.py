@@ -1,6 +1,6 @@
-"""Whether what a behaviour reports makes sense: nonsense stops here and never enters the mind.
+"""Validates the reports of behaviours, so that invalid percepts never reach the mind.
 
-Each check raises a `BehaviourError` that says what is wrong and what was expected.
+Each check raises a `BehaviourError` with the fault and what was expected.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from visup.agent.model.records import Frame, Observation, Percept, Region
 SAME_TIME_S = 1e-6
 
 
-def collect_percepts(contract: Contract, said: object) -> tuple[Percept, ...]:
-    """What a behaviour returned, as percepts; a generator that does not end is cut off.
+def collect_percepts(contract: Contract, returned: object) -> tuple[Percept, ...]:
+    """The return value of a behaviour as percepts; an endless generator is cut off.
 
     Raises:
-        BehaviourError: It is not iterable, holds something else, or is more than the contract allows.
+        BehaviourError: It is not iterable, has other elements, or more than the contract allows.
     """
-    if not isinstance(said, Iterable) or isinstance(said, str | bytes | Mapping | Percept):
+    if not isinstance(returned, Iterable) or isinstance(returned, str | bytes | Mapping | Percept):
         raise BehaviourError(
-            f"behaviour '{contract.name}' returned {a_kind(said)}",
+            f"behaviour '{contract.name}' returned {a_kind(returned)}",
             expected="percepts, one after another: yield each, or return a list of them",
-            hint="return () when there is nothing to report" if said is None else None,
+            hint="return () when there is nothing to report" if returned is None else None,
         )
-    percepts = tuple(islice(said, contract.most_percepts + 1))
+    percepts = tuple(islice(returned, contract.most_percepts + 1))
     for percept in percepts:
         if not isinstance(percept, Percept):
             raise BehaviourError(
@@ -45,16 +45,16 @@ def collect_percepts(contract: Contract, said: object) -> tuple[Percept, ...]:
 def check_percepts(
     contract: Contract, percepts: Iterable[Percept], frame: Frame, before: Observation | None = None
 ) -> None:
-    """Refuse percepts that are not as the contract and their kinds want them.
+    """Check percepts against the contract and their kinds.
 
     Args:
-        contract: Of the behaviour.
-        percepts: What it reported.
-        frame: The frame that they are about.
-        before: What others reported of it: no two may give a region one id.
+        contract: Contract of the behaviour.
+        percepts: Its percepts.
+        frame: The frame.
+        before: Reports of earlier behaviours on it: region ids must be unique.
 
     Raises:
-        BehaviourError: One is nonsense.
+        BehaviourError: One is not valid.
     """
     region_ids: set[int] = {r.id for r in before.of("region")} if before is not None else set()
     for p in percepts:

@@ -1,8 +1,7 @@
-"""The other end of `process_runner.py`: what runs in the process of an isolated behaviour.
+"""The worker process of an isolated behaviour; the counterpart of `process_runner.py`.
 
-Started by `sandbox.py` as `python -m visup.agent.execution.worker`. The first message says whose contracts
-are wanted, or which behaviour is to be started; those that follow are frames. Answers are data
-(`messages.py`).
+Started by `sandbox.py` as `python -m visup.agent.execution.worker`. The first message requests contracts or
+names the behaviour to start; the following ones are frames. Answers are data (`messages.py`).
 """
 
 from __future__ import annotations
@@ -46,17 +45,17 @@ _MORE = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
 EXCEPTIONS: Mapping[str, type[Exception]] = MappingProxyType(
     {kind.__name__: kind for kind in (*_SOME, *_MORE)}
 )
-"""Exceptions that are told by their own names; all others come as `BehaviourError`."""
+"""Exceptions that are reported by their names; all others become `BehaviourError`."""
 
 LONGEST_REFUSAL = 100
-"""Faults of settings that are told at most."""
+"""Maximum number of reported faults of settings."""
 
 
 def main(channel: Channel, frames: int) -> None:
     """Serve the supervisor until it closes its end.
 
     Args:
-        channel: To the supervisor.
+        channel: Channel to the supervisor.
         frames: Descriptor of the file with the images.
     """
     with suppress(EOFError, OSError):
@@ -74,12 +73,12 @@ def main(channel: Channel, frames: int) -> None:
 
 
 def _answer(channel: Channel, does: Callable[[], tuple[Message, Any]]) -> Any:
-    """Do something and answer what came of it; what it made, or None where it failed."""
+    """Call a function and send its answer; returns its result, or None if it failed."""
     made = None
     try:
         message, made = does()
     except BaseException as fault:
-        # Whatever it is, it is the behaviour's failure; the supervisor decides what comes of it.
+        # Any exception is a failure of the behaviour; the supervisor decides what follows.
         message = _failure(fault)
     try:
         channel.send(message)
@@ -89,7 +88,7 @@ def _answer(channel: Channel, does: Callable[[], tuple[Message, Any]]) -> Any:
 
 
 def _contracts(asked: Message) -> tuple[Message, None]:
-    """The contracts of a file or module, once its behaviours are made with their settings."""
+    """The contracts of a file or module, whose behaviours are created with their settings."""
     limit_at_start(0.0)
     made = load_behaviours(asked["where"], asked["settings"])
     return {"contracts": [contract_document(b.contract) for b in made]}, None
@@ -99,7 +98,7 @@ def _started(asked: Message) -> tuple[Message, Behaviour]:
     limit_at_start(asked["memory_mb"])
     behaviour = _rebuilt(asked) if "object" in asked else _loaded(asked)
     start_behaviour(behaviour)
-    mask_to_runs(np.zeros((1, 1), np.bool_))  # its libraries are loaded before memory is bounded
+    mask_to_runs(np.zeros((1, 1), np.bool_))  # loads its libraries before memory is limited
     limit_memory(asked["memory_mb"])
     return {}, behaviour
 
@@ -113,7 +112,7 @@ def _loaded(asked: Message) -> Behaviour:
 
 
 def _rebuilt(asked: Message) -> Behaviour:
-    """A behaviour that was made in the supervisor, with the attributes that it had there."""
+    """A behaviour created in the supervisor, with the attributes that it had there."""
     for name in asked["modules"]:
         importlib.import_module(name)
     file = asked["file"]
@@ -185,14 +184,14 @@ def contract_document(contract: Contract) -> Message:
 
 
 def _image(placed: list[int], frames: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    """A copy of its own: the behaviour may keep frames, the file is written over."""
+    """A copy of an image: the behaviour may keep frames, while the file is overwritten."""
     offset, *shape = placed
     data = os.pread(frames, int(np.prod(shape)), offset)
-    return np.frombuffer(data, np.uint8).reshape(shape)  # of bytes, and so read-only
+    return np.frombuffer(data, np.uint8).reshape(shape)  # read-only, since it is backed by bytes
 
 
 def _end_with_supervisor(lifeline: int) -> None:
-    """A supervisor that was killed leaves no process behind, where nothing else sees to that."""
+    """End with a killed supervisor, on systems where nothing else does."""
     while os.read(lifeline, 1):
         pass
     os._exit(1)

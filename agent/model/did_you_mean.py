@@ -1,4 +1,4 @@
-"""Hints that name what was probably meant, in one way for every message."""
+"""Hints that suggest the closest known word, worded alike for every message."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path
 
 
 def closest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """The known word nearest to one, whatever their cases, or None.
+    """The closest known word, ignoring case, or None.
 
     >>> closest("Convergin", ["converging", "diverging"])
     'converging'
 
     Args:
-        word: What was written.
-        known: What there is.
-        cutoff: How alike they must be, from 0 to 1.
+        word: The unknown word.
+        known: The known words.
+        cutoff: Least similarity, 0 to 1.
     """
     return _closest(word, tuple(known), cutoff)
 
 
-@lru_cache(maxsize=256)  # the same slip is often made, and each trial of a repair meets it again
+@lru_cache(maxsize=256)  # the same mistake recurs, for example in each trial of a repair
 def _closest(word: str, known: tuple[str, ...], cutoff: float) -> str | None:
     by_folded = {k.casefold(): k for k in known}
     near = get_close_matches(word.casefold(), by_folded, n=1, cutoff=cutoff)
@@ -30,9 +30,9 @@ def _closest(word: str, known: tuple[str, ...], cutoff: float) -> str | None:
 
 
 def closest_file(path: Path, names: Iterable[str]) -> Path | None:
-    """The file beside a path that was probably meant, or None.
+    """The file next to a path that was probably meant, or None.
 
-    Endings are often the same, and make any two names look alike: names must be near without theirs.
+    Names are compared without suffixes, since equal suffixes make any two names look similar.
 
     >>> closest_file(Path("clips/cart.mp4"), ["carts.mp4", "short.mp4"]).as_posix()
     'clips/carts.mp4'
@@ -40,14 +40,14 @@ def closest_file(path: Path, names: Iterable[str]) -> Path | None:
     True
 
     Args:
-        path: What was written.
-        names: What there is in its folder.
+        path: The missing path.
+        names: Names in its folder.
     """
     near = closest(path.name, [n for n in names if closest(path.stem, [Path(n).stem])])
     return path.parent / near if near else None
 
 
 def did_you_mean(word: str, known: Iterable[str], form: str = "'{}'") -> str | None:
-    """The hint that names the nearest known word, or None when none is near."""
+    """A hint with the closest known word, or None."""
     near = closest(word, known)
     return f"did you mean {form.format(near)}?" if near else None

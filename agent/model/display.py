@@ -1,7 +1,6 @@
-"""Records show themselves in notebooks and to rich, where what shows them is installed.
+"""Rich display of records in notebooks and terminals, where the needed libraries are installed.
 
-The agent draws nothing and imports nothing that does: whatever draws is found by its name when a record
-is first shown.
+The agent imports no drawing code: it is looked up by name when a record is first shown.
 """
 
 from __future__ import annotations
@@ -29,14 +28,14 @@ def _as_html(record: Any) -> str:
 
 
 def enable_display(*kinds: type) -> None:
-    """Let records of some kinds show themselves."""
+    """Enable the display of some types of records."""
     for kind in kinds:
         kind.__rich__ = _as_rich  # type: ignore[attr-defined]
         kind._repr_html_ = _as_html  # type: ignore[attr-defined]
 
 
 def drawn(image: NDArray[np.uint8], mind: Mind) -> NDArray[np.uint8]:
-    """A picture of what is believed, drawn over a frame.
+    """A frame with the beliefs drawn over it.
 
     Args:
         image: (H, W, 3) uint8 BGR.

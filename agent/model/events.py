@@ -71,7 +71,7 @@ class AlertCondition:
 
 @dataclass(frozen=True)
 class Alert:
-    """An event that a person should act on, with its life.
+    """An event that a person should act on, from opening to closing.
 
     Attributes:
         id: Number within the run, from 1.

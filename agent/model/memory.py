@@ -10,13 +10,13 @@ Remembered = TypeVar("Remembered")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MemoryKey(Generic[Remembered]):
-    """The place of one reasoner's memory in a mind; whoever owns the key says what stands there.
+    """The typed key of one reasoner's memory in a mind, owned by the reasoner.
 
-    `mind.recall(KEY)` gives what is remembered, `mind.remember(KEY, value)` a mind that remembers `value`.
+    `mind.recall(KEY)` returns the memory, `mind.remember(KEY, value)` a mind with the memory `value`.
 
     Attributes:
-        name: Unique among the reasoners of an agent; checkpoints know the memory by it.
-        default: What is remembered before anything was; immutable.
+        name: Unique among the reasoners of an agent; identifies the memory in checkpoints.
+        default: The initial memory; immutable.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What is believed about an object: where it is, what it is, which way it faces and how it turns."""
+"""Beliefs about an object: presence, identity, pose and rotation."""
 
 from __future__ import annotations
 

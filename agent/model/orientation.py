@@ -1,12 +1,12 @@
-"""How an object that is seen from a direction stands before the camera: the one place of this convention.
+"""The convention for orientations of objects: view direction and in-plane rotation, defined here only.
 
-A *direction* is the unit vector from the object to the viewer, in the model's frame. A picture taken from
-there has the model's +z up (looking along z, its +y). A *rotation* turns the picture in its plane, in
-radians from x (right) towards y (down). Both together are an *orientation*: the (3, 3) matrix that takes
-vectors of the model's frame to the camera's (x right, y down, z forward).
+A *direction* is the unit vector from the object to the viewer, in the model's frame. The image seen from
+there has the model's +z up (looking along z, its +y). A *rotation* turns the image in its plane, in radians
+from x (right) towards y (down). Together they are an *orientation*: the (3, 3) matrix from the model's frame
+to the camera's (x right, y down, z forward).
 
-A mirrored match needs no rule of its own: it tells of the opposite direction, whose picture, with this
-roll, is the mirror image left to right.
+A mirrored match needs no special case: it means the opposite direction, whose image, with this roll, is
+mirrored left to right.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _ALONG_POLE = 0.999
 
 
 def image_axes(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Right and up of the picture seen from directions.
+    """The right and up axes of the images seen from directions.
 
     Args:
         direction: (..., 3) unit vectors from the object to the viewer, model frame.
@@ -34,18 +34,18 @@ def image_axes(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.fl
     d = np.asarray(direction, np.float64)
     x, y, z = d[..., 0], d[..., 1], d[..., 2]
     upright, none = np.abs(z) < _ALONG_POLE, np.zeros_like(x)
-    # pole x direction, the pole being +z or, looking along it, +y.
+    # Cross product of pole and direction; the pole is +z or, looking along it, +y.
     right = np.stack([np.where(upright, -y, z), np.where(upright, x, none), -x * ~upright], -1)
     right /= np.sqrt((right**2).sum(axis=-1, keepdims=True))
     return right, _cross(d, right)
 
 
 def orientations(directions: ArrayLike, rotations: ArrayLike) -> NDArray[np.float64]:
-    """Orientations of an object that is seen from directions, turned in the plane.
+    """Orientations of an object seen from directions and rotated in the image plane.
 
     Args:
         directions: (..., 3) unit vectors from the object to the viewer, model frame.
-        rotations: (...) radians from x towards y that take the picture to what is seen.
+        rotations: (...) radians from x towards y, from the unrotated image to the observed one.
 
     Returns:
         (..., 3, 3) float64 rotation matrices, model to camera.
@@ -82,15 +82,15 @@ def views(orientation: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float
 def swing_and_roll(
     one: ArrayLike, other: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far apart orientations are: the angle between their directions, and the turn in the plane.
+    """The difference of orientations: angle between directions, and in-plane rotation.
 
     Args:
         one: (..., 3, 3) rotation matrices, model to camera.
         other: The same.
 
     Returns:
-        (...) swing, in [0, pi], and (...) roll, in (-pi, pi], that takes `one` to `other` once the
-        direction of the one has been swung the shortest way to that of the other; radians, float64.
+        (...) swing in [0, pi] and (...) roll in (-pi, pi] that takes `one` to `other` after its direction has
+        been swung the shortest way to the other's; radians, float64.
 
     Example:
         >>> turned = orientations([[0.0, -1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]], [0, 0.5, 0])
@@ -104,6 +104,6 @@ def swing_and_roll(
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross product along the last axis; that of NumPy takes several times as long on few vectors."""
+    """Cross product along the last axis; several times faster than NumPy's on few vectors."""
     i, j = [1, 2, 0], [2, 0, 1]
     return np.asarray(a[..., i] * b[..., j] - a[..., j] * b[..., i])

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from visup.agent.model.display import enable_display
 
 if TYPE_CHECKING:
-    # Only the types: records pass arrays on, so that importing them stays quick.
+    # Types only, so that importing records stays fast.
     import numpy as np
     from numpy.typing import NDArray
 

@@ -1,4 +1,4 @@
-"""What a table of relations is made of: questions by column, and the answers of all pairs as arrays."""
+"""The columns of a relation table: one question per column, with the answers for all pairs as arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNKNOWN_CODE = -1
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """What holds between objects now.
+    """A relation between objects at one moment.
 
     Attributes:
         name: 'converging', 'diverging', 'keeping_distance', 'touching', 'coupled', ...
@@ -45,15 +45,13 @@ class Column:
     """One question about every pair of objects; see `RelationBlock`.
 
     Attributes:
-        names: The relation that each code stands for; '' for a code that has no name of its own (not
-            where only the one that holds is listed).
-        rows: Row of the codes that say what a is to b, and of those that say what b is to a; the same
-            where the question is symmetric.
-        confidence: Row of the numbers that say how sure the answer is, 0 to 1.
-        value: Row of the quantity behind it, NaN unknown; or None.
-        sigma: Row of its standard deviation, NaN unknown; or None.
-        listed: Which of its relations are given when a mind's relations are gone through: 'each'
-            (true or false), 'one' (the one that holds), or 'none' (they are there to be asked for).
+        names: The relation of each code; '' for a code without a name (not with `listed='one'`).
+        rows: Row of the codes for a to b, and row of those for b to a; equal if the question is symmetric.
+        confidence: Row of the confidences, 0 to 1.
+        value: Row of the underlying quantity, NaN if unknown; or None.
+        sigma: Row of its standard deviation, NaN if unknown; or None.
+        listed: Which of its relations are listed when iterating over a mind's relations: 'each' (true or
+            false), 'one' (the one that holds), or 'none' (on request only).
     """
 
     names: tuple[str, ...]
@@ -65,34 +63,34 @@ class Column:
 
     @property
     def count(self) -> int:
-        """How many relations are listed of each pair."""
+        """Number of relations listed per pair."""
         return {"each": sum(map(bool, self.names)), "one": 1, "none": 0}[self.listed]
 
 
 @dataclass(frozen=True, eq=False)
 class ColumnLayout:
-    """Columns that stand together in every step, and so made once.
+    """Columns that occur together in every step, created once.
 
     Attributes:
-        each: In the order in which they are listed.
+        each: The columns in listing order.
     """
 
     each: tuple[Column, ...]
 
     @cached_property
     def named(self) -> Mapping[str, tuple[Column, int]]:
-        """Relation -> its column, and its code there."""
+        """Relation -> its column and its code."""
         return {n: (q, code) for q in self.each for code, n in enumerate(q.names) if n}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelationBlock:
-    """What holds between all pairs of objects.
+    """The relations between all pairs of objects.
 
-    Pairs (a, b) with a < b stand in the order (0, 1), (0, 2), ..., (1, 2), ... of a table's ids.
+    Pairs (a, b) with a < b are in the order (0, 1), (0, 2), ..., (1, 2), ... of a table's ids.
 
     Attributes:
-        columns: What the rows stand for.
+        columns: Meaning of the rows.
         state: (R, P) int8 codes, -1 unknown.
         since: (R, P) seconds since when each pair has its code.
         numbers: (N, P) confidences and quantities.
@@ -106,7 +104,7 @@ class RelationBlock:
     def relation(
         self, column: Column, code: int, pair: tuple[int, int], row: int, k: int
     ) -> Relation:
-        """The relation of one code for pair number k, as it stands (row 0) or turned round (1)."""
+        """The relation of one code for pair number k, in order (row 0) or reversed (1)."""
         at = column.rows[row]
         state = int(self.state[at, k])
         unknown = state == UNKNOWN_CODE
@@ -122,7 +120,7 @@ class RelationBlock:
         )
 
     def listed_of(self, column: Column, pair: tuple[int, int], k: int) -> Iterator[Relation]:
-        """What is listed of one pair, as it stands; the converse can be asked for."""
+        """The listed relations of one pair in order; converses are available on request."""
         codes: Iterable[int] = range(len(column.names))
         if column.listed == "one":
             codes = (max(0, int(self.state[column.rows[0], k])),)

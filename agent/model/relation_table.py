@@ -1,9 +1,8 @@
-"""All that holds between objects at one moment: a table by columns that gives records on demand.
+"""The relations between objects at one moment: a columnar table that creates records on demand.
 
-Fifty objects are 1225 pairs of a dozen relations each: too many records to make in every step, of
-which a few are ever read. So a step keeps its relations as arrays, a column for each question that
-has one answer for a pair (such as: do the two converge, keep their distance, or diverge?), and a
-`Relation` is made when somebody asks for it.
+Fifty objects have 1225 pairs with a dozen relations each: too many records to create in every step, of which
+few are ever read. So relations are stored as arrays, one column for each question with one answer per pair
+(such as: do the two converge, keep their distance, or diverge?), and a `Relation` is created when requested.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ _TRUTHS = {code: truth for truth, code in _CODES.items()}
 
 @dataclass(frozen=True, eq=False)
 class RelationTable(Sequence[Relation]):
-    """The relations of one step; immutable. As a sequence it gives those that are listed.
+    """The relations of one step; immutable. As a sequence it has the listed relations.
 
     Attributes:
         ids: (M,) object ids, increasing.
-        parts: What holds between all pairs of them.
+        parts: Relations between all pairs of them.
         extra: Relations given one by one (those of plug-ins).
     """
 
@@ -41,7 +40,7 @@ class RelationTable(Sequence[Relation]):
     extra: tuple[Relation, ...] = field(default=())
 
     def with_block(self, cells: RelationBlock) -> RelationTable:
-        """The same with more that holds between all pairs of its objects."""
+        """The same table with a further block for all pairs of its objects."""
         return RelationTable(self.ids, (*self.parts, cells), self.extra)
 
     def find(self, name: str, *objects: int) -> Relation | None:
@@ -73,7 +72,7 @@ class RelationTable(Sequence[Relation]):
         return None if found is None else found.truth
 
     def codes(self, name: str) -> list[int]:
-        """Whether a relation holds between pairs as they stand: 1 true, -1 false, 0 unknown or not judged."""
+        """A relation for all pairs in order: 1 true, -1 false, 0 unknown or not evaluated."""
         for part in self.parts:
             at = part.columns.named.get(name)
             if at is not None:
@@ -89,7 +88,7 @@ class RelationTable(Sequence[Relation]):
         return tuple([r for r in held if r is not None])
 
     def holding_objects(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
-        """Objects and names of the relations of some names that are true, by objects: no records."""
+        """Objects and names of the true relations with the given names, by objects; creates no records."""
         found: list[tuple[tuple[int, ...], str]] = [
             (r.objects, r.name) for r in self.extra if r.name in names and r.truth is Truth.TRUE
         ]
@@ -109,35 +108,35 @@ class RelationTable(Sequence[Relation]):
         return sorted(found, key=itemgetter(0))
 
     def truth_codes(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
-        """A relation between all of some objects.
+        """A relation between all pairs of the given objects.
 
         Args:
             name: Any relation, listed or not.
             ids: Objects, in any order.
 
         Returns:
-            (n, n) int8, a the row and b the column: 1 true, -1 false, 0 unknown or not judged.
+            (n, n) int8, a the row and b the column: 1 true, -1 false, 0 unknown or not evaluated.
         """
         table: NDArray[np.int8] = self.truth_tables((name,), ids)[0]
         return table
 
     def truth_tables(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
-        """Several relations between all of some objects, in one pass.
+        """Several relations between all pairs of the given objects, in one pass.
 
         Args:
             names: Any relations, listed or not.
             ids: Objects, in any order.
 
         Returns:
-            (k, n, n) int8, one table as of `truths` for each name.
+            (k, n, n) int8, one table as in `truth_codes` for each name.
         """
         import numpy as np
 
         columns = tuple([part.columns for part in self.parts])
         heights = tuple([len(part.state) for part in self.parts])
-        places, code = _places_of(columns, heights, names, len(self.ids))
+        places, code = _indices_of(columns, heights, names, len(self.ids))
         states = [part.state.ravel() for part in self.parts]
-        codes = _truth(np.concatenate([*states, _nothing()]).take(places), code)
+        codes = _truth(np.concatenate([*states, _not_evaluated()]).take(places), code)
         if tuple(ids) != self.ids:
             codes = self._of(codes, ids)
         for r in self.extra:
@@ -148,7 +147,7 @@ class RelationTable(Sequence[Relation]):
         return codes
 
     def _of(self, codes: NDArray[np.int8], ids: Sequence[int]) -> NDArray[np.int8]:
-        """(k, n, n) tables for other objects; what is not judged is unknown."""
+        """(k, n, n) tables for the given objects; 0 where not evaluated."""
         import numpy as np
 
         out = np.zeros((len(codes), len(ids), len(ids)), dtype=np.int8)
@@ -160,7 +159,7 @@ class RelationTable(Sequence[Relation]):
         return out
 
     def all(self) -> Iterator[Relation]:
-        """Everything that is judged, listed or not: of each column the relation that holds."""
+        """All evaluated relations, listed or not: of each column the one that holds."""
         for part in self.parts:
             for k, pair in enumerate(self._pairs):
                 for column in part.columns.each:
@@ -172,7 +171,7 @@ class RelationTable(Sequence[Relation]):
         yield from self.extra
 
     def pair(self, a: int, b: int) -> tuple[int, int]:
-        """Number of a pair and its row: 0 as it stands, 1 turned round; number -1 when not there."""
+        """Number of a pair and its row: 0 in order, 1 reversed; number -1 if it does not exist."""
         i, j = self._place.get(a, -1), self._place.get(b, -1)
         if i < 0 or j < 0 or i == j:
             return -1, 0
@@ -229,13 +228,13 @@ class RelationTable(Sequence[Relation]):
 
 
 @lru_cache(maxsize=128)
-def _places_of(
+def _indices_of(
     columns: tuple[ColumnLayout, ...], heights: tuple[int, ...], wanted: tuple[str, ...], m: int
 ) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
-    """Where some relations of all of m objects are found in the states of all cells, end to end.
+    """The indices of relations between m objects in the concatenated states of all blocks.
 
     Returns:
-        (k, m, m) places, of what is not judged that behind the last state, and (k, 1, 1) codes.
+        (k, m, m) indices, one past the last state if not evaluated, and (k, 1, 1) codes.
     """
     import numpy as np
 
@@ -255,8 +254,8 @@ def _places_of(
 
 
 @lru_cache(maxsize=1)
-def _nothing() -> NDArray[np.int8]:
-    """The state of what is not judged."""
+def _not_evaluated() -> NDArray[np.int8]:
+    """The state of relations that are not evaluated."""
     import numpy as np
 
     return np.array([UNKNOWN_CODE], dtype=np.int8)

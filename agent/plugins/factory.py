@@ -1,4 +1,4 @@
-"""Behaviours of the user's own: from a file, or from a module by its path; made with their settings."""
+"""Creates user behaviours with their settings, from a file or a module path."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from visup.agent.model.errors import BehaviourError
 from visup.agent.plugins.settings import validate_settings
 
 Constructor = Callable[..., object]
-"""A class of behaviours, or a function that makes one."""
+"""A behaviour class, or a factory function."""
 
 MODULE_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
 @dataclass(frozen=True, slots=True)
 class BehaviourFactory:
-    """Something that makes a behaviour.
+    """A factory of a behaviour.
 
     Attributes:
-        kind: The class, or a function.
-        where: Where it was found, for messages.
+        kind: The class or function.
+        where: Its location, for messages.
     """
 
     kind: Constructor
@@ -39,25 +39,25 @@ class BehaviourFactory:
 
     @property
     def contract(self) -> Contract | None:
-        """The contract, as far as it is known before anything is made."""
+        """The contract, if it is known before the behaviour is created."""
         found = getattr(self.kind, "contract", None)
         return found if isinstance(found, Contract) else None
 
     @property
     def settings(self) -> type | None:
-        """The model of its settings, or None when it has none."""
+        """The model of its settings, or None."""
         found = getattr(self.kind, "Settings", None)
         return found if isinstance(found, type) else None
 
     def make(self, settings: Mapping[str, Any] | None = None) -> Behaviour:
-        """A new behaviour.
+        """Create a behaviour.
 
         Args:
-            settings: Values for its settings; the defaults hold for what is left out.
+            settings: Values of its settings; omitted ones have their defaults.
 
         Raises:
-            BehaviourError: It cannot be made, or is no behaviour.
-            SettingsError: A setting is not as it should be.
+            BehaviourError: It cannot be created, or is no behaviour.
+            SettingsError: A setting is not valid.
         """
         name = self.contract.name if self.contract else getattr(self.kind, "__name__", "behaviour")
         given = validate_settings(self.settings, settings or {}, name)
@@ -79,15 +79,15 @@ class BehaviourFactory:
 def load_behaviours(
     where: str, settings: Mapping[str, Mapping[str, Any]] | None = None
 ) -> list[Behaviour]:
-    """Behaviours of a file or a module.
+    """Load the behaviours of a file or a module.
 
     Args:
-        where: `FILE.py`, for every class of its own that has a contract; or `package.module:Class`.
-        settings: Name of a behaviour -> values for its settings.
+        where: `FILE.py`, for every class defined in it that has a contract; or `package.module:Class`.
+        settings: Name of a behaviour -> values of its settings.
 
     Raises:
-        BehaviourError: It is missing, does not run, or holds no behaviour.
-        SettingsError: A setting is not as it should be.
+        BehaviourError: It is missing, does not run, or has no behaviour.
+        SettingsError: A setting is not valid.
     """
     values = settings or {}
     return [
@@ -96,10 +96,10 @@ def load_behaviours(
 
 
 def find_factories(where: str) -> list[BehaviourFactory]:
-    """What a file or a module offers.
+    """The behaviour factories of a file or a module.
 
     Raises:
-        BehaviourError: It is missing, does not run, or holds no behaviour.
+        BehaviourError: It is missing, does not run, or has no behaviour.
     """
     if not MODULE_PATH.fullmatch(where):
         return _of_file(Path(where))
@@ -116,10 +116,10 @@ def find_factories(where: str) -> list[BehaviourFactory]:
 
 
 def as_behaviour(made: object, where: str) -> Behaviour:
-    """The same object, once it is known to be a behaviour.
+    """The same object, checked to be a behaviour.
 
     Raises:
-        BehaviourError: It has no contract, or no `perceive` that can be called as it will be.
+        BehaviourError: It has no contract, or no `perceive` with the required signature.
     """
     if not isinstance(getattr(made, "contract", None), Contract):
         raise BehaviourError(
@@ -145,17 +145,17 @@ def as_behaviour(made: object, where: str) -> Behaviour:
             where=where,
             expected=expected,
         ) from fault
-    return made  # type: ignore[return-value]  # just checked, member by member
+    return made  # type: ignore[return-value]  # checked above, member by member
 
 
 def module_name(path: Path) -> str:
-    """The name under which a file of behaviours is imported; unique even for files of the same name."""
+    """The module name of a file of behaviours; unique even for files of the same name."""
     place = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
     return f"visup_plugin_{path.stem}_{place}"
 
 
 def import_file(path: Path) -> ModuleType:
-    """A file of behaviours, freshly imported.
+    """Import a file of behaviours afresh.
 
     Raises:
         BehaviourError: It is not Python.
@@ -164,7 +164,7 @@ def import_file(path: Path) -> ModuleType:
     if spec is None or spec.loader is None:
         raise BehaviourError("the file is not Python", where=str(path), expected="a .py file")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses of the plug-in look their module up here
+    sys.modules[spec.name] = module  # dataclasses of the plug-in look up their module here
     spec.loader.exec_module(module)
     return module
 
@@ -202,7 +202,7 @@ def _run(imported: Callable[[], ModuleType], where: str) -> ModuleType:
 
 
 def _place(fault: BaseException, where: str) -> str:
-    """The line of the plug-in at which it failed, if it is one."""
+    """The line of the plug-in at which it failed, if known."""
     if isinstance(fault, SyntaxError) and fault.lineno:
         return f"{where}:{fault.lineno}"
     trace, line = fault.__traceback__, None

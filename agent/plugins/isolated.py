@@ -1,4 +1,4 @@
-"""A stand-in for a behaviour that runs in its own process and is not imported here."""
+"""A proxy for a behaviour that runs in its own process and is not imported here."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class IsolatedBehaviour:
     """A behaviour whose code never runs in this process; give it to an agent like any other.
 
     Attributes:
-        contract: As its own process told it.
+        contract: Its contract, as reported by its process.
         where: `FILE.py`, or `package.module:Class`.
-        settings: Of this behaviour.
+        settings: Its settings.
     """
 
     contract: Contract

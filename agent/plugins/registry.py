@@ -1,4 +1,4 @@
-"""Installed behaviours, found by name: entry points of packages."""
+"""The registry of installed behaviours, found through the entry points of packages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Registry:
         self._offers: dict[str, BehaviourFactory | EntryPoint] = {}
 
     def add(self, name: str, kind: Constructor) -> None:
-        """Add a class of behaviours, or whatever makes one.
+        """Add a behaviour class or factory function.
 
         Raises:
             BehaviourError: The name is taken.
@@ -34,7 +34,7 @@ class Registry:
         Raises:
             BehaviourError: The name is taken.
         """
-        # Not told from a class by its type: once some package imports the backport
+        # Entry points are not recognised by type: once some package imports the backport
         # `importlib_metadata`, entry points are of that one's class.
         self._add(point.name, point)
 
@@ -48,7 +48,7 @@ class Registry:
         return sorted(self._offers)
 
     def where(self, name: str) -> str:
-        """Where the behaviour of that name is found, `package.module:Class`; nothing is imported.
+        """Location of the behaviour of that name, `package.module:Class`; nothing is imported.
 
         Raises:
             BehaviourError: No such name.
@@ -66,7 +66,7 @@ class Registry:
         )
 
     def factory(self, name: str) -> BehaviourFactory:
-        """What makes the behaviour of that name; an entry point is imported now.
+        """The factory of the behaviour of that name; imports its entry point.
 
         Raises:
             BehaviourError: No such name, or it cannot be imported.
@@ -87,15 +87,15 @@ class Registry:
         return offer
 
     def make(self, name: str, settings: Mapping[str, Any] | None = None) -> Behaviour:
-        """A new behaviour.
+        """Create a behaviour.
 
         Args:
             name: Its name.
-            settings: For it.
+            settings: Its settings.
 
         Raises:
-            BehaviourError: No such name, or it cannot be made.
-            SettingsError: A setting is not as it should be.
+            BehaviourError: No such name, or it cannot be created.
+            SettingsError: A setting is not valid.
         """
         return self.factory(name).make(settings)
 

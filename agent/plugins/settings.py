@@ -1,4 +1,4 @@
-"""Settings of plug-ins: each is judged by the plug-in's own pydantic model, named `Settings`."""
+"""Settings of plug-ins, validated by the plug-in's pydantic model `Settings`."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ Values = dict[str, dict[str, Any]]
 
 
 def validate_settings(model: type | None, values: Mapping[str, Any], name: str) -> object:
-    """Settings of one behaviour, as its model makes them.
+    """Validate the settings of one behaviour.
 
     Args:
         model: The pydantic model; None for a behaviour without settings.
-        values: What was given.
-        name: Of the behaviour.
+        values: The given values.
+        name: Name of the behaviour.
 
     Returns:
         An instance of the model, or None without one.
 
     Raises:
-        SettingsError: A setting is unknown or not as it should be.
+        SettingsError: A setting is unknown or not valid.
     """
     if model is None:
         if values:
@@ -60,7 +60,7 @@ def parse_settings(given: Iterable[str]) -> Values:
     {'lamp': {'contrast': 120, 'colour': 'red'}}
 
     Raises:
-        SettingsError: One is not of that form, or comes twice.
+        SettingsError: One is malformed or duplicate.
     """
     values: Values = {}
     for text in given:
@@ -81,13 +81,13 @@ def read_settings(path: Path) -> Values:
     """Settings from a TOML file: a table `[behaviours.NAME]` for each behaviour.
 
     Raises:
-        SettingsError: The file is missing, is not TOML, or holds something else.
+        SettingsError: The file is missing, is not TOML, or has other content.
     """
     return behaviour_tables(read_toml(path), path)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file, as it is.
+    """Parse a TOML file.
 
     Raises:
         SettingsError: The file is missing, or is not TOML.
@@ -104,11 +104,11 @@ def behaviour_tables(document: Mapping[str, Any], path: Path) -> Values:
     """The tables `[behaviours.NAME]` of a settings file.
 
     Args:
-        document: The file, without what else is known in it.
-        path: Of the file.
+        document: The file, without its other known tables.
+        path: Path of the file.
 
     Raises:
-        SettingsError: It holds something else.
+        SettingsError: It has other content.
     """
     tables = document.get("behaviours", {})
     strange = next((key for key in document if key != "behaviours"), None)
@@ -126,7 +126,7 @@ def behaviour_tables(document: Mapping[str, Any], path: Path) -> Values:
 
 
 def merge_settings(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
-    """Settings in layers; a later one goes over those before it, key by key."""
+    """Merge layers of settings key by key; later layers take precedence."""
     names = dict.fromkeys(name for layer in layers for name in layer)
     return {n: {k: v for layer in layers for k, v in layer.get(n, {}).items()} for n in names}
 

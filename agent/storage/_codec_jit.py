@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from visup.compiled import compiled
 
 LARGEST = 2.0**24
-"""float32 knows all whole numbers below."""
-NO_DIGIT = 9  # the same as in codec.py, which must not import this file at once
+"""float32 represents all smaller integers exactly."""
+NO_DIGIT = 9  # the same as in mask_codec.py, which imports this file only on demand
 
 
 @compiled
 def run_lengths(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Lengths of the runs of a mask in reading order, that of False first (0 when there is none).
+    """Run lengths of a mask in reading order, beginning with False (0 if there is none).
 
     Args:
         mask: (N,) bool, contiguous.
@@ -34,15 +34,15 @@ def run_lengths(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 @compiled
 def chain_digits(points: NDArray[np.float32], code: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Moves of a contour from pixel to neighbouring pixel, each as a digit.
+    """The moves of a contour from pixel to neighbouring pixel as digits.
 
     Args:
         points: (N, 2) pixels, contiguous, N > 0.
-        code: (9,) the character of a move (dx, dy) at 3 (dx + 1) + dy + 1; that of no move is `NO_DIGIT`.
+        code: (9,) character of a move (dx, dy) at 3 (dx + 1) + dy + 1; `NO_DIGIT` where there is no move.
 
     Returns:
-        (N - 1,) characters; or (N,), all `NO_DIGIT`, when it is another contour: one with points
-        that are no whole numbers (or negative zeros), or with other moves.
+        (N - 1,) characters; or (N,), all `NO_DIGIT`, for any other contour: with points that are not integers
+        (or negative zeros), or with other moves.
     """
     count = len(points)
     found = np.full(count, NO_DIGIT, np.uint8)
@@ -68,7 +68,7 @@ def chain_points(
     Args:
         x: Of its first point, pixels.
         y: The same.
-        digits: (N,) numbers of moves, all of them below 8.
+        digits: (N,) numbers of moves, all below 8.
         moves: (8, 2) pixels.
 
     Returns:

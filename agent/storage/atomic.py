@@ -1,4 +1,4 @@
-"""Files that are replaced whole or not at all, also where the power goes: nothing half-written is left."""
+"""Atomic and durable replacement of files, safe against crashes and loss of power."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A draft beside a file, which takes its place once it is on the disk.
+    """Write a draft that replaces a file once it is on disk.
 
     Args:
-        path: What is replaced; it need not exist.
+        path: The file to replace; it need not exist.
 
     Yields:
-        The draft, empty. It is gone afterwards, whatever happened.
+        The empty draft; it is removed in any case.
 
     Raises:
-        OSError: It cannot be written; the old file is as it was.
+        OSError: It cannot be written; the old file is unchanged.
     """
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     os.close(handle)
     draft = Path(name)
     try:
         yield draft
-        draft.chmod(0o644)  # mkstemp keeps it from everybody else
+        draft.chmod(0o644)  # mkstemp denies access to others
         sync(draft)
         draft.replace(path)
         sync(path.parent)
@@ -36,19 +36,19 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all.
+    """Write a file atomically.
 
     Raises:
-        OSError: It cannot be written; the old file is as it was.
+        OSError: It cannot be written; the old file is unchanged.
     """
     with replacing(path) as draft:
         draft.write_bytes(data)
 
 
 def sync(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk."""
+    """Wait until a file, or the entries of a folder, are on disk (fsync)."""
     if os.name == "nt" and path.is_dir():
-        return  # Windows has no way to ask for it
+        return  # not possible on Windows
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -1,8 +1,8 @@
-"""What an agent has become, as bytes and back: minds, what reasoners remember, what behaviours hold.
+"""Serialises the state of an agent: minds, memories of reasoners, states of behaviours.
 
-A state is a tree of plain values, NumPy arrays and objects of visup's own classes, in which what was
-one object stays one. Reading it runs no code of the file's choosing: nothing is imported, only classes
-that visup has loaded already are made, and only by setting their attributes.
+A state is a graph of plain values, NumPy arrays and objects of visup's own classes, whose shared references
+are preserved. Reading it cannot run code of the file's choosing: nothing is imported, only classes that visup
+has already loaded are instantiated, and only by setting their attributes.
 """
 
 from __future__ import annotations
@@ -26,20 +26,22 @@ from visup.agent.model.errors import OutputError
 
 MAGIC = b"VISUPST1"
 PACKAGE = "visup."
-_HEAD = struct.Struct("<8sQII")  # magic, bytes of the tree, check sum of the tree and of the arrays
+_HEAD = struct.Struct(
+    "<8sQII"
+)  # magic, size of the tree in bytes, checksums of the tree and of the arrays
 _PLAIN = frozenset({type(None), bool, int, float, str})
 _Node = Any
 
 
 class StateError(TypeError):
-    """A value is of a kind that cannot be saved."""
+    """A value has a type that cannot be saved."""
 
 
 def dump_state(value: Any) -> bytes:
-    """A state as bytes.
+    """Serialise a state.
 
     Raises:
-        StateError: It holds something that cannot be saved, such as a function or an open file.
+        StateError: It contains something that cannot be saved, such as a function or an open file.
     """
     writer = _StateWriter()
     root = writer.node(value)
@@ -49,10 +51,10 @@ def dump_state(value: Any) -> bytes:
 
 
 def load_state(data: bytes) -> Any:
-    """The state that was frozen.
+    """Deserialise a state.
 
     Raises:
-        OutputError: The bytes are damaged, or of another visup.
+        OutputError: The bytes are damaged, or of another version of visup.
     """
     try:
         magic, size, tree_crc, body_crc = _HEAD.unpack_from(data)
@@ -68,16 +70,16 @@ def load_state(data: bytes) -> Any:
 
 @dataclass(slots=True)
 class _StateWriter:
-    """Nodes in an order in which each comes after those that it holds."""
+    """Builds a table of nodes in which each comes after those that it refers to."""
 
     table: list[_Node] = field(default_factory=list)
     shapes: list[tuple[str, list[int], str]] = field(default_factory=list)
     arrays: list[bytes] = field(default_factory=list)
     _known: dict[int, int] = field(default_factory=dict)
-    _alive: list[Any] = field(default_factory=list)  # so that no id is used twice
+    _alive: list[Any] = field(default_factory=list)  # keeps ids unique
 
     def node(self, value: Any) -> _Node:
-        """A plain value as it is, anything else as [its number in the table]."""
+        """A plain value unchanged, anything else as [its number in the table]."""
         if type(value) in _PLAIN:
             return value
         number = self._known.get(id(value))
@@ -116,7 +118,7 @@ class _StateWriter:
             return ["enum", name, self.node(value.value)]
         if isinstance(value, tuple):
             return ["named", name, [self.node(v) for v in value]]
-        if isinstance(value, str):  # a name of a task, which knows where it stands
+        if isinstance(value, str):  # a name in a task, which has a position
             return [
                 "text",
                 name,
@@ -131,7 +133,7 @@ class _StateWriter:
         whole = np.asarray(value)
         if whole.dtype.kind not in "biufc":
             raise StateError(f"an array of {whole.dtype}")
-        # Sums depend on the order in memory to the last bit.
+        # The memory order affects sums in the last bits.
         order = "F" if whole.flags.f_contiguous and not whole.flags.c_contiguous else "C"
         self.shapes.append((whole.dtype.str, list(whole.shape), order))
         self.arrays.append(whole.tobytes(order))  # type: ignore[arg-type]  # 'C' or 'F'
@@ -156,10 +158,10 @@ def _name(kind: type) -> str:
 
 
 def state_of(value: Any) -> dict[str, Any]:
-    """The attributes of an object, also those in slots.
+    """The attributes of an object, including those in slots.
 
     Raises:
-        StateError: It is no plain object.
+        StateError: It has no plain attributes.
     """
     if isinstance(value, FunctionType | ModuleType | type):
         raise StateError(f"a {type(value).__qualname__}")
@@ -169,7 +171,7 @@ def state_of(value: Any) -> dict[str, Any]:
 
 
 def loaded_modules(data: bytes) -> list[str]:
-    """The modules whose classes a state needs, so that another process can load them first."""
+    """The modules of the classes in a state, so that another process can load them first."""
     _, size, _, _ = _HEAD.unpack_from(data)
     table, _, _ = json.loads(data[_HEAD.size : _HEAD.size + size])
     named = {node[1] for node in table if node[0] in ("object", "enum", "named", "text")}

@@ -1,13 +1,13 @@
-"""What was perceived, as bytes and back: reasoning again on it gives the very same events.
+"""The codec of observations: lossless, so that replayed reasoning gives identical events.
 
-A step is one JSON document (docs/step.schema.json), compressed by zlib. Numbers are written so that
-they are read back to the last bit; masks are runs, contours from pixel to pixel chain codes. Plug-ins'
-values are kept when they are made of plain values, arrays and visup's own records; of others only
-the type is known, and what their behaviour gives is unknown when the run is replayed.
+A step is one JSON document (docs/step.schema.json), compressed by zlib. Numbers are read back exactly; masks
+are run-length encoded, contours between neighbouring pixels are chain codes. Values of plug-ins are saved if
+they consist of plain values, arrays and visup's own records; of others only the type is recorded, and their
+kind is unknown when the run is replayed.
 
-It is written by hand, over the fields of the records, because pydantic's `TypeAdapter` has no form for
-what JSON lacks (tuples, arrays, read-only mappings) and is no faster: 1.6 to 1.8 microseconds for a
-hypothesis, as here. The form is described once, from the records, in `schema.py`.
+It is hand-written, over the fields of the records, because pydantic's `TypeAdapter` has no form for types
+that JSON lacks (tuples, arrays, read-only mappings) and is no faster: 1.6 to 1.8 microseconds for a
+hypothesis, as here. The format is derived from the records in `schema.py`.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from visup.agent.storage.mask_codec import (
 from visup.agent.storage.text_file import check_room
 
 LARGEST_STEP_BYTES = 256 * 2**20
-"""No step is larger, bytes uncompressed: a damaged file must not fill the memory."""
+"""Largest step, bytes uncompressed: a damaged file must not fill the memory."""
 LARGEST_REPORT_BYTES = 32 * 2**20
-"""Of a step that is too large, reports that take more are left out."""
+"""Reports larger than this are left out of a step that is too large."""
 MOST_BITS = 1024
-"""Whole numbers are no longer: they could not be read back."""
+"""Longest integer, bits: longer ones could not be read back."""
 
-_LEVEL = 1  # of zlib: higher levels save a few per cent and take several times as long
+_LEVEL = 1  # zlib: higher levels save a few per cent and take several times as long
 _PLAIN = frozenset({type(None), bool, float, str})
-"""What is written as it is; so are whole numbers, but for those that could not be read back."""
+"""Types written unchanged; so are integers up to `MOST_BITS`."""
 _LEFT_OUT = (records.Frame, records.Observation, mind.Mind)
 _TYPES: Mapping[str, type] = MappingProxyType(
     {
@@ -63,18 +63,18 @@ _FIELDS = {k: tuple(f.name for f in fields(k)) for k in _TYPES.values() if is_da
 
 
 UNREADABLE = (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError)
-"""What reading a document that is not as it should be raises."""
+"""Exceptions raised by reading an invalid document."""
 
 
 class UnsupportedTypeError(TypeError):
-    """A value is of a type that the codec does not know."""
+    """A value has a type that the codec does not support."""
 
 
 def pack_observation(observation: Observation) -> bytes:
-    """An observation as bytes.
+    """Encode an observation.
 
     Args:
-        observation: What was perceived of one frame; times that behaviours took are left out.
+        observation: The observation of one frame; the run times of behaviours are left out.
 
     Returns:
         A compressed JSON document.
@@ -88,10 +88,10 @@ def pack_observation(observation: Observation) -> bytes:
 
 
 def _checked_text(document: Any) -> bytes:
-    """A document as text that can be read back.
+    """A document as text, checked to be readable.
 
     Raises:
-        ValueError: It could not be.
+        ValueError: It is not.
     """
     text = to_json(document, inf_nan_mode="constants")
     if len(text) > LARGEST_STEP_BYTES:
@@ -101,7 +101,7 @@ def _checked_text(document: Any) -> bytes:
 
 
 def _as_lost(report: dict[str, Any]) -> dict[str, Any]:
-    """A report as it is, or without its percepts where they could not be read back."""
+    """A report unchanged, or without percepts if they could not be read back."""
     try:
         if len(_checked_text(report)) <= LARGEST_REPORT_BYTES:
             return report
@@ -112,7 +112,7 @@ def _as_lost(report: dict[str, Any]) -> dict[str, Any]:
 
 
 def unpack_observation(data: bytes, where: str = "") -> Observation:
-    """The observation that was packed.
+    """Decode an observation.
 
     Raises:
         OutputError: The bytes are damaged.
@@ -133,7 +133,7 @@ def unpack_observation(data: bytes, where: str = "") -> Observation:
 
 
 def to_document(observation: Observation) -> dict[str, Any]:
-    """An observation as JSON values, in the form of docs/step.schema.json."""
+    """An observation as JSON values, in the format of docs/step.schema.json."""
     return {
         "frame_index": observation.frame_index,
         "time": float(observation.time),
@@ -143,7 +143,7 @@ def to_document(observation: Observation) -> dict[str, Any]:
 
 
 def from_document(written: Mapping[str, Any]) -> Observation:
-    """The observation of a document; reports whose values could not be recorded have rested."""
+    """The observation of a document; reports whose values were not recorded count as rested."""
     width, height = written["frame_size"]
     with room():
         reports = tuple(_report_of(r) for r in written["reports"])
@@ -167,7 +167,7 @@ def encode_percept(p: Percept) -> list[Any]:
     """A percept as JSON values.
 
     Raises:
-        UnsupportedTypeError: Its value is, or holds, something that is not known here.
+        UnsupportedTypeError: Its value is, or contains, an unsupported type.
     """
     return [p.kind, encode(p.value), encode(p.time), p.source, encode(p.confidence)]
 
@@ -176,7 +176,7 @@ def decode_percept(written: list[Any]) -> Percept:
     """Decode a percept, without validating it.
 
     Raises:
-        ValueError, TypeError, KeyError: It was not.
+        ValueError, TypeError, KeyError: It is not valid.
     """
     kind, value, time, source, confidence = written
     return Percept(str(kind), decode(value), decode(time), str(source), decode(confidence))
@@ -193,10 +193,10 @@ def _report_of(written: Mapping[str, Any]) -> Report:
 
 
 def encode(value: Any) -> Any:
-    """A value as JSON values; what JSON has no form for is an object with the key '$'.
+    """A value as JSON values; types that JSON lacks become objects with the key '$'.
 
     Raises:
-        NotPlainError: It is, or holds, something that is not known here.
+        UnsupportedTypeError: It is, or contains, an unsupported type.
     """
     kind = type(value)
     if kind in _PLAIN:
@@ -230,10 +230,10 @@ def encode(value: Any) -> Any:
 
 
 def decode(value: Any) -> Any:
-    """The value that was encoded.
+    """Decode a value.
 
     Raises:
-        ValueError, TypeError, KeyError: It was not.
+        ValueError, TypeError, KeyError: It is not valid.
     """
     kind = type(value)
     if kind in _PLAIN or kind is int:
@@ -303,7 +303,7 @@ def _array_of(written: Mapping[str, Any]) -> NDArray[Any]:
     if dtype.kind not in "biufc":
         raise ValueError(f"an array of {dtype}")
     flat = np.frombuffer(base64.b64decode(written["of"]), dtype)
-    # As arrays are made in memory: writable, and of the machine's own byte order.
+    # As newly created arrays: writable, in native byte order.
     return flat.astype(dtype.newbyteorder("=")).reshape([int(n) for n in written["shape"]])
 
 

@@ -1,7 +1,7 @@
-"""Room that a database keeps for itself, so that it can be written to for a while on a full disk.
+"""Reserved space in a database, so that it stays writable for a while on a full disk.
 
-Pages that are free stay in a file of SQLite and are used before it grows; a log that is not cut short is
-written over from its beginning. Both are on the disk already: nobody else can take them.
+Free pages stay in an SQLite file and are used before it grows; a log that is not truncated is overwritten
+from its beginning. Both already occupy the disk, so that no other program can take the space.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TRY_AGAIN = 25
-"""Looks that are left out after one that found no room."""
+"""Calls skipped after one that found no space."""
 
 
 @dataclass(slots=True)
@@ -21,9 +21,9 @@ class PageReserve:
     """Free pages of a database.
 
     Args:
-        size: Bytes that are to be free; less than half of it is filled up again.
-        fill: A statement that takes so many bytes, given their number.
-        clear: The one that gives them back.
+        size: Bytes to keep free; refilled when less than half is left.
+        fill: A statement that occupies a given number of bytes.
+        clear: The statement that frees them.
     """
 
     size: int
@@ -32,7 +32,7 @@ class PageReserve:
     _left_out: int = 0
 
     def keep(self, db: sqlite3.Connection) -> None:
-        """Fill the reserve up when it is time to; where there is no room it is tried again later."""
+        """Refill the reserve if needed; without space it is tried again later."""
         if not self.size or self._left_out > 0:
             self._left_out -= 1
             return
@@ -42,21 +42,21 @@ class PageReserve:
             if 2 * free * page >= self.size:
                 return
             self._left_out = TRY_AGAIN
-            # Two transactions: pages that are taken and given back in one are never written.
+            # Two transactions: pages allocated and freed in one are never written.
             db.execute(self.fill, (self.size - free * page,))
             db.execute(self.clear)
             self._left_out = 0
 
 
 def lengthen(path: Path, size: int) -> None:
-    """Let a file that is written over from its beginning have its full length now.
+    """Extend a file to its full length in advance.
 
     Args:
-        path: It need not exist.
-        size: Bytes; the file is not made shorter.
+        path: The file; it need not exist.
+        size: Bytes; the file is never shortened.
 
     Raises:
-        OSError: There is no room.
+        OSError: There is no space.
     """
     handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
     try:

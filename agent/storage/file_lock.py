@@ -1,7 +1,7 @@
-"""One writer at a time for a file or a run folder, by a lock that is released when its process ends.
+"""Write locks for a file or a run folder, released when their process ends.
 
-The lock is the operating system's, on a hidden file beside what is locked (`.NAME.lock`), which may stay: a
-process that was killed holds nothing. Reading needs no lock.
+They are locks of the operating system on a hidden file next to the locked one (`.NAME.lock`), which may
+remain: a killed process holds nothing. Reading needs no lock.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from filelock import BaseFileLock, FileLock, Timeout
 from visup.agent.model.errors import OutputError
 
 WAIT_S = 60.0
-"""How long a writer waits for another one: replacing a database takes a second or two."""
+"""How long a writer waits for another, seconds: replacing a database takes a second or two."""
 
 
 def acquire_lock(
@@ -24,13 +24,13 @@ def acquire_lock(
     """Acquire the write lock of a file, which the caller must release.
 
     Args:
-        path: What is written; it need not exist.
-        what: Such as 'this run', for the message.
+        path: The file to be written; it need not exist.
+        what: Description for the message, such as 'this run'.
         wait_s: How long to wait for another writer, seconds.
-        again: Whether a thread that holds it may take it once more.
+        again: Whether the lock is re-entrant for its thread.
 
     Raises:
-        OutputError: Another writer holds it, or no lock can be taken there.
+        OutputError: Another writer holds it, or locking is not possible there.
     """
     if not path.parent.is_dir() or not path.name:
         raise _unwritable(path, what, "there is no such folder")
@@ -49,7 +49,7 @@ def acquire_lock(
 
 
 def lock_path(path: Path) -> Path:
-    """The hidden file that carries the lock of a file."""
+    """The lock file of a file."""
     return path.with_name(f".{path.name}.lock")
 
 
@@ -63,7 +63,7 @@ def _unwritable(path: Path, what: str, why: str) -> OutputError:
 
 @contextmanager
 def only_writer(path: Path, what: str) -> Iterator[None]:
-    """Hold the lock of a file while something is changed in it, once others are done; see `acquire_lock`."""
+    """Hold the lock of a file while changing it, after waiting for others; see `acquire_lock`."""
     lock = acquire_lock(path, what, WAIT_S, again=True)
     try:
         yield

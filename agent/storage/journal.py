@@ -1,11 +1,10 @@
-"""The journal: what happened in a run, in SQLite files, written step by step.
+"""The journal: the record of a run in SQLite files, written step by step.
 
-Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step
-up to the last one that was committed, and can be read while the run goes on. What is told must also
-outlast the loss of power: a step with events or alerts is on the disk, with all before it, once it is
-recorded; quiet ones follow with the next. A run of days goes on in
-further files (segments) beside the first one. What was perceived is kept in full, so that a run can be
-reasoned about again without its video. Read next: `journal_reader.py`, which reads all this back.
+Write-ahead logging makes each step atomic: after a crash the journal has every step up to the last committed
+one, and it can be read while the run goes on. Events and alerts must also survive a loss of power: a step
+with any is on disk, with all before it, once it is recorded; others follow with the next. Long runs continue
+in further files (segments). Observations are stored in full, so that the reasoning of a run can be replayed
+without its video. Read next: `journal_reader.py`, which reads journals.
 """
 
 from __future__ import annotations
@@ -62,11 +61,11 @@ class JournalLimits:
     """How a journal is split into segments, and how much of it is retained.
 
     Attributes:
-        segment_bytes: A segment that holds more of steps is followed by a new one.
-        segment_s: So is one that spans more than this, seconds of the source.
-        keep_bytes: When steps of all segments take more, those of the oldest are dropped; their events
+        segment_bytes: Size of the steps of a segment after which a new one begins.
+        segment_s: Duration of a segment after which a new one begins, seconds of the source.
+        keep_bytes: When the steps of all segments exceed this, those of the oldest are dropped; their events
             and alerts stay. None keeps everything.
-        reserve_bytes: Set aside for a full disk, in the file and in its log, until the journal is closed.
+        reserve_bytes: Reserved for a full disk, in the file and in its log, until the journal is closed.
     """
 
     segment_bytes: int = 256 * 2**20
@@ -76,20 +75,20 @@ class JournalLimits:
 
 
 class Journal:
-    """Writes a run as it goes: give its `record` to an agent as an observer, close it at the end.
+    """Writes a run: add its `record` to an agent as an observer, and close it at the end.
 
     Args:
         path: The first file; it must not exist yet, unless `resume`.
-        limits: When to begin a new segment, and what to keep.
-        resume: Go on with the journal of an earlier run.
+        limits: When to begin a new segment, and how much to retain.
+        resume: Whether to continue an existing journal.
 
     Attributes:
         path: As given.
-        last_frame: Number of the last frame that is recorded, or None.
+        last_frame: Number of the last recorded frame, or None.
 
     Raises:
-        OutputError: It cannot be written, another process is writing it, or the one to go on with is
-            of another version.
+        OutputError: It cannot be written, another process is writing it, or the one to continue has another
+            version.
     """
 
     def __init__(
@@ -114,17 +113,17 @@ class Journal:
 
     @property
     def size(self) -> int:
-        """What the steps that are kept take, bytes."""
+        """Size of the retained steps, bytes."""
         return sum(self._sizes)
 
     def note(self, **facts: Any) -> None:
-        """Store facts about the run (settings, source, verdict, ...), replacing older ones, on the disk."""
+        """Store facts about the run (settings, source, verdict, ...) durably, replacing older ones."""
         rows = [(key, _text(to_jsonable(value))) for key, value in facts.items()]
         sql = "INSERT OR REPLACE INTO run VALUES (?, ?)"
         self._write([(sql, row) for row in rows], durable=True)
 
     def record(self, step: Step, frame: Frame | None = None) -> None:
-        """Write one step, wholly or not at all.
+        """Write one step atomically.
 
         Raises:
             OutputError: The disk is full or the file has become unwritable; earlier steps stay.
@@ -151,7 +150,7 @@ class Journal:
         self._reserve.keep(self._db)
 
     def close(self) -> None:
-        """Fold the log into the file and close it."""
+        """Merge the log into the file and close it."""
         try:
             with suppress(
                 sqlite3.Error
@@ -174,12 +173,12 @@ class Journal:
         self._open(self.path, 1)
 
     def _open(self, path: Path, number: int) -> None:
-        if path.is_symlink():  # one that leads nowhere: the file would be made elsewhere
+        if path.is_symlink():  # a dangling link: the file would be created elsewhere
             raise OutputError("the journal would be written elsewhere", where=str(path))
         try:
             self._db = _connected(path, self._limits.reserve_bytes)
             self._durable = False
-            # One transaction: a run killed meanwhile leaves an empty file or a whole journal.
+            # One transaction: a run killed meanwhile leaves an empty file or a complete journal.
             marks = f"PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};"
             self._db.executescript(f"BEGIN;{SCHEMA}{marks}COMMIT;")
             self._reserve.keep(self._db)
@@ -192,7 +191,7 @@ class Journal:
             self.note(segment=number)
 
     def _go_on(self) -> None:
-        # The last one stays open: who closes it takes away the log, and with it the reserve.
+        # The last one stays open: closing it would remove the log, and with it the reserve.
         *earlier, self._db = filter(None, map(self._take_over, segments(self.path)))
         for db in earlier:
             db.close()
@@ -200,7 +199,7 @@ class Journal:
         self._reserve.keep(self._db)
 
     def _take_over(self, path: Path) -> sqlite3.Connection | None:
-        """Count what a segment holds; None when the run was killed before it was begun."""
+        """Open a segment and count its content; None if the run was killed before it was begun."""
         try:
             db = _connected(path, self._limits.reserve_bytes)
             if path != self.path and is_empty(db):
@@ -238,7 +237,7 @@ class Journal:
             raise _unwritable(self.path, fault) from fault
 
     def _make_room(self) -> None:
-        """Drop the steps of the oldest segments beyond what is kept."""
+        """Drop the steps of the oldest segments beyond `keep_bytes`."""
         keep = self._limits.keep_bytes
         for i in range(len(self._sizes) - 1):
             if keep is None or sum(self._sizes) + self._limits.segment_bytes <= keep:
@@ -257,7 +256,7 @@ class Journal:
             if durable != self._durable:
                 self._db.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
                 self._durable = durable
-            if len(statements) == 1:  # is a transaction by itself
+            if len(statements) == 1:  # a transaction by itself
                 self._db.execute(*statements[0])
                 return
             self._db.execute("BEGIN IMMEDIATE")
@@ -276,7 +275,7 @@ def segment_path(path: Path, number: int) -> Path:
 
 
 def segments(path: Path) -> list[Path]:
-    """The files of a journal, in order; the first one is always among them."""
+    """The files of a journal in order, always including the first."""
     found = [path]
     while (following := segment_path(path, len(found) + 1)).is_file():
         found.append(following)
@@ -284,17 +283,17 @@ def segments(path: Path) -> list[Path]:
 
 
 def is_empty(db: sqlite3.Connection) -> bool:
-    """Whether a file is a segment that was not begun."""
+    """Whether a file is an empty segment."""
     return db.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
 
 
 def check_schema(db: sqlite3.Connection, path: Path) -> None:
-    """Refuse a file whose tables are not those of a journal, before anything of them is read.
+    """Refuse a file without exactly the tables of a journal, before reading any of them.
 
-    A view in the place of a table may be a program, and one without an end.
+    A view in place of a table may run an endless query.
 
     Raises:
-        OutputError: They are not.
+        OutputError: It is none.
     """
     db.execute("PRAGMA trusted_schema = OFF")
     if sorted(db.execute(_SCHEMA_OF)) != _expected_schema():
@@ -312,10 +311,10 @@ def _expected_schema() -> list[Any]:
 
 
 def check_version(db: sqlite3.Connection, path: Path) -> None:
-    """Refuse what is not a journal of this version.
+    """Refuse a file that is not a journal of this version.
 
     Raises:
-        OutputError: It is not.
+        OutputError: It is none.
     """
     (application,) = db.execute("PRAGMA application_id").fetchone()
     (version,) = db.execute("PRAGMA user_version").fetchone()
@@ -332,7 +331,7 @@ def check_version(db: sqlite3.Connection, path: Path) -> None:
 
 
 def summary(step: Step) -> dict[str, Any]:
-    """What is believed after a step, in short; all else follows from what was seen (`seen`)."""
+    """A summary of the beliefs after a step; everything else follows from the observation (`seen`)."""
     mind = step.mind
     return {
         "objects": [object_summary(b) for _, b in sorted(mind.objects.items())],
@@ -358,11 +357,11 @@ def _task_line(task: TaskBelief) -> dict[str, Any]:
 
 
 def _connected(path: Path, reserve_bytes: int = 0) -> sqlite3.Connection:
-    # Written by one thread at a time; which one is the caller's business.
+    # Written by one thread at a time, which the caller ensures.
     db = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-    # Steps of a few kilobytes fill large pages better; of a file that there is the size stays.
+    # Large pages suit steps of a few kilobytes; an existing file keeps its page size.
     db.execute(f"PRAGMA page_size={PAGE_BYTES}")
-    if reserve_bytes:  # free pages can be given back, and the log is as long as they are
+    if reserve_bytes:  # free pages can be released, and the log is as long as they are
         db.execute("PRAGMA auto_vacuum=INCREMENTAL")
         db.execute(f"PRAGMA wal_autocheckpoint={reserve_bytes // PAGE_BYTES}")
     db.execute("PRAGMA journal_mode=WAL")
@@ -379,9 +378,9 @@ def _alert_row(a: Alert) -> tuple[Any, ...]:
 
 
 def _text(value: Any) -> str:
-    """Plain values as JSON, the same values as the same text.
+    """Plain values as canonical JSON.
 
-    File names that are not UTF-8 hold what no file can; it stands in the text as escapes.
+    File names that are not UTF-8 contain surrogates, which are written as escapes.
     """
     return _SURROGATE.sub(lambda found: f"\\u{ord(found[0]):04x}", _TEXT.encode(value))
 

@@ -1,4 +1,4 @@
-"""A recorded run, read back: its facts, steps, events and alerts, over all segments of its journal."""
+"""Reads a recorded run: its facts, steps, events and alerts, over all segments of its journal."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from visup.agent.storage.wall_clock import RecordStamp, WallClock
 JOURNAL = "journal.sqlite"
 _LARGEST_ROW = LARGEST_STEP_BYTES
 _LARGEST_RECORD = 16 * 2**20
-"""Characters of a record that is no step."""
+"""Maximum characters of a record other than a step."""
 
 
 def _nearest_run(run: Path) -> str | None:
-    """The hint that names a run beside, where one has nearly that name."""
+    """A hint with a run of a similar name in the same folder, or None."""
     try:
         runs = [p.name for p in run.parent.iterdir() if (p / JOURNAL).is_file()]
     except OSError:
@@ -72,17 +72,17 @@ class Recording:
         return it
 
     def facts(self) -> Mapping[str, Any]:
-        """Facts about the run, as given to `Journal.note`."""
+        """Facts about the run, from `Journal.note`."""
         rows = self._rows("SELECT key, value FROM run")
         return {key: self._loaded(value) for _, (key, value) in rows}
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """Events as lines of `events.jsonl`, in the order in which they happened."""
+        """Events as in `events.jsonl`, in order."""
         rows = self._rows("SELECT record FROM events ORDER BY number")
         return (self._record(record) for _, (record,) in rows)
 
     def answers(self) -> dict[int, dict[int, str]]:
-        """What the operator said: frame index -> object id -> model name."""
+        """The operator's answers: frame index -> object id -> model name."""
         found: dict[int, dict[int, str]] = {}
         for _, (text,) in self._rows("SELECT record FROM events WHERE kind = 'answer'"):
             event = self._record(text)
@@ -94,42 +94,42 @@ class Recording:
         return found
 
     def alerts(self) -> dict[int, dict[str, Any]]:
-        """Alerts by id, as they were last."""
+        """Alerts by id in their last state."""
         rows = self._rows("SELECT record FROM alerts ORDER BY id")
         found = [self._record(record) for _, (record,) in rows]
         return {a["id"]: a for a in found if isinstance(a.get("id"), int)}
 
     def summaries(self, first: int = 0, last: int = 2**63 - 1) -> Iterator[dict[str, Any]]:
-        """What was believed after each step, in short, with frame index and time.
+        """Summaries of the beliefs after each step, with frame index and time.
 
         Args:
-            first: Number of the first frame that is wanted.
-            last: Number of the last one.
+            first: Number of the first frame.
+            last: Number of the last frame.
         """
         sql = "SELECT frame_index, time, summary FROM steps WHERE frame_index BETWEEN ? AND ?"
         rows = self._rows(f"{sql} ORDER BY frame_index", (first, last))
         return ({"frame_index": i, "time": t, **self._record(s)} for _, (i, t, s) in rows)
 
     def observations(self, after: int = -1) -> Iterator[Observation]:
-        """What was perceived, step by step.
+        """The observations, step by step.
 
         Args:
-            after: Only of frames with a higher number.
+            after: Only frames with a higher number.
 
         Raises:
-            OutputError: A step is damaged; those before it were given.
+            OutputError: A step is damaged; those before it were yielded.
         """
         sql = "SELECT frame_index, seen, crc FROM steps WHERE frame_index > ? ORDER BY frame_index"
-        for path, (index, seen, crc) in self._rows(sql, (after,)):
-            yield _perceived(path, index, seen, crc)
+        for path, (index, data, crc) in self._rows(sql, (after,)):
+            yield _observation_of(path, index, data, crc)
 
     def moments(self) -> Iterator[tuple[int, float]]:
-        """Number and time of each frame that was judged, seconds, in their order."""
+        """Number and time (seconds) of each processed frame, in order."""
         rows = self._rows("SELECT frame_index, time FROM steps ORDER BY frame_index")
         return ((int(index), float(time)) for _, (index, time) in rows)
 
     def summary_at(self, frame: int) -> dict[str, Any]:
-        """What was believed after one step, in short.
+        """The summary of the beliefs after one step.
 
         Raises:
             OutputError: There is no such step, or it is damaged.
@@ -140,15 +140,15 @@ class Recording:
         raise self._no_step(frame)
 
     def step_at(self, frame: int) -> tuple[dict[str, Any], Observation]:
-        """What was believed after one step, in short, and what was perceived in it.
+        """The summary of the beliefs after one step, and its observation.
 
         Raises:
             OutputError: There is no such step, or it is damaged.
         """
         sql = "SELECT frame_index, time, summary, seen, crc FROM steps WHERE frame_index = ?"
-        for path, (index, time, text, seen, crc) in self._rows(sql, (frame,)):
+        for path, (index, time, text, data, crc) in self._rows(sql, (frame,)):
             told = {"frame_index": index, "time": time, **self._record(text)}
-            return told, _perceived(path, index, seen, crc)
+            return told, _observation_of(path, index, data, crc)
         raise self._no_step(frame)
 
     def _no_step(self, frame: int) -> OutputError:
@@ -162,17 +162,17 @@ class Recording:
         return stamp
 
     def first_and_last(self) -> tuple[int, int] | None:
-        """Numbers of the first and last frame whose steps are kept, or None when there are none."""
+        """Numbers of the first and last frame with stored steps, or None."""
         rows = self._rows("SELECT min(frame_index), max(frame_index) FROM steps")
         ends = [(a, b) for _, (a, b) in rows if isinstance(a, int) and isinstance(b, int)]
         return (ends[0][0], ends[-1][1]) if ends else None
 
     def count(self) -> int:
-        """How many steps are kept."""
+        """Number of stored steps."""
         return sum(n for _, (n,) in self._rows("SELECT count(*) FROM steps"))
 
     def written(self) -> float:
-        """When it was last written to, seconds since the epoch by the clock of the wall."""
+        """When it was last written to, seconds since the epoch."""
         last = segments(self.path)[-1]
         log = last.with_name(last.name + "-wal")
         return max(p.stat().st_mtime for p in (last, log) if p.exists())
@@ -207,19 +207,19 @@ class Recording:
             raise _damaged(str(self.path), str(fault)) from fault
 
 
-def _perceived(path: Path, index: int, seen: Any, crc: Any) -> Observation:
-    """What was perceived in a step, from its row in the journal."""
+def _observation_of(path: Path, index: int, data: Any, crc: Any) -> Observation:
+    """The observation of a step from its row in the journal."""
     where = f"{path}, frame {index}"
-    if not isinstance(seen, bytes) or zlib.crc32(seen) != crc:
+    if not isinstance(data, bytes) or zlib.crc32(data) != crc:
         raise _damaged(where, "its check sum is wrong")
-    return checked(unpack_observation(seen, where), where)
+    return checked(unpack_observation(data, where), where)
 
 
 def checked(observation: Observation, where: str) -> Observation:
-    """The same observation, once it is known to hold what behaviours may report.
+    """The same observation after validating its percepts.
 
     Raises:
-        OutputError: It does not.
+        OutputError: One is not valid.
     """
     size = observation.frame_size
     try:
@@ -239,13 +239,13 @@ LONGEST_FAULT = 300
 
 
 def is_run(place: str | Path) -> bool:
-    """Whether a path is that of a recorded run: its folder, or its journal."""
+    """Whether a path is a recorded run: its folder, or its journal."""
     path = Path(place)
     return (path / JOURNAL).is_file() or (path.is_file() and path.name == JOURNAL)
 
 
 def export_events(journal: Path, target: Path) -> None:
-    """Write `events.jsonl` from a journal: one event a line, with camera, host and time where they are known.
+    """Write `events.jsonl` from a journal: one event per line, with camera, host and time if known.
 
     Raises:
         OutputError: `target` cannot be written, or `journal` cannot be read.
@@ -266,14 +266,14 @@ def _time_of(event: Mapping[str, Any]) -> float:
 
 
 def event_text(event: Mapping[str, Any]) -> str:
-    """An event as a line of `events.jsonl`, without the end of line."""
+    """An event as a line of `events.jsonl`, without the newline."""
     return json.dumps(event, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
 def opened_readonly(path: Path) -> sqlite3.Connection:
-    """The file, to be read only; also where not even the log beside it may be touched.
+    """Open the file read-only, even where its log must not be touched.
 
-    A reader that is left half way may be closed by whichever thread collects it.
+    An unfinished reader may be closed by the thread that collects it as garbage.
     """
     uri = path.absolute().as_uri()
     db = sqlite3.connect(f"{uri}?mode=ro", uri=True, check_same_thread=False)
@@ -287,7 +287,7 @@ def opened_readonly(path: Path) -> sqlite3.Connection:
 
 
 def _unreadable(path: Path, fault: Exception) -> OutputError:
-    """What is wrong with a journal: that it may not be read is no damage."""
+    """The error for an unreadable journal: missing permission is no damage."""
     try:
         with path.open("rb"):
             pass

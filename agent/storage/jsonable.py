@@ -1,7 +1,7 @@
 """Records as plain JSON values, for the journal and for programs that read visup's output.
 
-By hand: pydantic does not serialise read-only mappings, and does not round numbers, by which equal runs
-give equal bytes.
+Hand-written: pydantic neither serialises read-only mappings nor rounds numbers, which is needed for equal
+runs to give equal bytes.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from visup.agent.model.relation_table import RelationTable
 def to_jsonable(value: Any) -> Any:
     """A record as JSON-like values.
 
-    Images and masks are left out (they are large, and the video has them); numbers are rounded to
-    six digits, so that equal runs give equal bytes.
+    Images and masks are left out (they are large, and the video has them); numbers are rounded to six digits,
+    so that equal runs give equal bytes.
 
     Args:
-        value: A record, or what records are made of.
+        value: A record, or a value of one of its fields.
     """
     kind: Any = type(value)
     if kind is str or kind is int or value is None or kind is bool:
@@ -63,7 +63,7 @@ def to_jsonable(value: Any) -> Any:
 
 @cache
 def _shown(kind: Any) -> tuple[str, ...]:
-    """The fields of a kind of record that are shown."""
+    """The fields of a type of record that are written."""
     hidden = _HIDDEN.get(kind, frozenset())
     return tuple(f.name for f in fields(kind) if f.name not in hidden)
 
@@ -75,7 +75,7 @@ _HIDDEN: Mapping[type, frozenset[str]] = {
 
 
 def _number(x: float) -> float | str:
-    """JSON knows no infinity and no NaN; they are written as words."""
+    """A number; infinity and NaN, which JSON lacks, are written as words."""
     return round(x, 6) if isfinite(x) else str(x)
 
 

@@ -1,7 +1,7 @@
-"""Masks as runs, contours as chain codes, and how much of a document is read: for `codec.py`.
+"""Run-length codes for masks and chain codes for contours, with a limit of their total size; for `codec.py`.
 
-Compiled loops are imported where they are called: a process of an isolated behaviour, which reads and
-writes documents too, starts in half the time without.
+Compiled loops are imported on demand: the process of an isolated behaviour, which also encodes documents,
+starts in half the time without them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MOST_PIXELS = 2**28
-"""No step has masks and contours of more pixels and points together."""
+"""Maximum number of pixels and points of all masks and contours of a step together."""
 
 
 _left: ContextVar[list[int]] = ContextVar("pixels that are left")
@@ -23,7 +23,7 @@ _left: ContextVar[list[int]] = ContextVar("pixels that are left")
 
 @contextmanager
 def room() -> Iterator[None]:
-    """Where masks and contours are read: together they are bounded."""
+    """A context in which the total size of decoded masks and contours is limited."""
     token = _left.set([MOST_PIXELS])
     try:
         yield
@@ -40,7 +40,7 @@ def _take(pixels: int) -> None:
 
 
 def mask_to_runs(mask: NDArray[np.bool_]) -> list[int]:
-    """Lengths of the runs of a mask in reading order, that of False first (0 when there is none)."""
+    """Run lengths of a mask in reading order, beginning with False (0 if there is none)."""
     from visup.agent.storage._codec_jit import run_lengths
 
     lengths: list[int] = run_lengths(np.ascontiguousarray(mask).reshape(-1)).tolist()
@@ -48,10 +48,10 @@ def mask_to_runs(mask: NDArray[np.bool_]) -> list[int]:
 
 
 def runs_to_mask(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """The mask of runs, of shape (height, width).
+    """The mask of run lengths, of shape (height, width).
 
     Raises:
-        ValueError: The runs are not of that many pixels.
+        ValueError: The runs do not sum to that many pixels.
     """
     _take(shape[0] * shape[1])
     counts = np.asarray(lengths, np.int64)
@@ -61,20 +61,20 @@ def runs_to_mask(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_
 
 
 NO_DIGIT = 9
-"""Stands for what is no move of a chain code."""
+"""Marks a step that is no move of a chain code."""
 
 _CHAIN = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
 _CODE = np.full(9, NO_DIGIT, np.uint8)
-"""The character of a move (dx, dy) at 3 (dx + 1) + dy + 1."""
+"""Character of a move (dx, dy) at index 3 (dx + 1) + dy + 1."""
 for _digit, (_dx, _dy) in enumerate(_CHAIN):
     _CODE[3 * (_dx + 1) + _dy + 1] = ord("0") + _digit
 
 
 def contour_to_chain(contour: NDArray[np.float32]) -> dict[str, Any] | None:
-    """A contour that goes from pixel to neighbouring pixel as a chain code (Freeman, 1961).
+    """A contour between neighbouring pixels as a chain code (Freeman, 1961).
 
-    Digits are directions in steps of 45 degrees, 0 to the right, 2 down. None where it is another
-    contour, which is kept as an array.
+    Digits are directions in steps of 45 degrees, 0 to the right, 2 down. None for any other contour, which is
+    stored as an array.
     """
     points = np.asarray(contour)
     if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 2 or not len(points):
@@ -92,7 +92,7 @@ def chain_to_contour(written: Mapping[str, Any]) -> NDArray[np.float32]:
     """The contour of a chain code, (N, 2) pixels.
 
     Raises:
-        ValueError: It is none, or there is no room.
+        ValueError: It is not valid, or exceeds the limit.
     """
     digits = np.frombuffer(written["of"].encode(), np.uint8) - ord("0")
     if len(digits) and digits.max() > 7:

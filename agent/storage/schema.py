@@ -1,6 +1,6 @@
-"""The form of a recorded step, for programs that read journals without visup (docs/step.schema.json).
+"""The JSON Schema of a recorded step, for programs that read journals without visup (docs/step.schema.json).
 
-What records hold is taken from the records themselves; what the codec writes otherwise stands here.
+Fields of records are derived from the records; only what the codec encodes differently is defined here.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 from visup.agent.model.records import CameraMotion, Depth, Health, Hypothesis, Region, ReportState
 
 VERSION = 1
-"""Of the form; that of the journal that holds it is `visup.agent.storage.journal.VERSION`."""
+"""Version of this schema; that of the journal is `visup.agent.storage.journal.VERSION`."""
 
 Number = Annotated[float, Field(description="A number; Infinity and NaN are written so.")]
 
@@ -64,7 +64,7 @@ class Chain(_Strict):
 
 
 def _plain(hint: Any) -> Any:
-    """What a field of a record becomes in a document."""
+    """The type in a document of a field of a record."""
     if hint is float:
         return Number
     if isinstance(hint, UnionType):
@@ -93,7 +93,7 @@ def _tagged(kind: type, says: str, **fields: Any) -> Any:
 
 
 def _record(kind: type, says: str, **written: Any) -> Any:
-    """The form of a record: its fields, in their order, but for those that are written otherwise."""
+    """The schema of a record: its fields in order, with replacements for those encoded differently."""
     hints = get_type_hints(kind, localns={"np": np, "NDArray": NDArray})
     fields = {
         f.name: (written.get(f.name) or _plain(hints[f.name]), ...) for f in dataclass_fields(kind)
@@ -127,8 +127,8 @@ if TYPE_CHECKING:
     Value = Any
 else:
     Value = reduce(or_, (*RECORDS, Tuple, ArrayValue, Any))
-"""Whatever a behaviour reports. Plug-ins' values are JSON values, with objects that have the key '$' for
-tuples, arrays, bytes, sets, mappings with other keys than words, and visup's records by their name."""
+"""The value of a percept. Values of plug-ins are JSON values, with objects that have the key '$' for tuples,
+arrays, bytes, sets, mappings whose keys are not strings, and visup's records by name."""
 
 
 class ReportDocument(_Strict):

@@ -1,7 +1,7 @@
-"""Seals: by which visup knows a file as one that the same user's visup wrote.
+"""Seals (message authentication codes) that identify files written by the same user's visup.
 
-What a sealed file holds need not be checked as a stranger's would be. The key is a secret of the user, made
-when it is first needed, and kept outside of all run folders: whoever gives away a run gives no key with it.
+A sealed file need not be checked like a stranger's. The key is a secret of the user, created when first
+needed and stored outside all run folders, so that sharing a run does not share the key.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from pathlib import Path
 from visup.agent.storage.text_file import read_bounded
 
 KEY_FILE = "VISUP_STATE_KEY"
-"""Variable of the environment that names another file of the key, for users who may not write at home."""
+"""Environment variable with another path of the key, for users without a writable home."""
 KEY_BYTES = 32
 SEALED = b"VISUPSTS"
 _SEAL_BYTES = 32
 
 
 class SealError(ValueError):
-    """A file bears no seal of this user, or there can be none."""
+    """A file has no seal of this user, or sealing is not possible."""
 
 
 def key_path() -> Path:
@@ -33,10 +33,10 @@ def key_path() -> Path:
 
 
 def own_key() -> bytes:
-    """The key of this user; made where there is none.
+    """The key of this user; created if missing.
 
     Raises:
-        SealError: None can be kept.
+        SealError: It cannot be stored.
     """
     try:
         return _read()
@@ -49,12 +49,12 @@ def own_key() -> bytes:
         draft.touch(mode=0o600, exist_ok=False)
         try:
             draft.write_bytes(secrets.token_bytes(KEY_BYTES))
-            os.link(draft, path)  # of several that begin at once one is first
+            os.link(draft, path)  # atomic: of several processes one wins
         except FileExistsError:
             pass
         finally:
             draft.unlink()
-    except (OSError, RuntimeError) as fault:  # of a home that nobody knows
+    except (OSError, RuntimeError) as fault:  # RuntimeError: unknown home folder
         why = fault.strerror if isinstance(fault, OSError) else fault
         raise SealError(
             f"no key can be kept at {path}: {why}; {KEY_FILE} names another file"
@@ -63,7 +63,7 @@ def own_key() -> bytes:
 
 
 def seal(data: bytes, key: bytes) -> bytes:
-    """Bytes with a seal before them."""
+    """Bytes with a seal prepended."""
     return SEALED + hmac.digest(key, data, "sha256") + data
 
 
@@ -71,7 +71,7 @@ def unsealed(data: bytes) -> bytes:
     """The bytes after the seal.
 
     Raises:
-        SealError: They bear none, or that of somebody else.
+        SealError: They have none, or another user's.
     """
     at = len(SEALED) + _SEAL_BYTES
     body = data[at:]
@@ -82,7 +82,7 @@ def unsealed(data: bytes) -> bytes:
 
 
 def _read() -> bytes:
-    """The key that there is."""
+    """The existing key."""
     try:
         key = read_bounded(key_path(), KEY_BYTES)
     except (OSError, RuntimeError) as fault:

@@ -1,4 +1,4 @@
-"""Text files that others wrote, read within bounds: regular files of a limited size, in UTF-8."""
+"""Reads untrusted text files within bounds: regular files of limited size in UTF-8."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import IO
 
 PIECE_BYTES = 2**20
 LARGEST_TEXT_BYTES = 2**20
-"""No task, rules, zones or settings are larger; the largest that ship take a hundredth of it."""
+"""Maximum size of tasks, rules, zones and settings; the largest shipped ones have a hundredth of it."""
 
 
 def read_text_file(path: Path, most: int = LARGEST_TEXT_BYTES) -> str:
-    """The text of a file; a mark of the byte order at its beginning is no part of it.
+    """The text of a file without a byte order mark.
 
     Raises:
         OSError: It cannot be read, is a device or a pipe, or is larger than that.
@@ -24,14 +24,14 @@ def read_text_file(path: Path, most: int = LARGEST_TEXT_BYTES) -> str:
 
 
 def read_bounded(path: Path, most: int) -> bytes:
-    """The bytes of a regular file that is no larger than that.
+    """The bytes of a regular file of limited size.
 
     Raises:
         OSError: It cannot be read, is a device or a pipe, or is larger.
     """
-    # What is no file may never come to an end, or to a beginning.
+    # Opening or reading a device or pipe may block forever.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    with open(handle, "rb") as file:  # noqa: PTH123  # of a descriptor
+    with open(handle, "rb") as file:  # noqa: PTH123  # opens a descriptor
         facts = os.fstat(handle)
         if not stat.S_ISREG(facts.st_mode):
             raise OSError(EINVAL, "it is not a file", str(path))
@@ -42,28 +42,29 @@ def read_bounded(path: Path, most: int) -> bytes:
 
 
 def _read_at_most(file: IO[bytes], most: int) -> bytes:
-    """So many bytes or fewer; memory is taken for what is there, not for what may be asked for."""
-    pieces, left = [], most
-    while left and (piece := file.read(min(left, PIECE_BYTES))):
+    """At most a number of bytes; memory is allocated for the actual content, not for the limit."""
+    pieces, remaining = [], most
+    while remaining and (piece := file.read(min(remaining, PIECE_BYTES))):
         pieces.append(piece)
-        left -= len(piece)
+        remaining -= len(piece)
     return b"".join(pieces)
 
 
 MOST_VALUES = 4_000_000
-"""No document holds more values: an empty list takes two bytes of text, and thirty times that in memory."""
+"""Maximum number of values in a document: an empty list takes 2 bytes of text and thirty times that in
+memory."""
 
 
 def check_room(text: bytes, most: int = MOST_VALUES, marks: bytes = b",[{") -> None:
-    """Refuse a document that would take far more memory than its text does.
+    """Refuse a document that would need far more memory than its text.
 
     Args:
-        text: The document: JSON, unless `marks` are others.
-        most: How many values it may hold.
-        marks: Characters of which each begins a value.
+        text: The document; JSON with the default `marks`.
+        most: Maximum number of values.
+        marks: Characters that each begin a value.
 
     Raises:
-        ValueError: It holds more.
+        ValueError: It has more.
     """
     if sum(text.count(mark) for mark in marks) > most:
         raise ValueError(f"it holds more than {most} values")

@@ -1,8 +1,8 @@
-"""When things were by the clock on the wall, beside the seconds of the source: UTC, with its zone.
+"""Wall-clock times (UTC) of a run, in addition to the seconds of its source.
 
-A run is reasoned about in seconds of its source, so that equal frames give equal events. Of a camera it is
-known besides when each frame came. That is kept as anchors: at this second of the source it was that time.
-One is enough while both clocks agree; there are more where a run was resumed, or the wall's clock was set.
+Reasoning uses seconds of the source, so that equal frames give equal events. For a camera the arrival time of
+frames is known, too. It is stored as anchors: pairs of source time and wall-clock time. One is enough while
+both clocks agree; more are added when a run is resumed or the wall clock is set.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 
 TOLERANCE_S = 1.0
-"""So far the two clocks may differ: records say when a thing was, not how long it took."""
+"""Tolerated difference of the clocks, seconds: records say when something happened, not how long it took."""
 
 MOST_ANCHORS = 10_000
 LATEST = 253402300799.0
-"""The end of the year 9999: what is told of later times makes no sense."""
+"""The end of the year 9999; later times are not valid."""
 
 
 @dataclass(frozen=True, slots=True)
 class WallClock:
-    """Times of the source as times of the wall.
+    """Converts source times to wall-clock times.
 
     Attributes:
-        anchors: Pairs of seconds of the source and seconds since 1970 in UTC; the first ones ascend.
+        anchors: Pairs of source seconds and seconds since 1970 in UTC, ascending by source seconds.
     """
 
     anchors: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def read(cls, told: object) -> WallClock:
-        """The clock of a recorded run; one without anchors where there is none that makes sense."""
+        """The clock of a recorded run; without anchors if there is no valid one."""
         pairs = told if isinstance(told, list | tuple) else ()
         anchors = tuple(
             (float(pair[0]), float(pair[1]))
@@ -51,7 +51,7 @@ class WallClock:
         return cls(anchors if ascends else ())
 
     def seconds(self, time_s: float) -> float | None:
-        """Seconds since 1970 at a time of the source, or None if unknown.
+        """Seconds since 1970 at a source time, or None if unknown.
 
         >>> WallClock(((0.0, 1000.0), (60.0, 5000.0))).seconds(61.5)
         5001.5
@@ -72,10 +72,10 @@ class WallClock:
         return None if seconds is None else utc_text(seconds)
 
     def anchored(self, time_s: float, wall_s: float) -> WallClock:
-        """This clock where it agrees with what is now, else one with a further anchor.
+        """This clock if it agrees with the given times, else one with a further anchor.
 
         Args:
-            time_s: Seconds of the source, no earlier than that of the last anchor.
+            time_s: Source seconds, not before the last anchor.
             wall_s: Seconds since 1970.
         """
         known = self.seconds(time_s)
@@ -90,7 +90,7 @@ def _is_time(value: object) -> bool:
 
 
 def utc_text(seconds: float) -> str:
-    """Seconds since 1970 as a text that sorts, to the millisecond, with its zone.
+    """Seconds since 1970 as a sortable text with milliseconds and time zone.
 
     >>> utc_text(1795455235.0181)
     '2026-11-23T17:33:55.018Z'
@@ -102,18 +102,18 @@ def utc_text(seconds: float) -> str:
 class RecordStamp:
     """The fields common to all records: camera, host, and wall-clock time.
 
-    An observer of the steps of a camera; other sources tell no time of the wall.
+    An observer of the steps of a camera; other sources have no wall-clock time.
 
     Args:
-        camera: Its name; None to leave camera and host out.
-        clock: As far as it is known from an earlier part of the run.
-        live: Whether it is a camera that is watched, so that what is said without a time is said now.
+        camera: Its name; None to leave out camera and host.
+        clock: Clock of the earlier part of the run.
+        live: Whether the source is a live camera, so that records without a time are of now.
         now: Seconds since 1970.
 
     Attributes:
-        clock: As far as it is known now.
-        lag: How long ago it was what a time of the source shows, seconds.
-        changed: Told of each further anchor.
+        clock: The present clock.
+        lag: Age of a source time, seconds.
+        changed: Receives each further anchor.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class RecordStamp:
         """The keys of a record.
 
         Args:
-            time_s: When it was, seconds of the source; None for now.
+            time_s: Source seconds; None for now.
         """
         now = utc_text(self._now()) if self._live else None
         at = now if time_s is None else self.clock.text(time_s)
