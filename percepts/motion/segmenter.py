@@ -8,7 +8,7 @@ best, and the resulting outlines decide which constraints a layer may use in the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from functools import partial
 from typing import Any, TypeVar
 
@@ -18,6 +18,7 @@ import numpy as np
 from visup.agent import Directive, Frame, Region
 from visup.agent.contract.saving import saved_attributes
 from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.executors import second_core
 from visup.percepts.motion.features.motion_constraints import (
     Constraints,
     Points,
@@ -112,7 +113,7 @@ class MotionSegmenter:
     ) -> None:
         self.settings = settings or MotionSettings()
         # Cells and points are independent: one core each, with the same results.
-        self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
+        self._beside = second_core()
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
         self._model = model or _model(self.settings)
