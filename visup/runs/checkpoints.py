@@ -1,4 +1,4 @@
-"""The checkpoint beside the journal of a run, from which a killed run resumes within seconds."""
+"""Checkpoints next to the journal, from which a killed run resumes within seconds."""
 
 from __future__ import annotations
 
@@ -23,24 +23,25 @@ from visup.version import __version__
 CHECKPOINT = "state.bin"
 LARGEST_STATE_BYTES = 2**30
 HELD_IN = ("visup.runs.wiring", "visup.report.collector")
-"""Classes of these, and of all that they use, may be in a state; reading one makes only what is loaded."""
+"""Modules whose classes, with those they import, may be in a state; reading instantiates only loaded
+classes."""
 PACKED = b"VISUPSTZ"
-"""Before a state that is compressed."""
+"""Prefix of a compressed state."""
 BYTES_AN_HOUR = 160e6
 BYTES_AT_ONCE = 40e6
-"""What states may write in an hour of the source, and what they may save up of it: at most 200 MB in any
-hour. Between two states nearly all of what behaviours hold has changed, so that differences would be no
-smaller; compressed they take an eighth. A state that is large is kept more seldom."""
+"""Write budget of states per hour of the source, and its burst size: at most 200 MB in any hour. Between two
+states nearly all data of behaviours change, so that differences would be no smaller; compressed, a state has
+an eighth of its size. Large states are saved less often."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
-    """A run after one of its steps.
+    """The state of a run after a step.
 
     Attributes:
         frame_index: Number of the step's frame.
-        agent: For `Agent.load`.
-        kept: What the recorder remembers.
+        agent: State for `Agent.load`.
+        kept: State of the recorder.
     """
 
     frame_index: int
@@ -49,20 +50,20 @@ class Checkpoint:
 
 
 class CheckpointWriter:
-    """Keeps the latest state in a file, which is replaced as a whole; the disk is waited for elsewhere.
+    """Saves the latest state to a file, replaced atomically in a separate thread.
 
     Args:
         folder: The run folder.
-        every_s: Seconds of the source between two states; 0 keeps none.
+        every_s: Seconds of the source between two states; 0 saves none.
 
     Attributes:
-        note: Why none can be kept, or None.
+        note: Why no state can be saved, or None.
         largest: Size of the largest state so far, bytes in memory.
-        written: Bytes that were written so far.
+        written: Bytes written so far.
     """
 
     def __init__(self, folder: Path, every_s: float) -> None:
-        self.note, self._key = _key_to_seal_with() if every_s else (None, b"")
+        self.note, self._key = _sealing_key() if every_s else (None, b"")
         self.largest = 0
         self.written = 0
         self._path = folder / CHECKPOINT
@@ -75,12 +76,12 @@ class CheckpointWriter:
         self._size = 0.0
 
     def offer(self, agent: Agent, step: Step, kept: Callable[[], Mapping[str, Any] | None]) -> None:
-        """Keep the state after a step when it is time to.
+        """Save the state after a step if it is due.
 
         Args:
-            agent: After the step.
-            step: The step, which the journal holds already.
-            kept: Tells what the recorder remembers; None when no state can be kept now.
+            agent: The agent after the step.
+            step: The step, already in the journal.
+            kept: Gives the state of the recorder; None if no state can be saved now.
         """
         self._last = step.time if self._last is None else self._last
         if self._seen is not None:
@@ -97,16 +98,16 @@ class CheckpointWriter:
         remembered = kept()
         data = None if remembered is None else self._data(agent, step, remembered)
         if data is not None:
-            with suppress(RuntimeError):  # no room for a thread
+            with suppress(RuntimeError):  # no memory for a thread
                 self._writing = self._disk.submit(self._write, data)
 
     def keep(self, agent: Agent, step: Step, kept: Mapping[str, Any] | None) -> None:
-        """Keep the state after a step at once, and wait until it is on the disk.
+        """Save the state after a step at once, and wait until it is on disk.
 
         Args:
-            agent: After the step.
-            step: The step, which the journal holds already.
-            kept: What the recorder remembers; None when no state can be kept now.
+            agent: The agent after the step.
+            step: The step, already in the journal.
+            kept: State of the recorder; None if no state can be saved now.
         """
         if not self._every_s or self.note or kept is None:
             return
@@ -116,20 +117,20 @@ class CheckpointWriter:
             self._disk.submit(self._write, data).result()
 
     def _data(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> bytes | None:
-        """The state as it is written, or None where there can be none."""
+        """The serialised state, or None if it cannot be saved."""
         try:
             data = self._frozen(agent, step, kept)
         except StateError as fault:
-            self.note = _none_kept(fault)
+            self.note = _not_saved_note(fault)
             return None
         except MemoryError:
-            return None  # no room for a copy: the older state stays, supervision goes on
+            return None  # no memory for a copy: the older state stays, supervision goes on
         self.largest = max(self.largest, len(data))
         return data
 
     def _write(self, data: bytes) -> None:
         packed = seal(PACKED + zlib.compress(data, 1), self._key)
-        # Where it cannot be written the older state stays; the disk's trouble is told of the journal.
+        # On failure the older state stays; disk faults are reported for the journal.
         with suppress(OSError):
             write_whole(self._path, packed)
         self.written += len(packed)
@@ -154,23 +155,23 @@ class CheckpointWriter:
         )
 
 
-def _key_to_seal_with() -> tuple[str | None, bytes]:
-    """Why no state can be kept, or None; and the key."""
+def _sealing_key() -> tuple[str | None, bytes]:
+    """Why no state can be saved, or None; and the key."""
     try:
         return None, own_key()
     except SealError as fault:
-        return _none_kept(fault), b""
+        return _not_saved_note(fault), b""
 
 
-def _none_kept(fault: Exception) -> str:
+def _not_saved_note(fault: Exception) -> str:
     return f"no checkpoint of this run is kept ({fault}): resuming it perceives all frames again"
 
 
 def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
-    """The state in a run folder, if this user's visup wrote it: what it holds is taken up as it is.
+    """The state in a run folder, if this user's visup wrote it, since its content is trusted.
 
     Returns:
-        It, or None when there is none that can be used, and then why, when there is one.
+        The state, or None if there is no usable one; and why an existing state is not usable.
     """
     for name in HELD_IN:
         import_module(name)
@@ -187,10 +188,10 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """A state as it was before it was compressed.
+    """The decompressed state.
 
     Raises:
-        ValueError: It is damaged, or larger than a state may be.
+        ValueError: It is damaged or too large.
     """
     if not data.startswith(PACKED):
         return data

@@ -1,4 +1,4 @@
-"""What `visup demo` runs: the clip, database and task that ship with the package."""
+"""The content of `visup demo`: the clip, database and task that ship with the package."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def demo_settings(every: int = 2) -> WatchSettings:
     )
 
 
-def free_folder(wanted: Path) -> Path:
-    """`wanted`, or the same with the next free number: an earlier run is never overwritten."""
-    if not wanted.exists():
-        return wanted
-    return next(p for n in range(2, 10**6) if not (p := Path(f"{wanted}-{n}")).exists())
+def free_folder(preferred: Path) -> Path:
+    """`preferred`, numbered if it exists: an earlier run is never overwritten."""
+    if not preferred.exists():
+        return preferred
+    return next(p for n in range(2, 10**6) if not (p := Path(f"{preferred}-{n}")).exists())

@@ -14,7 +14,7 @@ from visup.tasks.learning.traces import RunTrace, trace_of
 
 
 def run_minds(run: Path) -> tuple[Mind, ...]:
-    """What was believed in a recorded run, moment by moment.
+    """The minds of a recorded run, moment by moment.
 
     Args:
         run: A run folder of `visup watch`, or its journal.
@@ -29,17 +29,17 @@ def run_minds(run: Path) -> tuple[Mind, ...]:
 
 
 def run_trace(run: Path) -> RunTrace:
-    """The happenings of a recorded run; raises as of `run_minds`."""
+    """The trace of a recorded run; raises like `run_minds`."""
     return trace_of(run.name if run.is_dir() else run.parent.name, run_minds(run))
 
 
 def run_judged(task: Task, run: Path) -> JudgedRun:
-    """A task on a recorded run; raises as of `run_minds`."""
+    """A task evaluated on a recorded run; raises like `run_minds`."""
     return judged(task, run_minds(run))
 
 
 def declared_actors(run: Path) -> dict[str, Actor]:
-    """Actors as the tasks of a run declare them, by name; none of a run without a task."""
+    """The actors declared by the tasks of a run, by name; none without a task."""
     settings = settings_for(Recording.open(run))
     tasks = [t for name in settings.tasks for t in load_tasks(name)]
     return {a.name: a for t in tasks for a in t.actors}

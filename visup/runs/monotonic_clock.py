@@ -12,12 +12,12 @@ NAME = "clock"
 
 
 class MonotonicFrames:
-    """Frames whose times always grow; those that do not are put one frame after the one before.
+    """Frames with strictly increasing times; others are moved to one frame period after the previous one.
 
     Args:
-        frames: A source, or frames of any other origin.
-        fps: Its frame rate.
-        after: Time of the frame before the first one, seconds; None when there was none.
+        frames: A source, or any other frames.
+        fps: Frame rate.
+        after: Time of the frame before the first, seconds; None if there was none.
     """
 
     def __init__(self, frames: Iterable[Frame], fps: float, after: float | None = None) -> None:
@@ -25,7 +25,7 @@ class MonotonicFrames:
         self._pause = 1.0 / fps
         self._last = after
         self._shift = 0.0
-        self._said: str | None = None
+        self._reported: str | None = None
 
     def __iter__(self) -> Iterator[Frame]:
         return self
@@ -35,15 +35,15 @@ class MonotonicFrames:
         time = frame.time + self._shift
         if not math.isfinite(time) or (self._last is not None and time <= self._last):
             begin = 0.0 if self._last is None else self._last + self._pause
-            self._said = f"The clock of the source jumped from {self._last} s to {time} s."
-            # A clock that was set stays so: later frames keep their distance to this one.
+            self._reported = f"The clock of the source jumped from {self._last} s to {time} s."
+            # A clock that was set stays so: later frames keep their time difference to this one.
             self._shift += begin - time if math.isfinite(time) else 0.0
             time = begin
         self._last = time
         return frame if time == frame.time else Frame(frame.index, time, frame.image)
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """Once after a jump: that there was one."""
-        said, self._said = self._said, None
+        """One fault after each jump of the clock."""
+        said, self._reported = self._reported, None
         if said:
             yield AlertCondition(CLOCK_JUMPED, (), Severity.WARNING, said, key=NAME, needs=())

@@ -1,7 +1,6 @@
-"""The operator of a run, who identifies objects in advance, from a file, or on the terminal.
+"""The operator of a run, who identifies objects in advance, in a file, or on the terminal.
 
-Nothing waits for an answer: lines are read in a thread of their own, and what was typed by the end of
-a step is taken up then.
+The run never waits for an answer: a separate thread reads lines, which are processed after each step.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from visup.agent.model.step import Observer, Step
 from visup.agent.storage.text_file import read_text_file
 
 MOST_DIGITS = 18
-"""Of the number of an object."""
+"""Maximum number of digits of an object id."""
 
 
 def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, str]:
-    """Answers from `ID=NAME`; empty lines and what follows a `#` are left out.
+    """Parse answers `ID=NAME`; empty lines and comments after `#` are skipped.
 
     >>> parse_answers(["2=arm", "", "1 = satellite  # the big one"])
     {2: 'arm', 1: 'satellite'}
@@ -35,7 +34,7 @@ def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, s
         where: Name of the file, for errors.
 
     Raises:
-        SettingsError: One is not of that form.
+        SettingsError: A line is malformed.
     """
     answers = {}
     for line in lines:
@@ -66,7 +65,7 @@ def read_answers(path: Path) -> dict[int, str]:
 
 
 def typed_lines() -> Callable[[], list[str]] | None:
-    """What is typed on the terminal, without waiting for it; None where there is no terminal."""
+    """A non-blocking reader of lines typed on the terminal; None without a terminal."""
     if not sys.stdin.isatty():
         return None
     typed: SimpleQueue[str] = SimpleQueue()
@@ -90,12 +89,12 @@ def _taken(queue: SimpleQueue[str]) -> list[str]:
 
 @dataclass(slots=True)
 class HumanOperator:
-    """Hands answers to an agent.
+    """Passes answers to an agent.
 
     Attributes:
-        answers: Given beforehand: object id -> name; each waits until its object is known.
-        typed: Gives the lines that were typed since it was last asked, or None.
-        tell: Told what was wrong with a typed line, and how to answer a question.
+        answers: Answers given in advance: object id -> name; each waits until its object is known.
+        typed: Gives the lines typed since the last call, or None.
+        tell: Receives errors of typed lines, and how to answer a question.
     """
 
     answers: dict[int, str] = field(default_factory=dict)
@@ -103,15 +102,15 @@ class HumanOperator:
     tell: Callable[[str], None] = print
 
     def attend(self, agent: Agent, *, at_once: bool = False) -> Observer:
-        """An observer that hands answers to an agent after each step.
+        """An observer that passes answers to an agent after each step.
 
         Args:
             agent: The agent.
-            at_once: Whether to hand over now what its mind is ready for; a run that was killed may
-                have been killed before it was.
+            at_once: Whether to pass on answers about known objects immediately, since a killed run may not
+                have done so.
 
         Raises:
-            SettingsError: An answer that was given beforehand names what nobody knows.
+            SettingsError: An answer given in advance has an unknown name.
         """
         for name in self.answers.values():
             resolve_model(agent.mind, name, agent.models, cast=agent.cast)
@@ -138,9 +137,9 @@ class HumanOperator:
         return after
 
     def _take(self, agent: Agent, line: str, now: float) -> None:
-        """A typed line: ID=NAME, or a name alone while one question waits.
+        """Process a typed line: ID=NAME, or a name alone while one question is open.
 
-        A name that was typed before the question could be read is no answer to it.
+        A name typed before the question could be read is no answer to it.
         """
         waiting = [q for q in agent.mind.questions if q.asked < now]
         if "=" not in line and line.strip() and len(waiting) == 1:

@@ -1,7 +1,7 @@
-"""Writes the run folder: the journal as the run goes, what is derived from it at the end.
+"""Writes the run folder: the journal during the run, and derived files at the end.
 
-A journal that cannot be written any more (a full disk, a folder that was taken away) does not stop the
-supervision: what is to be written waits in memory, the trouble is told as an alert, and it is tried again.
+A journal that cannot be written (full disk, removed folder) does not stop the supervision: steps wait in
+memory, an alert reports the fault, and writing is retried.
 """
 
 from __future__ import annotations
@@ -34,31 +34,31 @@ if TYPE_CHECKING:
     from visup.runs.result import RunResult
 
 MOST_WAITING = 1000
-"""Steps that wait while the journal cannot be written; beyond, the oldest are lost."""
+"""Steps that wait while the journal cannot be written; beyond this number the oldest are lost."""
 
 TRY_AGAIN = 25
-"""Steps between two attempts to write again."""
+"""Steps between two retries."""
 
 
 class Recorder:
     """Writes the journal, the annotated video and the report of a run; an observer.
 
     Args:
-        settings: Of the run.
-        source: What is watched.
-        folder: A folder from `fresh_folder`, or that of the run that goes on.
-        options: What is written.
-        resume: Whether the run goes on.
+        settings: Settings of the run.
+        source: The source.
+        folder: A folder from `fresh_folder`, or that of the run to resume.
+        options: What to write.
+        resume: Whether a run is resumed.
 
     Attributes:
         folder: As given.
         journal: The journal.
-        facts: What was noted about the run.
-        notes: What the user should know.
-        complete: Whether all that was to be written so far was written, but for the annotated video.
+        facts: Facts about the run.
+        notes: Notes for the user.
+        complete: Whether everything so far was written, apart from the annotated video.
 
     Raises:
-        OutputError: The journal cannot be begun.
+        OutputError: The journal cannot be created.
     """
 
     def __init__(
@@ -108,16 +108,16 @@ class Recorder:
 
     @property
     def behind(self) -> bool:
-        """Whether steps wait to be written."""
+        """Whether steps are waiting to be written."""
         return bool(self._waiting)
 
     def keep_clock(self, clock: WallClock) -> None:
-        """Note when it was by the clock of the wall, with the next step."""
+        """Record the wall clock with the next step."""
         self._clock = self._wall = clock
         self.facts["began"] = clock.text(0.0)
 
     def begin_anew(self) -> None:
-        """Forget what was gathered for the report: all of it comes again."""
+        """Clear the data for the report, since all steps will be processed again."""
         from visup.report.collector import Collector
 
         self.collector = Collector()
@@ -125,11 +125,11 @@ class Recorder:
             self._derived["report"] = self.collector.add
 
     def catch_up(self, step: Step, frame: Frame) -> None:
-        """Take note of a step that the journal holds already."""
+        """Process a step that is already in the journal."""
         self._derive(step, frame, ["report"])
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """What is wrong with recording now."""
+        """Present faults of recording."""
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
             yield AlertCondition(
@@ -142,7 +142,7 @@ class Recorder:
             )
 
     def close(self) -> None:
-        """Close the journal, whatever came of the run."""
+        """Close the journal."""
         try:
             self.journal.close()
         except OutputError as fault:
@@ -151,10 +151,10 @@ class Recorder:
     def finish(
         self, result: RunResult, ended: str, tasks: Sequence[TaskBelief]
     ) -> tuple[Path | None, tuple[str, ...]]:
-        """Everything that is made once the last frame was seen.
+        """Write the derived files after the last frame.
 
         Returns:
-            The report, or None, and what the user should know.
+            The report, or None, and notes for the user.
         """
         if self.video:
             self.video.close()
@@ -171,10 +171,10 @@ class Recorder:
             )
             export_events(self.folder / JOURNAL, self.folder / "events.jsonl")
             report = self._report(result)
-            # Last of all: a run that was killed before can be gone on with.
+            # Last, so that a run killed before can be resumed.
             self.journal.note(ended=ended)
         except OutputError as fault:
-            # The verdict must reach the user even when there is no room to write it down.
+            # The verdict must reach the user even on a full disk.
             self.notes = (*self.notes, str(fault))
             self.complete = False
         return report, self.notes
@@ -198,7 +198,7 @@ class Recorder:
                 if name in self._derived:
                     self._derived[name](step, frame)
             except Exception as fault:
-                # What is derived may be lost; supervision and the journal go on.
+                # Derived files may be lost; supervision and the journal go on.
                 del self._derived[name]
                 self.complete &= name != "report"
                 said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
@@ -218,7 +218,7 @@ class Recorder:
         except OutputError:
             raise
         except Exception as fault:
-            # The run itself is recorded already; a report that cannot be made must not hide it.
+            # The run itself is recorded; a failing report must not hide that.
             self.complete = False
             self.notes = (f"the report was not made: {type(fault).__name__}: {fault}",)
             return None
@@ -239,7 +239,7 @@ class Recorder:
 
 
 def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
-    """What is noted of a run when it begins."""
+    """The facts recorded at the beginning of a run."""
     left_out = {SOURCE_REDACTED: True} if has_secret(settings.source) else {}
     return {
         "visup": __version__,
@@ -253,10 +253,10 @@ def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
 
 
 def recorder_state(recorder: Recorder | None) -> Mapping[str, Any] | None:
-    """What a recorder remembers besides the journal, for the state of a run.
+    """The state of a recorder for a checkpoint.
 
     Returns:
-        None as long as steps wait: a state of a step that the journal has not is of no use.
+        None while steps are waiting: a state after a step that is not in the journal is useless.
     """
     if recorder is None:
         return {}
@@ -264,7 +264,7 @@ def recorder_state(recorder: Recorder | None) -> Mapping[str, Any] | None:
 
 
 def free_path(path: Path) -> Path:
-    """A file beside those that an earlier part of the run wrote."""
+    """An unused path next to the files of earlier parts of the run."""
     names = (path.with_name(f"{path.stem}-{n}{path.suffix}") for n in range(2, 10**6))
-    # Not even a link that leads nowhere: what is written there would be a file elsewhere.
+    # A dangling link counts as used: writing to it would create a file elsewhere.
     return next(p for p in chain((path,), names) if not os.path.lexists(p))

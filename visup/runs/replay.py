@@ -1,7 +1,7 @@
-"""Reasoning again about a recorded run without seeing again, and what it changes.
+"""Replays the reasoning of a recorded run without perception, and compares the results.
 
-Rules and tasks can so be tested on recorded missions: record once, replay in seconds with the new rules
-or task, and look at the difference in events, alerts, stages and verdict.
+This tests rules and tasks on recorded missions: record once, replay in seconds with new rules or tasks, and
+compare events, alerts, stages and verdict.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ class Transcript:
     """The events of a run.
 
     Attributes:
-        events: As lines of `events.jsonl`.
-        verdict: How it ended; None where nothing was to be judged, or it is not over.
-        steps: Frames.
-        seconds: Wall time that reasoning took; 0 for a recorded run.
-        at_end: What rules came to that were not decided, as the settings ask.
+        events: Events as in `events.jsonl`.
+        verdict: The verdict; None without a task, or if the run has not ended.
+        steps: Number of frames.
+        seconds: Wall time of the reasoning; 0 for a recorded run.
+        at_end: Results of rules that were undecided at the end, as the settings request.
     """
 
     events: tuple[Line, ...]
@@ -57,12 +57,12 @@ class Transcript:
 
 @dataclass(frozen=True, slots=True)
 class TranscriptDiff:
-    """What differs between two runs, in the order of time; both are empty when nothing does.
+    """The difference between two runs, ordered by time.
 
     Attributes:
-        gone: Events that only the first told.
-        new: Events that only the second told.
-        verdicts: Of the first and of the second.
+        gone: Events of the first only.
+        new: Events of the second only.
+        verdicts: Verdicts of both.
     """
 
     gone: tuple[Line, ...] = ()
@@ -73,7 +73,7 @@ class TranscriptDiff:
         return bool(self.gone or self.new or self.verdicts[0] != self.verdicts[1])
 
     def counts(self) -> dict[str, tuple[int, int]]:
-        """How many of (alerts, stages, other events) are gone and new."""
+        """Counts of gone and new events by group: alerts, stages, other events."""
         return {
             group: (_count(self.gone, group), _count(self.new, group))
             for group in ("alerts", "stages", "other events")
@@ -104,7 +104,7 @@ def settings_for(recording: Recording, **changed: Any) -> WatchSettings:
 def changed_settings(settings: WatchSettings, **changed: Any) -> WatchSettings:
     """Settings with some of them changed; None and () change nothing.
 
-    Where tasks are changed and actors are not, bindings of actors that the new tasks lack are dropped.
+    If tasks are changed but actors are not, bindings of actors that the new tasks lack are dropped.
     """
     wanted = {k: v for k, v in changed.items() if v}
     if "tasks" in wanted and "actors" not in wanted:
@@ -120,19 +120,19 @@ def replay(
     out: Path | None = None,
     tell: Callable[[Step], None] | None = None,
 ) -> Transcript:
-    """Reason again.
+    """Replay the reasoning of a run.
 
     Args:
-        recording: What was perceived.
+        recording: The recorded run.
         settings: Tasks, rules and actors to reason with.
-        out: A new run folder to write a journal and `events.jsonl` to, or None.
-        tell: Told of each step.
+        out: A new run folder for a journal and `events.jsonl`, or None.
+        tell: Receives each step.
 
     Returns:
-        What it told.
+        The transcript.
 
     Raises:
-        VisupError: The recording is damaged, or a task or rules file is not as it should be.
+        VisupError: The recording is damaged, or a task or rules file is not valid.
     """
     agent = reasoning_agent(settings)
     listener = _EventCollector()
@@ -168,8 +168,8 @@ def recorded_transcript(recording: Recording) -> Transcript:
 def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
     """Events in only one of two runs.
 
-    Events are the same when all that is told of them is. Faults of behaviours and of
-    the surroundings count like any other: they are part of what was perceived.
+    Events are equal if all their fields are. Faults of behaviours and of the environment count like any
+    other: they are part of the observations.
     """
     a = [event_text(e) for e in first.events]
     b = [event_text(e) for e in second.events]
@@ -183,7 +183,7 @@ def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
 
 
 def group_of(event: Line) -> str:
-    """What an event is about: 'alerts', 'stages' or 'other events'."""
+    """The group of an event: 'alerts', 'stages' or 'other events'."""
     kind = str(event.get("kind"))
     if kind in ("alert", "alert_closed"):
         return "alerts"

@@ -1,4 +1,4 @@
-"""The report of a replay: with the video's frames where it is still there, else with outlines alone."""
+"""The report of a replay, with frames of the video if it still exists, else with outlines only."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from visup.tasks.tools.outline import outline
 from visup.version import __version__
 
 GREY = 96
-"""Where the video is gone, outlines are drawn on such a ground, 0 to 255."""
+"""Background for outlines if the video is missing, grey level 0 to 255."""
 
 
 class ReplayReport:
-    """Gathers what the report of a replay needs; give it each step, and `write` at the end.
+    """Collects the data for the report of a replay; call it with each step, and `write` at the end.
 
     Args:
-        recording: What is replayed.
-        settings: What is reasoned with.
+        recording: The recorded run.
+        settings: Settings of the replay.
     """
 
     def __init__(self, recording: Recording, settings: WatchSettings) -> None:
@@ -68,18 +68,18 @@ class ReplayReport:
         self._stack.close()
 
     def __call__(self, step: Step) -> None:
-        """Take note of one step."""
+        """Add one step."""
         self._collector.add(step, self._frame(step))
 
     def write(self, folder: Path, verdict: Verdict | None) -> Path | None:
         """Write `report.html`.
 
         Args:
-            folder: Of the new run.
-            verdict: How it ended.
+            folder: Folder of the new run.
+            verdict: The verdict.
 
         Returns:
-            The file; None where the extra for reports is missing.
+            The file; None if the extra for reports is missing.
 
         Raises:
             OutputError: It cannot be written.

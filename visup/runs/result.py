@@ -10,22 +10,22 @@ from visup.agent import Verdict
 
 
 class ExitCode(IntEnum):
-    """What `visup watch` and `visup replay` end with; of several the first of 1, 4, 5, 130, 3."""
+    """The exit codes of `visup watch` and `visup replay`; if several apply, the first of 1, 4, 5, 130, 3."""
 
     GOOD = 0
-    """It went well; without a task: nothing unsafe was seen, from the first frame to the last."""
+    """Success; without a task: nothing unsafe was seen from the first frame to the last."""
     BAD = 1
-    """It failed, was unsafe, or could not be followed or watched whole."""
+    """The task failed, something was unsafe, or not everything could be followed or watched."""
     BAD_INPUT = 2
-    """Something given is not as it should be; nothing was watched."""
+    """An input is not valid; nothing was watched."""
     UNFINISHED = 3
-    """The task was still in progress when the source ended, and nothing was wrong."""
+    """The task was still in progress when the source ended; no other fault."""
     SOURCE_BROKE_OFF = 4
-    """The source is cut off or damaged; nothing was wrong in the part that was seen."""
+    """The source is truncated or damaged; no other fault in the part that was seen."""
     NOT_RECORDED = 5
-    """The run, its report or its alerts could not be written or delivered whole; nothing was wrong else."""
+    """The run, its report or its alerts could not be written or delivered completely; no other fault."""
     STOPPED = 130
-    """The user stopped it (Ctrl-C); nothing was wrong until then."""
+    """The user stopped it (Ctrl-C); no fault until then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,18 +33,19 @@ class RunResult:
     """How a run ended.
 
     Attributes:
-        verdict: Of the tasks; without a task 'interrupted' if something grave was seen, else 'unknown' if
-            a part was not watched, else None.
-        steps: Frames supervised.
-        problem: What was wrong with the source, or None.
+        verdict: Verdict on the tasks; without a task 'interrupted' if something severe was seen, else
+            'unknown'
+            if a part was not watched, else None.
+        steps: Number of frames.
+        problem: Fault of the source, or None.
         folder: The run folder, or None.
         report: The report, or None.
-        notes: What the user should know, such as an extra that is missing.
-        has_task: Whether there was a task to judge.
+        notes: Notes for the user, such as a missing extra.
+        has_task: Whether there was a task.
         stopped: Whether the user stopped it.
         seconds: Time of the last frame.
-        recorded: Whether all that was to be written was written.
-        delivered: Whether every sink for alerts took all that it was sent.
+        recorded: Whether everything was written.
+        delivered: Whether every sink accepted all alerts.
     """
 
     verdict: Verdict | None
@@ -61,7 +62,7 @@ class RunResult:
 
     @property
     def exit_code(self) -> ExitCode:
-        """What the command ends with."""
+        """The exit code of the command."""
         if self.verdict not in (None, Verdict.SUCCEEDED, Verdict.IN_PROGRESS):
             return ExitCode.BAD
         if self.problem and not self.stopped:

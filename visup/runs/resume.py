@@ -1,8 +1,8 @@
-"""Going on with a run that was killed: the agent becomes again what it was after the last recorded step.
+"""Resumes a killed run: restores the agent to its state after the last recorded step.
 
-What was perceived stands in the journal, so the mind is reasoned anew from it, exactly. Behaviours hold
-state of their own: they take up the latest state that was kept and look again at the frames since; without
-one they look again at all frames. A camera's frames are gone: there behaviours go on from the state.
+The mind is reproduced exactly by replaying the observations in the journal. Behaviours restore the latest
+saved state and process the frames since then again, or all frames without a saved state. For a camera, whose
+frames are gone, behaviours continue from the saved state.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class InterruptedRun:
 
     Attributes:
         recording: Its journal.
-        settings: As it was begun.
+        settings: Its original settings.
         state: The latest state, or None.
-        why_none: Why the state that there is cannot be used, or None.
-        steps: How many steps are recorded.
-        verdict: What its events came to, if it has no task.
-        answers: What the operator said beforehand: object id -> name.
+        why_none: Why an existing state cannot be used, or None.
+        steps: Number of recorded steps.
+        verdict: Verdict from its events, if it has no task.
+        answers: Answers of the operator in advance: object id -> name.
     """
 
     recording: Recording
@@ -60,7 +60,7 @@ class InterruptedRun:
         """Check that no other process has resumed the run since it was read.
 
         Raises:
-            OutputError: Somebody has.
+            OutputError: One has.
         """
         if self.recording.count() != self.steps:
             raise OutputError(
@@ -76,21 +76,20 @@ def interrupted_run(
     plugins: Collection[str] = (),
     source: str | None = None,
 ) -> InterruptedRun:
-    """The past of a run.
+    """Read a run to resume.
 
-    What a run folder says is data. The behaviours of the user's own that it names are code, which may be
-    anybody's: they run only when they are named here again.
+    The content of a run folder is data. User behaviours named in it are code of unknown origin: they run only
+    if they are named again here.
 
     Args:
         run: A run folder.
-        behaviours: Files or modules of behaviours of one's own that the run had, and that may run.
-        plugins: Names of installed behaviours that the run had, and that may run.
-        source: The source with its password, which is not recorded; None of a run whose source has none.
+        behaviours: Files or modules of the run's user behaviours that may run.
+        plugins: Names of the run's installed behaviours that may run.
+        source: The source with its password, which is not recorded; None if it has none.
 
     Raises:
-        OutputError: There is no run, or it is over, or nothing of it was recorded.
-        SettingsError: It had other behaviours than those that are named, or its source is not named as it
-            must be.
+        OutputError: There is no run, it has ended, or nothing was recorded.
+        SettingsError: Its behaviours differ from those named, or its source is not named as required.
     """
     recording = Recording.open(run)
     facts = recording.facts()
@@ -127,7 +126,7 @@ def interrupted_run(
 
 
 def _belongs(state: Checkpoint, ends: tuple[int, int] | None, *, continues: bool) -> bool:
-    """Whether a state is that of one of the steps that are kept, or of the run that this one continues."""
+    """Whether a state belongs to a recorded step, or to the run that this one continues."""
     if ends is None:
         return continues
     return ends[0] - 1 <= state.frame_index <= ends[1] or (
@@ -138,12 +137,12 @@ def _belongs(state: Checkpoint, ends: tuple[int, int] | None, *, continues: bool
 def _with_named_code(
     recorded: WatchSettings, run: Path, behaviours: Collection[Path | str], plugins: Collection[str]
 ) -> WatchSettings:
-    """The settings of a run with the code that the user named, which must be that of the run."""
+    """The settings of a run with the code named by the user, which must match."""
     had = sorted(map(_code_name, recorded.behaviours)), sorted(recorded.plugins)
     if had != (sorted(map(_code_name, behaviours)), sorted(plugins)):
         behaviour = [w for where in recorded.behaviours for w in ("--behaviour", str(where))]
         wanted = [*behaviour, *(w for name in recorded.plugins for w in ("--plugin", name))]
-        # Quoted: a folder's words must not become commands where the hint is pasted.
+        # Quoted: text from a folder must not become commands when the hint is pasted.
         again = shlex.join(["visup", "watch", "--resume", str(run), *wanted])
         raise SettingsError(
             "this run used custom behaviours, which are code; code is never run from a run folder"
@@ -159,7 +158,7 @@ def _with_named_code(
 def _with_secret(
     recorded: WatchSettings, run: Path, source: str | None, *, needed: bool
 ) -> WatchSettings:
-    """The settings of a run with its source as it can be opened."""
+    """The settings of a run with the password of its source."""
     if needed and source is None:
         raise SettingsError(
             "the source of this run had a password, which is not recorded",
@@ -179,7 +178,7 @@ def _with_secret(
 
 
 def _code_name(where: Path | str) -> str:
-    """By what code is told to be that of the run: a module's path, or a file's name, wherever it is now."""
+    """The name by which code is matched: a module path, or a file name regardless of its folder."""
     return str(where) if MODULE_PATH.fullmatch(str(where)) else Path(where).name
 
 
@@ -188,7 +187,7 @@ def _is_grave(event: Mapping[str, Any]) -> bool:
 
 
 def _kind(event: Mapping[str, Any]) -> str:
-    """What a recorded event is about; a journal may be a stranger's, and say anything."""
+    """The kind of a recorded event; the journal is untrusted."""
     data = event.get("data")
     said = data.get("alert_kind") if isinstance(data, dict) else None
     return str(said or event.get("kind"))
@@ -203,7 +202,7 @@ def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
 
 @cache
 def _settings_form() -> TypeAdapter[WatchSettings]:
-    """Made once: that takes longer than to read the settings of a run."""
+    """Cached: creating it takes longer than parsing the settings of a run."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(WatchSettings)
@@ -213,7 +212,7 @@ def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
     """The settings of a recorded run.
 
     Raises:
-        OutputError: They are not there, or not as they should be.
+        OutputError: They are missing or not valid.
     """
     from pydantic import ValidationError
 
@@ -233,21 +232,21 @@ def catch_up(
     *,
     whole: bool,
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
-    """Make an agent what it was after the last recorded step.
+    """Bring an agent to its state after the last recorded step.
 
     Args:
-        agent: Of the run's settings; new, or as the run's state left it.
-        source: Just opened.
+        agent: Agent with the run's settings; new, or restored from a state.
+        source: The source, just opened.
         past: The run.
-        tell: Told of the recorded steps whose frames there are.
-        late: Told of all recorded steps since the state.
-        whole: Whether its behaviours are as the state left them, too.
+        tell: Receives recorded steps whose frames exist.
+        late: Receives all recorded steps since the state.
+        whole: Whether the behaviours were restored, too.
 
     Returns:
-        The frames with which the run goes on, and what the user should know.
+        The frames that follow, and notes for the user.
 
     Raises:
-        SourceError: The source is not what was recorded.
+        SourceError: The source differs from the recorded one.
     """
     after = past.state.frame_index if past.state else -1
     if source.live:
@@ -258,8 +257,8 @@ def catch_up(
     for seen in past.recording.observations(after):
         frame = _frame(frames, seen, source)
         again = agent.perceive(frame)
-        differing += pack_observation(_without_troubles(again)) != pack_observation(
-            _without_troubles(seen)
+        differing += pack_observation(_without_runtime_faults(again)) != pack_observation(
+            _without_runtime_faults(seen)
         )
         step = agent.reason(seen, answers.get(seen.frame_index, {}))
         tell(step, frame)
@@ -293,7 +292,7 @@ def _frame(frames: Iterator[Frame], observation: Observation, source: VideoSourc
     )
 
 
-def _without_troubles(observation: Observation) -> Observation:
+def _without_runtime_faults(observation: Observation) -> Observation:
     name = RuntimeFaults.contract.name
     return replace(
         observation, reports=tuple(r for r in observation.reports if r.behaviour != name)
@@ -307,7 +306,7 @@ def _live(
     late: Callable[[Step], None],
     after: int,
 ) -> Iterator[Frame]:
-    """Frames of a camera, counted and timed on from the last recorded one."""
+    """Frames of a camera, with numbers and times continued from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):
         late(agent.reason(last, answers.get(last.frame_index, {})))
@@ -317,7 +316,7 @@ def _live(
     first = next(source, None)
     if first is None:
         return iter(())
-    # Only how long nobody looked is taken from the clock of the wall; it may have been set since.
+    # Only the gap is measured by the wall clock, since it may have been set meanwhile.
     away = max(1.0 / source.fps, time.time() - past.recording.written())
     later = agent.mind.time + away - first.time
     on = agent.mind.frame_index + 1

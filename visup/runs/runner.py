@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
 
 BOOKS_S = 2.0
-"""For the books of runs that were followed by others, when the last one ends, seconds."""
+"""Time to finish the files of earlier runs when the last one ends, seconds."""
 
 __all__ = ["Audience", "RunProgress", "fresh_folder", "notify", "supervise", "supervised"]
 
@@ -58,23 +58,23 @@ def supervise(
     """Watch a source from start to end.
 
     Args:
-        settings: What to watch and against what.
+        settings: Settings of the run.
         folder: A folder from `fresh_folder`, that of `past`, or None to record nothing.
-        audience: Who follows the run.
+        audience: Observers of the run.
         options: How it is recorded, and where alerts go.
-        past: The run to go on with; `settings` are its own.
-        at_once: Whether a stop signal ends the step that it comes in; else the step is finished first.
+        past: The run to resume; `settings` are its own.
+        at_once: Whether a stop signal interrupts the present step; otherwise the step is finished first.
 
     Returns:
-        How it ended. A source that breaks off is told in `problem`; all that was seen is kept.
+        The result. A source that breaks off is reported in `problem`; everything seen is kept.
 
     Raises:
-        VisupError: Something given is not as it should be.
+        VisupError: An input is not valid.
     """
     run = supervised(settings, folder, audience or Audience(), options, past)
     with stop_signals(at_once=at_once) as stop:
         try:
-            with suppress(KeyboardInterrupt):  # it may come between two steps
+            with suppress(KeyboardInterrupt):  # may arrive between two steps
                 while not stop.received:
                     next(run)
             stop.closing = True
@@ -93,8 +93,8 @@ def supervised(
 ) -> Generator[Step, None, RunResult]:
     """As `supervise`, but as a generator of steps; the source is open when it returns.
 
-    A KeyboardInterrupt thrown in ends the run as stopped by the user, with verdict and report; a
-    generator that is merely closed leaves the run as one that was killed, to be resumed.
+    A KeyboardInterrupt thrown in ends the run as stopped by the user, with verdict and report; a generator
+    that is only closed leaves the run like a killed one, to be resumed.
     """
     run = _supervised(settings, folder, audience, options or RunOptions(), past)
     next(run)
@@ -108,7 +108,7 @@ def _supervised(
     options: RunOptions,
     past: InterruptedRun | None,
 ) -> Generator[Step | None, None, RunResult]:
-    """First None, once everything is open; then the steps."""
+    """Yields None once everything is open, then the steps."""
     with ExitStack() as stack:
         answered = audience.operator is not None and bool(audience.operator.answers)
         run = _Run(settings, folder, options, past, stack, answered=answered)
@@ -122,7 +122,7 @@ def _supervised(
 
 
 class _Run:
-    """A run from its first frame to its result; what it opens is closed with `stack`."""
+    """A run from its first frame to its result; its resources are closed with `stack`."""
 
     def __init__(
         self,
@@ -140,12 +140,12 @@ class _Run:
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
         self._warnings = () if past else check_cast(settings, self._agent, answered=answered)
-        # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
+        # The bound actors are recorded, so that a replay, which has no models, knows them.
         actors = self._agent.mind.actors
         self._notes = told_of_actors(settings.actors, actors)
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
-        # Before the journal: what is refused leaves no run behind.
+        # Before the journal, so that a refused run leaves nothing behind.
         told = past.recording.facts().get("clock") if past else None
         self._stamp = RecordStamp(options.camera, WallClock.read(told), live=self.source.live)
         written = past.recording.written() if past else None
@@ -154,13 +154,13 @@ class _Run:
         self._recorder = self._recorder_in(folder, options, resume=past is not None)
         stack.callback(self._close_journals)
         if past:
-            past.check_unchanged()  # now that nobody else may write it
+            past.check_unchanged()  # under the lock
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
         self._alarms = VerdictMonitor(past.verdict if past else None)
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
         self._options, self._stopped = options, False
-        self._last: Step | None = None  # while none is under way
+        self._last: Step | None = None  # None during a step
 
     def _recorder_in(
         self, folder: Path | None, options: RunOptions, *, resume: bool
@@ -175,19 +175,19 @@ class _Run:
             self._recorder.close()
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
-        """Make the agent what it was, and give the frames that are left."""
-        past, whole = self._take_up(past)
+        """Restore the agent, and return the remaining frames."""
+        past, whole = self._load_state(past)
         tell = self._recorder.catch_up if self._recorder else lambda step, frame: None
         late = self._sinks.alerts.late
         frames, notes = catch_up(self._agent, self.source, past, tell, late, whole=whole)
         self._notes = (*self._notes, *notes)
         return frames
 
-    def _take_up(self, past: InterruptedRun) -> tuple[InterruptedRun, bool]:
-        """The run with the state that was taken up, or without one that could not be.
+    def _load_state(self, past: InterruptedRun) -> tuple[InterruptedRun, bool]:
+        """Load the saved state; returns the run, without a state that cannot be loaded.
 
-        What a state holds changes with visup, and with the behaviours that gave theirs: one that does not
-        fit is no reason not to go on, since the journal tells the same.
+        The content of a state depends on the versions of visup and of behaviours: one that does not fit is
+        skipped, since the journal has the same information.
         """
         if past.state is None:
             return past, False
@@ -205,15 +205,15 @@ class _Run:
             return replace(past, state=None, why_none=why), False
 
     def connect(self, audience: Audience, past: InterruptedRun | None) -> None:
-        """Let everyone follow the agent, and its surroundings report their faults."""
+        """Connect the observers, and the sources of runtime faults."""
         if self._recorder:
             self._stamp.changed = self._recorder.keep_clock
             if self._stamp.clock.anchors:
                 self._recorder.keep_clock(self._stamp.clock)
-        # The journal comes first: what is told was recorded before.
+        # The journal comes first, so that everything reported is recorded.
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
-        # Evidence comes before who is told where it is.
+        # Evidence comes before the sinks, which link to it.
         kept = (self._evidence,) if self._evidence else ()
         box = (AnswerBox(self._agent, lambda: self._folder, audience.notice),) if recording else ()
         others = (*audience.observers, *kept, self._sinks, *answering, *box)
@@ -231,7 +231,7 @@ class _Run:
             self._faults.add_source(self.source.runtime_faults)
 
     def keep_evidence(self) -> None:
-        """Keep evidence of alerts, where that is wanted."""
+        """Save evidence of alerts, if requested."""
         self._evidence: EvidenceKeeper | None = None
         wanted = self._options.evidence
         if wanted is None or self._folder is None:
@@ -243,14 +243,14 @@ class _Run:
         self._sinks.alerts.links = keeper.links
 
     def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
-        """Give a warning before the first frame; without an audience it is added to the notes."""
+        """Issue a warning before the first frame; without an audience it is added to the notes."""
         if notice:
             notice(text)
         else:
             self._notes = (*self._notes, text)
 
     def timed(self, frames: Iterator[Frame], past: InterruptedRun | None) -> MonotonicFrames:
-        """Frames in real time where that is wanted, and in any case with times that grow."""
+        """Frames with increasing times, in real time if requested."""
         realtime = self._settings.realtime
         if self.source.live if realtime is None else realtime:
             self._pace = in_real_time(self.source, frames)
@@ -273,7 +273,7 @@ class _Run:
                     self._checkpoints.offer(
                         self._agent, step, lambda: recorder_state(self._recorder)
                     )
-                self._tell_figures(step, audience)
+                self._report_figures(step, audience)
                 if audience.places and self._recorder and self.source.live:
                     self._roll(step, self._recorder, audience)
                 yield step
@@ -281,11 +281,11 @@ class _Run:
             self._stopped = True
 
     def _roll(self, step: Step, old: Recorder, audience: Audience) -> None:
-        """Start the next run when it is due: the same agent, with a new journal."""
+        """Start the next run if it is due: the same agent with a new journal."""
         if not (audience.places and self._roll_over.due(step.time, old.journal.size)):
             return
         try:
-            new, checkpoints = self._next_books(step, old, audience.places)
+            new, checkpoints = self._next_recorder(step, old, audience.places)
         except OutputError as fault:
             self._roll_over.failed(step.time)
             if audience.notice:
@@ -304,7 +304,7 @@ class _Run:
         assert before
         self._roll_over.close_books(old, before, said, mind.tasks)
 
-    def _next_books(
+    def _next_recorder(
         self, step: Step, old: Recorder, places: RunPlaces
     ) -> tuple[Recorder, CheckpointWriter]:
         """The journal and the checkpoint of the next run, from which it can already be resumed.
@@ -329,7 +329,7 @@ class _Run:
             old.journal.note(next_run=folder.name)
         return new, checkpoints
 
-    def _tell_figures(self, step: Step, audience: Audience) -> None:
+    def _report_figures(self, step: Step, audience: Audience) -> None:
         lag = self._pace.lag(step.time) if self._pace else None
         if audience.progress:
             count = self.source.frame_count
@@ -340,7 +340,7 @@ class _Run:
             audience.figures(RunFigures(self._steps, dropped, lag, self._meter.ms))
 
     def result(self) -> RunResult:
-        """Close the books."""
+        """Close the run and return its result."""
         if self._checkpoints:
             if self._last and (self._stopped or self._options.span[1] is not None):
                 self._checkpoints.keep(self._agent, self._last, recorder_state(self._recorder))
@@ -379,7 +379,7 @@ class _Run:
         )
 
     def _attending(self, operator: HumanOperator, past: InterruptedRun | None) -> Observer:
-        """The operator, without answers that took effect before the run was killed."""
+        """The operator, without answers already applied before the run was killed."""
         if self._recorder and not past:
             self._recorder.journal.note(answers=operator.answers)
         given = {**past.answers, **operator.answers} if past else operator.answers
@@ -390,7 +390,7 @@ class _Run:
 
 
 def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:
-    """A function that gives a sentence to sinks and to `notice` at once."""
+    """A function that passes a sentence to sinks and to `notice` at once."""
 
     def tell(text: str) -> None:
         sinks.notice(text)

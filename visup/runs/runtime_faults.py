@@ -1,7 +1,6 @@
-"""What goes wrong round the agent, as percepts: the journal, a sink, a source that dropped.
+"""Faults of the agent's environment as percepts: the journal, a sink, a source that dropped.
 
-What lies outside the cycle enters it here, so that it opens alerts like anything else, is recorded
-with the percepts, and comes out the same when the run is replayed.
+As percepts they open alerts like anything else, are recorded, and recur when the run is replayed.
 """
 
 from __future__ import annotations
@@ -33,17 +32,17 @@ class RuntimeFaults(Stateless):
         self._sources: list[FaultSource] = []
 
     def add_source(self, source: FaultSource) -> None:
-        """Ask also this one from now on."""
+        """Add a source."""
         self._sources.append(source)
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One percept of kind 'trouble' for each fault that holds now."""
+        """One percept of kind 'trouble' for each present fault."""
         now = [concern for source in self._sources for concern in source()]
         return [Percept(RUNTIME_FAULT, c, frame.time, self.contract.name) for c in now]
 
 
 def runtime_fault_reasoner(mind: Mind, observation: Observation) -> Outcome:
-    """Every runtime fault is a concern."""
+    """Make every runtime fault an alert condition."""
     return Outcome(mind, conditions=observation.of(RUNTIME_FAULT))

@@ -1,4 +1,4 @@
-"""The wiring: an agent that sees, interprets and verifies, made from the settings of a run."""
+"""The wiring: builds an agent with behaviours and reasoners from the settings of a run."""
 
 from __future__ import annotations
 
@@ -59,18 +59,18 @@ if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
 
 LIVE_HANG_S = 20.0
-"""How long a behaviour may take for a frame of a camera before it is given up: no less than what
-compiling loops takes at the first frames after an installation."""
+"""Time limit of a behaviour on a live frame, seconds: enough for compiling loops at the first frames after an
+installation."""
 
 __all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
 
 def open_video(settings: WatchSettings, span: tuple[int, int | None] = (0, None)) -> VideoSource:
-    """The source of a run, opened.
+    """Open the source of a run.
 
     Args:
-        settings: Name it.
-        span: Which of its frames are given; see `VideoSource`.
+        settings: Settings of the run.
+        span: Which of its frames to read; see `VideoSource`.
 
     Raises:
         SourceError: It cannot be opened.
@@ -88,7 +88,7 @@ def open_video(settings: WatchSettings, span: tuple[int, int | None] = (0, None)
 
 
 def _every(settings: WatchSettings, fps: float) -> int:
-    """Every how many frames are looked at: what the user says goes before what suits the scene."""
+    """The frame stride n (every n-th frame); an explicit setting takes precedence over the preset."""
     if settings.pace is not None:
         return every_for(settings.pace, fps)
     return preset_named(settings.preset).every(fps) if settings.preset else 1
@@ -101,28 +101,29 @@ def build_agent(
     *,
     live: bool = False,
 ) -> Agent:
-    """An agent that supervises as the settings say.
+    """Build an agent with perception and reasoning.
 
     Args:
-        settings: What to supervise against.
-        observers: Told of each step.
+        settings: Settings of the run.
+        observers: Receive each step.
         also: Behaviours besides those of the settings.
-        live: Whether frames are made while they are read, so that a behaviour that hangs must be told
-            soon.
+        live: Whether the source is live, so that a hanging behaviour must be reported soon.
 
     Raises:
-        VisupError: A task, rules file, zones file, model database or behaviour is not as it should
-            be, or an actor is bound that no task has or to a model that the database lacks.
+        VisupError: A task, rules file, zones file, model database or behaviour is not valid, or an actor is
+            bound that no task has, or to a model that the database lacks.
     """
     tasks, zones = _tasks_and_zones(settings)
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     known, taught = _names(database)
-    boxes = _boxes(settings)
+    boxes = _detector(settings)
     known = (*known, *(n for n in (boxes.names if boxes else ()) if n not in known))
     actors = with_taught_actors(tasks, settings.actors, known, taught)
     behaviours = [
-        *_behaviours(settings, database, boxes, declared_sizes(tasks, actors), _places(tasks)),
+        *_behaviours(
+            settings, database, boxes, declared_sizes(tasks, actors), _initial_positions(tasks)
+        ),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
         *(told := signal_behaviours(settings.signals)),
         *also,
@@ -141,8 +142,8 @@ def build_agent(
     )
 
 
-def _boxes(settings: WatchSettings) -> DetectorBehaviour | None:
-    """What sees in place of visup's own eyes, where a detector does."""
+def _detector(settings: WatchSettings) -> DetectorBehaviour | None:
+    """The detector behaviour that replaces motion segmentation, or None."""
     if settings.detections is None:
         return None
     if settings.detections.suffix.lower() == ".onnx":
@@ -151,7 +152,7 @@ def _boxes(settings: WatchSettings) -> DetectorBehaviour | None:
 
 
 def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:
-    """All models that there are, and those that were taught."""
+    """Names of all models, and of the taught ones."""
     if database is None:
         return (), frozenset()
     return database.names(), frozenset(view.name for view in database.taught)
@@ -162,16 +163,15 @@ def reasoning_agent(
     observers: Sequence[Observer] = (),
     behaviours: Sequence[Behaviour] = (),
 ) -> Agent:
-    """An agent that reasons as the settings say about what was perceived before; it sees nothing.
+    """Build an agent that reasons about recorded observations, without perception.
 
     Args:
-        settings: What to supervise against.
-        observers: Told of each step.
-        behaviours: What sees in place of eyes.
+        settings: Settings of the run.
+        observers: Receive each step.
+        behaviours: Behaviours in place of perception.
 
     Raises:
-        VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
-            task has.
+        VisupError: A task, rules or zones file is not valid, or an actor is bound that no task has.
     """
     tasks, zones = _tasks_and_zones(settings)
     _check_actors(settings, tasks, None)
@@ -188,7 +188,7 @@ def reasoning_agent(
 
 
 def _tasks_and_zones(settings: WatchSettings) -> tuple[list[Task], tuple[Zone, ...]]:
-    """The tasks of a run and the zones of its settings; a task without a ground has that of the zones."""
+    """The tasks of a run and the zones of its settings; tasks without a ground use that of the zones."""
     loaded = [t for name in settings.tasks for t in load_tasks(name)]
     tasks = [with_bystanders(t, settings.bystanders) for t in loaded]
     zones = load_zones(settings.zones) if settings.zones else ()
@@ -200,15 +200,15 @@ def _tasks_and_zones(settings: WatchSettings) -> tuple[list[Task], tuple[Zone, .
 
 
 def _cast(tasks: Sequence[Task]) -> dict[str, tuple[str, ...]]:
-    """The actors of all tasks with the models that they may be: names for the operator's answers."""
+    """Actor -> models of all tasks: names for the operator's answers."""
     return {a: t.models(a) for t in tasks for a in task_actors(t)}
 
 
 def final_verdict(mind: Mind) -> Verdict:
-    """The verdict of a run that is over.
+    """The verdict of a run that has ended.
 
-    With tasks it is the gravest of those that were seen to go on, unknown when none was; without, what
-    comes of the alerts that are still open.
+    With tasks it is the most severe one of those observed, unknown if none was; without, it follows from the
+    open alerts.
     """
     if mind.tasks:
         verdicts = [finish(t) for t in mind.tasks]
@@ -227,20 +227,20 @@ _GRAVITY = (
 
 
 class VerdictMonitor:
-    """What comes of the events of a run without a task: an observer.
+    """An observer that derives the verdict of a run without a task from its events.
 
     Args:
-        verdict: What came of it before.
+        verdict: The verdict before.
 
     Attributes:
-        verdict: What has come of it.
+        verdict: The verdict so far.
     """
 
     def __init__(self, verdict: Verdict | None) -> None:
         self.verdict = verdict
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Take note of a step."""
+        """Add one step."""
         self.verdict = verdict_without_task(grave_kinds(step.events), self.verdict)
 
 
@@ -274,8 +274,8 @@ def _behaviours(
     return [*seeing, *user_behaviours(settings)]
 
 
-def _places(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
-    """Actors that are identified by their place and not by a model: where they are in the first picture."""
+def _initial_positions(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
+    """Actors identified by position instead of a model: their positions in the first frame."""
     return {
         a.name: c.at
         for t in tasks
@@ -313,7 +313,7 @@ def _reasoners(
 
 
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
-    """Check that every zone used is drawn somewhere."""
+    """Check that every zone used is defined."""
     for task in tasks:
         if needs_ground(task) and task.ground is None:
             raise SettingsError(

@@ -1,4 +1,4 @@
-"""Stepping: a debugger for agents. Forward, back, inside a step, sideways into what-if branches, and why.
+"""Stepping: a debugger for agents, with stepping back, breakpoints, what-if branches and explanations.
 
 >>> from visup.evaluation.runtime.scripted_observations import moving_ellipses
 >>> from visup.runs.settings import WatchSettings
@@ -10,9 +10,9 @@
 >>> stepper.back(3).frame_index
 6
 
-Read in this order: `history.py` (how all steps are kept), `breakpoints.py` (where to stop), `stepper.py`
-(the debugger), `diff.py` (what differs between two minds), `what_if.py` (branches), and `explanations/`
-(why, and why not).
+Read in this order: `history.py` (access to all steps), `breakpoints.py` (where to stop), `stepper.py`
+(the debugger), `diff.py` (differences of minds), `what_if.py` (branches), and `explanations/` (why, and why
+not).
 """
 
 from visup.stepping.breakpoint_parser import parse_condition

@@ -1,4 +1,4 @@
-"""Where to stop, in words: `alert`, `rule collision_course`, `stage captured`, `when gap(1, 2) < 20 px`."""
+"""Parses breakpoints: `alert`, `rule collision_course`, `stage captured`, `when gap(1, 2) < 20 px`."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from visup.wording import EVENT_KINDS
 def parse_condition(
     what: str | Phase | Predicate | StopCondition, mind: Mind, names: Names | None = None
 ) -> StopCondition:
-    """The condition that is meant.
+    """Parse a stop condition.
 
     Args:
         what: A phase, a function of the step, a condition, or text: `phase match`, `event alert`,
             `rule NAME`, `rule NAME changes`, `stage NAME`, `object 2`, `time 12.5`, `frame 300`,
-            `when EXPRESSION`, `change EXPRESSION`; or without its first word, where that is clear.
-        mind: Knows stages and rules, but none before its first step.
-        names: Those that there are; of the mind when left out.
+            `when EXPRESSION`, `change EXPRESSION`; or without its first word if that is unambiguous.
+        mind: Provides stages and rules, none before its first step.
+        names: Known names; by default those of the mind.
 
     Raises:
-        SettingsError: Nothing is meant by it.
-        VisupError: The expression cannot be read.
+        SettingsError: It is no condition.
+        VisupError: The expression is not valid.
     """
     if isinstance(what, Phase):
         return PhaseStop(what)
@@ -54,7 +54,7 @@ def parse_condition(
 
 
 def _guessed(word: str, names: Names) -> StopCondition:
-    """The meaning of a word given without its kind."""
+    """The condition of a word without its kind."""
     try:
         return TimeStop(float(word))
     except ValueError:
@@ -68,12 +68,12 @@ def _guessed(word: str, names: Names) -> StopCondition:
     if word in EVENT_KINDS:
         found.append(EventStop(word))
     if not found:
-        raise _not_known(word, names)
+        raise _unknown_word(word, names)
     return found[0] if len(found) == 1 else AnyStop(word, tuple(found))
 
 
-def _not_known(word: str, names: Names) -> SettingsError:
-    """What is no known word is not taken for an event: a slip would be waited for to the end."""
+def _unknown_word(word: str, names: Names) -> SettingsError:
+    """The error for an unknown word; taking it for an event would wait for a typing error until the end."""
     near = did_you_mean(word, [*EVENT_KINDS, *names.stages, *names.rules, *Phase])
     own = f"for an event of your own: event {word}" if word.isidentifier() else None
     return SettingsError(

@@ -1,6 +1,6 @@
-"""Where to stop: at a phase, an event, a rule, a stage, an object, a time, or what a function says.
+"""Stop conditions: a phase, an event, a rule, a stage, an object, a time, or a predicate.
 
-Each condition looks at a step with the mind before it, and gives a sentence when it is met.
+Each condition evaluates a step and the mind before it, and returns a sentence when it is met.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class StopCondition(Protocol):
 
     @property
     def text(self) -> str:
-        """What `parse_condition` reads back."""
+        """Its source for `parse_condition`."""
         ...
 
     def met(self, before: Mind, step: Step) -> str:
@@ -35,7 +35,7 @@ class StopCondition(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PhaseStop:
-    """Stops inside each cycle, after a phase."""
+    """Stops inside each cycle after a phase."""
 
     phase: Phase
 
@@ -67,7 +67,7 @@ class EventStop:
 
 @dataclass(frozen=True, slots=True)
 class RuleStop:
-    """Stops when a rule becomes true of some objects, or changes in any way.
+    """Stops when a rule becomes true for some objects, or changes in any way.
 
     Attributes:
         name: The rule.
@@ -92,7 +92,7 @@ class RuleStop:
 
 @dataclass(slots=True)
 class _VerdictCache:
-    """The verdicts of the last two minds: the mind after a step is that before the next one."""
+    """Caches the verdicts of two minds: the mind after a step is the one before the next."""
 
     _known: list[tuple[Mind, Mapping[tuple[int, ...], Truth]]] = field(default_factory=list)
 
@@ -142,7 +142,7 @@ class ObjectStop:
 
 @dataclass(frozen=True, slots=True)
 class TimeStop:
-    """Stops at the first frame that is not before a time, in seconds."""
+    """Stops at the first frame not before a time, in seconds."""
 
     time: float
 
@@ -159,7 +159,7 @@ class TimeStop:
 
 @dataclass(frozen=True, slots=True)
 class FrameStop:
-    """Stops at the first frame whose number is not below this."""
+    """Stops at the first frame with at least this number."""
 
     frame: int
 
@@ -176,10 +176,10 @@ class FrameStop:
 
 @dataclass(frozen=True, slots=True)
 class WhenStop:
-    """Stops when an expression becomes true; of a quantity, or with `changes`, when it changes.
+    """Stops when an expression becomes true; for a quantity, or with `changes`, when it changes.
 
-    An expression with windows knows the past only since the condition was first looked at, or since
-    the stepper last went back.
+    The history of an expression with windows begins when it is first evaluated, or when the stepper last went
+    back.
     """
 
     expression: Expression
@@ -203,13 +203,13 @@ class WhenStop:
             return _change_text(self.expression.text, old, truths, False)
         if was is None:
             return ""
-        told = {r.objects: str(r) for r in now.readings}
-        old_told = {r.objects: str(r) for r in was.readings}
+        new_verdicts = {r.objects: str(r) for r in now.readings}
+        old_verdicts = {r.objects: str(r) for r in was.readings}
         return next(
             (
-                f"{self.expression.text} {_of(ids)}: {old_told.get(ids, 'nothing')} -> {text}"
-                for ids, text in told.items()
-                if text != old_told.get(ids)
+                f"{self.expression.text} {_of(ids)}: {old_verdicts.get(ids, 'nothing')} -> {text}"
+                for ids, text in new_verdicts.items()
+                if text != old_verdicts.get(ids)
             ),
             "",
         )
@@ -223,19 +223,19 @@ class ExpressionMonitor:
     judged: ExpressionResult | None = None
 
     def __call__(
-        self, wanted: Expression, before: Mind, after: Mind
+        self, expression: Expression, before: Mind, after: Mind
     ) -> tuple[ExpressionResult | None, ExpressionResult]:
-        """Its values before and after."""
+        """Its values before and after a step."""
         if before is not self.mind:
-            self.judged = wanted.judge(before) if before.frame_index >= 0 else None
+            self.judged = expression.judge(before) if before.frame_index >= 0 else None
         was = self.judged
-        self.mind, self.judged = after, wanted.judge(after, was)
+        self.mind, self.judged = after, expression.judge(after, was)
         return was, self.judged
 
 
 @dataclass(frozen=True, slots=True)
 class PredicateStop:
-    """Stops when a function of the step says so."""
+    """Stops when a function of the step returns true."""
 
     predicate: Predicate
     text: str = "predicate"
@@ -247,7 +247,7 @@ class PredicateStop:
 
 @dataclass(frozen=True, slots=True)
 class AnyStop:
-    """Stops when any of several conditions is met, for words that may mean several."""
+    """Stops when any of several conditions is met, for ambiguous words."""
 
     text: str
     stops: tuple[StopCondition, ...]
@@ -263,12 +263,12 @@ def stage_names(mind: Mind) -> tuple[str, ...]:
 
 
 def rule_names(mind: Mind) -> tuple[str, ...]:
-    """The rules that judge a mind; none before its first step."""
+    """The rules of a mind; none before its first step."""
     return tuple(rule.name for rule in rule_memory(mind).rules)
 
 
 def rule_verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
-    """What a rule says of every choice of objects; nothing before the first step."""
+    """The verdict of a rule for every assignment of objects; empty before the first step."""
     return verdicts(mind, name) if rule_memory(mind).now is not None else {}
 
 
@@ -278,9 +278,9 @@ def _change_text(
     now: Mapping[tuple[int, ...], Truth],
     changes: bool,
 ) -> str:
-    """The first choice of objects of which something has become true, or has changed."""
+    """A text about the first assignment of objects for which a rule became true, or changed."""
     for ids in sorted({*was, *now}):
-        # Of who is not there any more nothing is true; who is new was not judged before.
+        # Rules are unknown for objects that have vanished, and were unknown for new ones.
         old, new = was.get(ids, Truth.UNKNOWN), now.get(ids, Truth.UNKNOWN)
         if old is not new and (changes or new is Truth.TRUE):
             return f"{name}{_of(ids)} is {new.value} (was {old.value})"

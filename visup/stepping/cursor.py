@@ -1,4 +1,4 @@
-"""Where a stepper is: after a step, inside one, or at a place to come back to."""
+"""Positions of a stepper: after a step, inside one, or a bookmark."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from visup.stepping.history import StepHistory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PausedStep:
-    """A step that is stopped inside its cycle.
+    """A step stopped inside its cycle.
 
     Attributes:
-        phase: The phase that is over.
-        seen: What was perceived.
-        thought: What was concluded so far; its mind is half-made. None after `perceive`.
+        phase: The last completed phase.
+        seen: The observation.
+        thought: Conclusions so far, with an unfinished mind; None after `perceive`.
     """
 
     phase: Phase
@@ -28,14 +28,14 @@ class PausedStep:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepResult:
-    """Where and why a run of steps ended.
+    """Where and why stepping ended.
 
     Attributes:
-        taken: How many steps were completed.
-        steps: The latest of them: as many as the history keeps whole.
-        reasons: Which conditions were met; empty when the number of steps was made.
+        taken: Number of completed steps.
+        steps: The latest of them, as many as the history caches.
+        reasons: The conditions met; empty if the requested number of steps was made.
         paused: The step inside which it stopped, or None.
-        ended: Whether there is nothing more to perceive.
+        ended: Whether the source has ended.
     """
 
     taken: int
@@ -46,18 +46,18 @@ class StepResult:
 
     @property
     def step(self) -> Step | None:
-        """The last step that was completed."""
+        """The last completed step."""
         return self.steps[-1] if self.steps else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bookmark:
-    """A place to go back to, from `Stepper.snapshot`.
+    """A position to return to, from `Stepper.snapshot`.
 
     Attributes:
-        number: How many steps led there.
-        snapshot: What the agent was.
-        history: The history that it belongs to.
+        number: Number of steps before it.
+        snapshot: State of the agent.
+        history: Its history.
     """
 
     number: int

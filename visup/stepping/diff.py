@@ -13,14 +13,14 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class MindChange:
-    """One thing that differs.
+    """One difference.
 
     Attributes:
         about: 'object', 'identity', 'pose', 'measured', 'relation', 'coupling', 'task', 'stage', 'actor',
             'alert', 'question', 'answer', 'camera', 'unknown', 'percept'.
-        what: What of it, such as 'object 2' or 'touching(1, 2)'.
-        before: How it was; None: it appears.
-        after: How it is; None: it vanishes.
+        what: The item, such as 'object 2' or 'touching(1, 2)'.
+        before: Its old value; None if it appears.
+        after: Its new value; None if it vanishes.
     """
 
     about: str
@@ -41,12 +41,12 @@ class MindChange:
 
 @dataclass(frozen=True, slots=True)
 class MindDiff:
-    """All that differs between two minds; false when nothing does.
+    """All differences between two minds; false if there are none.
 
     Attributes:
         frames: Numbers of their frames.
         times: Seconds.
-        changes: What differs, in the order of what is told first of a mind.
+        changes: The differences in a fixed order of topics.
     """
 
     frames: tuple[int, int]
@@ -70,7 +70,7 @@ class MindDiff:
 
 
 def mind_diff(first: Mind, second: Mind) -> MindDiff:
-    """What differs between two minds."""
+    """The differences between two minds."""
     relations = _true(first) | _true(second)
     was, now = ({**dict(_facts(m)), **_truths(m, relations)} for m in (first, second))
     order = sorted({*was, *now}, key=lambda key: (_ORDER.index(key[0]), key[1]))
@@ -105,7 +105,7 @@ _ORDER = (
 
 
 def _facts(mind: Mind) -> Iterator[tuple[Key, str]]:
-    """What a mind says, in words by what it is about."""
+    """The beliefs of a mind as texts by topic and item."""
     yield ("camera", "health"), mind.health.status.value
     for kind in sorted(mind.unknown):
         yield ("unknown", kind), "could not be observed"
@@ -149,12 +149,12 @@ def _of_tasks(mind: Mind) -> Iterator[tuple[Key, str]]:
 
 
 def _true(mind: Mind) -> frozenset[tuple[str, tuple[int, ...]]]:
-    """The relations that are true, of those that are told when all are gone through."""
+    """The true relations among the listed ones."""
     return frozenset((r.name, r.objects) for r in mind.relations if r.truth is Truth.TRUE)
 
 
 def _truths(mind: Mind, wanted: frozenset[tuple[str, tuple[int, ...]]]) -> dict[Key, str]:
-    """The truth of some relations, without those that are not evaluated."""
+    """The truth of relations, without those not evaluated."""
     found = {key: mind.relation(key[0], *key[1]) for key in wanted}
     return {("relation", _call(*key)): r.truth.value for key, r in found.items() if r is not None}
 

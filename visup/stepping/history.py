@@ -1,9 +1,8 @@
-"""All past steps at the price of a few: observations, a mind now and then, and reasoning again.
+"""Access to all past steps at low cost: stored observations, occasional minds, and recomputation.
 
-Reasoning is deterministic, so that a step need not be kept: it is thought again from the nearest mind
-before it. How far apart the kept minds are settles both what going back costs (at most `SPACING`
-steps) and what is kept (one mind in `SPACING`): consecutive minds share little, for measured numbers
-differ. The latest steps are kept whole, for looking back a little.
+Reasoning is deterministic, so a step can be recomputed from the nearest stored mind before it. The spacing of
+stored minds is a trade-off between the cost of going back (at most `SPACING` steps) and memory (one mind in
+`SPACING`): consecutive minds share little data, because measured numbers differ. The latest steps are cached.
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ LATEST = 100
 
 @dataclass(slots=True)
 class StepHistory:
-    """The steps of one timeline, and a place among them.
+    """The steps of one timeline, and the current position.
 
     Attributes:
-        agent: Thinks; between two steps it is what it was after step `at`.
-        observations: What was perceived; a branch shares it with the timeline that it left.
-        at: The place: how many steps led here.
-        begin: The number of steps before this timeline began: 0 but for branches.
-        answers: What the operator said before the step after each number.
-        spacing: Steps between two minds that are kept.
-        latest: How many steps are kept whole.
-        made: How many steps were ever made, those before it began included.
+        agent: The agent, in its state after step `at`.
+        observations: The observations, shared between a branch and its parent.
+        at: The position: number of steps before it.
+        begin: Number of steps before this timeline began: 0 except for branches.
+        answers: Step number -> the operator's answers before the next step.
+        spacing: Steps between stored minds.
+        latest: Number of cached steps.
+        made: Total number of steps made, including those before the beginning.
     """
 
     agent: Agent
@@ -62,18 +61,18 @@ class StepHistory:
         """The history of a branch that starts here: another agent with the same observations and answers.
 
         Args:
-            agent: As it is to be here.
+            agent: The agent in its state here.
         """
         answers = {n: given for n, given in self.answers.items() if n >= self.at}
         return StepHistory(agent, self.observations, self.at, answers, self.spacing, self.latest)
 
     @property
     def here(self) -> AgentSnapshot:
-        """What the agent is now."""
+        """The present state of the agent."""
         return self.agent.snapshot()
 
     def phases(self, observation: Observation) -> Iterator[tuple[Phase, Outcome]]:
-        """The reasoning of the next step, phase by phase, up to what `conclude` wants."""
+        """The reasoning of the next step, phase by phase, up to the input of `conclude`."""
         self._note_answers()
         return self.agent.phases(observation, self.answers.get(self.at, {}))
 
@@ -93,16 +92,16 @@ class StepHistory:
         return step
 
     def forward(self) -> Step:
-        """One step on along what was perceived."""
+        """Make the next step on the stored observations."""
         seen = self.observations.seen(self.at)
         *_, (_, thought) = self.phases(seen)
         return self.conclude(seen, thought)
 
     def go(self, number: int) -> Step | None:
-        """Be after step `number`, one that was made.
+        """Move to the position after step `number`, which must have been made.
 
         Returns:
-            That step; None where the timeline begins.
+            That step; None at the beginning of the timeline.
         """
         self._note_answers()
         step = None
@@ -114,19 +113,19 @@ class StepHistory:
         return step
 
     def step(self, number: int) -> Step | None:
-        """Step `number`, one that was made, without going there; None where the timeline begins."""
+        """Step `number`, without moving there; None at the beginning of the timeline."""
         with self.elsewhere():
             return self.go(number)
 
     def snapshot(self, number: int) -> AgentSnapshot:
-        """What the agent was after step `number`, one that was made."""
+        """The state of the agent after step `number`."""
         with self.elsewhere():
             self.go(number)
             return self.here
 
     @contextmanager
     def elsewhere(self) -> Iterator[None]:
-        """Whatever is done meanwhile, the place is the same again afterwards."""
+        """A context that restores the position afterwards."""
         at, was = self.at, self.here
         try:
             yield
@@ -135,7 +134,7 @@ class StepHistory:
             self.agent.restore(was)
 
     def jump(self, number: int, was: AgentSnapshot) -> None:
-        """Be after step `number`, at which the agent was this."""
+        """Move to the position after step `number`, given the agent's state there."""
         self._note_answers()
         self.at = number
         self.agent.restore(was)
@@ -148,12 +147,12 @@ class StepHistory:
                 yield number, event
 
     def _note_answers(self) -> None:
-        """Keep what the operator said since the latest step, before the agent becomes another."""
+        """Store the operator's answers since the latest step, before the agent's state changes."""
         if self.at == self.made and (said := self.here.answers):
             self.answers[self.at] = {**self.answers.get(self.at, {}), **said}
 
     def _take_up(self, number: int) -> Step | None:
-        """Be after a step that is kept, whole or as a mind."""
+        """Move to a cached step or stored mind."""
         step, was = self._whole.get(number) or (None, self._minds[number])
         self.at = number
         self.agent.restore(was)

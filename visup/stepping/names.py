@@ -1,4 +1,4 @@
-"""What words of a session may mean: the stages and rules that there are, also before the first step."""
+"""Known names of a session: stages and rules, even before the first step."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from visup.tasks.supervision.supervise import TaskReasoner
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What words may mean: the stages and the rules that there are.
+    """Known names.
 
     Attributes:
-        stages: Of all tasks.
-        rules: Of all reasoners.
+        stages: Stages of all tasks.
+        rules: Rules of all reasoners.
     """
 
     stages: tuple[str, ...] = ()
@@ -26,11 +26,11 @@ class Names:
 
 
 def known_names(mind: Mind, reasoners: Iterable[Reasoner] = ()) -> Names:
-    """The stages and rules that are known.
+    """The known stages and rules.
 
     Args:
-        mind: Knows those that were judged; none before its first step.
-        reasoners: Know their own, before the first step too.
+        mind: Provides evaluated ones; none before its first step.
+        reasoners: Provide their own, even before the first step.
     """
     stages, rules = list(stage_names(mind)), list(rule_names(mind))
     for each in reasoners:

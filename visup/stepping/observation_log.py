@@ -1,4 +1,4 @@
-"""What was perceived, step by step, as compactly as a journal holds it: the past to go back into."""
+"""Past observations, stored as compactly as in a journal."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pydantic_core import from_json, to_json
 from visup.agent import Observation
 from visup.agent.storage.codec import from_document, to_document
 
-_LEVEL = 1  # of zlib; see the codec
+_LEVEL = 1  # zlib; see the codec
 
 
 @dataclass(slots=True)
 class ObservationLog:
     """Observations by number: number n led from step n to step n + 1.
 
-    What the journal's form cannot hold (a plug-in's value of a kind of its own) is kept as it is.
+    Observations that the codec does not support (values of plug-ins) are stored unchanged.
     """
 
     _seen: list[bytes | Observation] = field(default_factory=list)
@@ -26,14 +26,14 @@ class ObservationLog:
         return len(self._seen)
 
     def add(self, observation: Observation) -> None:
-        """Keep one more."""
+        """Add an observation."""
         told = to_document(observation)
         lost = any("lost" in report for report in told["reports"])
         packed = zlib.compress(to_json(told, inf_nan_mode="constants"), _LEVEL)
         self._seen.append(observation if lost else packed)
 
     def seen(self, number: int) -> Observation:
-        """What was perceived after step `number`."""
+        """The observation after step `number`."""
         kept = self._seen[number]
         if isinstance(kept, Observation):
             return kept

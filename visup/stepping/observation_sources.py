@@ -1,4 +1,4 @@
-"""Where observations come from: behaviours that look at frames, a recorded run, or a script."""
+"""Sources of observations: behaviours on frames, a recorded run, or a script."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from visup.agent.storage.journal_reader import Recording
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepInput:
-    """What the next step begins with.
+    """The input of the next step.
 
     Attributes:
-        seen: What was perceived.
-        answers: What the operator said before it in a recorded run; None where nothing is recorded.
-        frame: The frame, where there is one.
+        seen: The observation.
+        answers: The operator's answers before it in a recorded run; None if not recorded.
+        frame: The frame, or None.
     """
 
     seen: Observation
@@ -28,15 +28,15 @@ class StepInput:
 
 @runtime_checkable
 class ObservationSource(Protocol):
-    """Gives one observation after the other; it cannot go back."""
+    """Provides observations one by one; it cannot go back."""
 
     def next(self, agent: Agent) -> StepInput | None:
-        """What comes next, for an agent that is after the latest step; None at the end."""
+        """The next input, for an agent after the latest step; None at the end."""
         ...
 
 
 class LiveObservations:
-    """The agent's behaviours look at frames."""
+    """Observations of the agent's behaviours on frames."""
 
     def __init__(self, frames: Iterable[Frame]) -> None:
         self._frames = iter(frames)
@@ -48,7 +48,7 @@ class LiveObservations:
 
 
 class RecordedObservations:
-    """What a run perceived, and what its operator said, from its journal."""
+    """Observations and answers from the journal of a run."""
 
     def __init__(self, recording: Recording) -> None:
         self._seen: Iterator[Observation] = recording.observations()
@@ -61,7 +61,7 @@ class RecordedObservations:
 
 
 class ScriptedObservations:
-    """Observations that are there already, such as scripted ones."""
+    """Given observations, such as scripted ones."""
 
     def __init__(self, seen: Iterable[Observation]) -> None:
         self._seen = iter(seen)

@@ -1,4 +1,4 @@
-"""The debugger of an agent: forth, back, inside a step, and aside into what might have been."""
+"""The debugger of an agent: steps forward, back, inside a step, and into what-if branches."""
 
 from __future__ import annotations
 
@@ -40,16 +40,15 @@ class Stepper(Timeline):
     """Steps an agent forward and back, stops at breakpoints, and inspects its mind.
 
     Args:
-        agent: The agent, new or after any step; or a history of its steps, to go on with.
+        agent: The agent, new or after any step; or a history of its steps to continue.
         frames: Frames for its behaviours; an `ObservationSource`, such as of a recorded run; or the
-            timeline that this one branches off.
-        spacing: Steps between two minds that are kept; more means less memory and longer ways
-            back.
-        latest: How many steps are kept whole.
+            timeline from which this one branches.
+        spacing: Steps between stored minds; more means less memory and slower stepping back.
+        latest: Number of cached steps.
 
     Attributes:
-        breakpoints: By their number.
-        watches: By their number.
+        breakpoints: Breakpoints by number.
+        watches: Watches by number.
     """
 
     def __init__(
@@ -71,14 +70,14 @@ class Stepper(Timeline):
 
     @classmethod
     def of_run(cls, run: Path | Recording, **changed: Any) -> Stepper:
-        """A stepper over what a run perceived; nothing is seen again.
+        """A stepper over the observations of a recorded run.
 
         Args:
             run: A run folder or its recording.
-            changed: Settings of the run to change, as of `visup.runs.replay.settings_for`.
+            changed: Settings of the run to change, as in `visup.runs.replay.settings_for`.
 
         Raises:
-            VisupError: There is no such run, or a setting is not as it should be.
+            VisupError: There is no such run, or a setting is not valid.
         """
         recording = run if isinstance(run, Recording) else Recording.open(run)
         return cls(
@@ -91,19 +90,19 @@ class Stepper(Timeline):
         until: str | Phase | Predicate | StopCondition | None = None,
         tell: Callable[[Step], None] | None = None,
     ) -> StepResult:
-        """Take some steps, or step until a condition holds; breakpoints also stop it.
+        """Make some steps, or step until a condition holds; breakpoints also stop it.
 
         Args:
-            n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
-                inside which it is stopped counts when it is completed.
+            n: Maximum number of steps; by default 1 without `until`, else unlimited. A step inside which it
+                is stopped counts when it is completed.
             until: See `visup.stepping.breakpoint_parser.parse_condition`.
-            tell: Told of each step as it is completed.
+            tell: Receives each completed step.
 
         Returns:
             Where and why it ended.
 
         Raises:
-            SettingsError: Nothing is meant by `until`.
+            SettingsError: `until` is not valid.
         """
         goal = (self._condition(until),) if until is not None else ()
         most = n if n is not None or goal else 1
@@ -151,7 +150,7 @@ class Stepper(Timeline):
         for watch in self.watches.values() if self.mind.frame_index >= 0 else ():
             watch.look(self.mind, self.mind)
 
-    # Where to stop, what to watch
+    # Breakpoints and watches
 
     def break_at(self, what: str | Phase | Predicate | StopCondition) -> Breakpoint:
         """Set a breakpoint; see `visup.stepping.breakpoint_parser.parse_condition`."""
@@ -161,7 +160,7 @@ class Stepper(Timeline):
 
     @property
     def names(self) -> Names:
-        """The stages and rules that may be named, also before the first step."""
+        """The known stages and rules, even before the first step."""
         return known_names(self.mind, self.agent.reasoners)
 
     def _condition(self, what: str | Phase | Predicate | StopCondition) -> StopCondition:
@@ -176,7 +175,7 @@ class Stepper(Timeline):
         del self.breakpoints[self._breakpoint(number).id]
 
     def enable(self, number: int, enabled: bool = True) -> None:
-        """Look at a breakpoint again, or no longer.
+        """Enable or disable a breakpoint.
 
         Raises:
             SettingsError: There is none of that number.
@@ -190,14 +189,14 @@ class Stepper(Timeline):
         return self.breakpoints[number]
 
     def watch(self, text: str, *, breaks: bool = False) -> WatchExpression:
-        """Judge an expression of the rule language after each step.
+        """Evaluate an expression of the rule language after each step.
 
         Args:
             text: Such as `gap(1, 2)` or `touching(arm, satellite) for 1 s`.
-            breaks: Whether steps end when what it shows changes.
+            breaks: Whether to stop when its value changes.
 
         Raises:
-            RuleError: It cannot be read.
+            RuleError: It is not valid.
         """
         made = WatchExpression.of(max(self.watches, default=0) + 1, text, breaks)
         if self.mind.frame_index >= 0:
@@ -206,7 +205,7 @@ class Stepper(Timeline):
         return made
 
     def unwatch(self, number: int) -> None:
-        """No longer judge an expression.
+        """Delete a watch.
 
         Raises:
             SettingsError: There is no watch of that number.
@@ -215,18 +214,18 @@ class Stepper(Timeline):
             known = ", ".join(map(str, self.watches)) or "no watches are set"
             raise SettingsError(f"there is no watch {number}", expected=known)
 
-    # Aside
+    # Branches
 
     @property
     def may_answer(self) -> bool:
-        """Whether the operator of this timeline can still speak: it is neither past nor recorded."""
+        """Whether the operator can answer here: at the end of a timeline that is not recorded."""
         return self.at == self.made and not isinstance(self._source, RecordedObservations)
 
     def answer(self, object_id: int, name: str) -> None:
-        """Say what an object is, as the operator of this run; where steps follow, branch first.
+        """Identify an object as the operator of this run; if steps follow, branch first.
 
         Raises:
-            SettingsError: Later steps were made, or nobody knows such an object or name.
+            SettingsError: Later steps were made, or there is no such object or name.
         """
         if not self.may_answer:
             recorded = isinstance(self._source, RecordedObservations)
@@ -236,14 +235,13 @@ class Stepper(Timeline):
         self.agent.answer(object_id, name)
 
     def branch(self, *assumptions: Assumption, reasoners: Reasoners | None = None) -> Stepper:
-        """Another timeline from here on, under some assumptions; this one stays as it is.
+        """A branch from here under some assumptions; this timeline is not changed.
 
-        It perceives the very same; when it comes to the end of what was perceived, this timeline goes
-        on by itself, ahead of its place.
+        It has the same observations; at their end, this timeline is extended ahead of its position.
 
         Args:
-            assumptions: Held in every step of the branch whatever is seen, from `visup.stepping.what_if`.
-            reasoners: What reasons there; as here when left out.
+            assumptions: Enforced in every step of the branch, from `visup.stepping.what_if`.
+            reasoners: Reasoners of the branch; by default the same.
         """
         reasoners = reasoners or self.agent.reasoners
         other = replace_agent(self.agent, assuming_reasoners(reasoners, assumptions))
@@ -256,10 +254,10 @@ class Stepper(Timeline):
         return made
 
     def compare(self) -> TranscriptDiff:
-        """How the events of this branch differ from those of the original timeline, over the same steps.
+        """The difference of events between this branch and its parent over the same steps.
 
         Returns:
-            Events that only that timeline told, and only this branch told; and both verdicts here.
+            Events of only the parent, of only this branch, and both verdicts here.
 
         Raises:
             SettingsError: This is no branch.
@@ -268,7 +266,7 @@ class Stepper(Timeline):
         if parent is None:
             raise SettingsError("this is not a branch: there is nothing to compare it with")
         while parent.made < self.at and parent._look_ahead():
-            continue  # it was stopped inside a step that this branch has made
+            continue  # the parent was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at
         return transcript_diff(
             _transcript(parent.events(first, last), parent.mind_at(last)),
@@ -276,11 +274,11 @@ class Stepper(Timeline):
         )
 
     def diff(self, first: int, second: int | None = None) -> MindDiff:
-        """What differs between the minds after two steps; the second one is here when left out."""
+        """The differences between the minds after two steps; the second is here by default."""
         there = self.mind if second is None else self.mind_at(second)
         return mind_diff(self.mind_at(first), there)
 
-    # Why
+    # Explanations
 
     def why(self, what: object) -> Why:
         """Explain something at this step: a tree of reasons, down to percepts and their frames.
@@ -290,19 +288,19 @@ class Stepper(Timeline):
                 `alert 2`, `touching 1 2`, `identity 1`, `captured`, `verdict`.
 
         Raises:
-            VisupError: Nothing is known of it.
+            VisupError: It cannot be explained.
         """
         reasons = ReasonFinder(self, self.at, self.mind)
         return asking.why(reasons, what) if isinstance(what, str) else reasons.of(what)
 
     def why_not(self, text: str) -> Why:
-        """Why something has not happened: conditions that are not met, and by how much.
+        """Why something has not happened: unmet conditions with their margins.
 
         Args:
             text: Such as `coupled 1 2`, `collision_course`, `stage captured`, `entry 3`, `identified 1`.
 
         Raises:
-            VisupError: Nothing is known of it.
+            VisupError: It cannot be explained.
         """
         made = self.at > self.begin
         before = self.mind_at(self.at - 1) if made else None
@@ -310,7 +308,7 @@ class Stepper(Timeline):
         return asking.why_not(LastStep(self.mind, before, seen, tuple(self.agent.reasoners)), text)
 
     def close(self) -> None:
-        """Let go of what the agent's behaviours have started."""
+        """Release the resources of the agent's behaviours."""
         self.agent.close()
 
 
@@ -320,7 +318,7 @@ def _transcript(events: Iterator[tuple[int, Event]], mind: Mind) -> Transcript:
 
 
 def replace_agent(agent: Agent, reasoners: Reasoners) -> Agent:
-    """An agent that reasons with other reasoners, and perceives nothing."""
+    """The same agent with other reasoners and without behaviours."""
     return Agent(
         reasoners=reasoners,
         actors=agent.actors,

@@ -1,4 +1,4 @@
-"""One timeline of an agent that can be walked forth and back: new steps, old steps, half steps."""
+"""One timeline of an agent with forward, backward and partial steps."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from visup.stepping.observation_sources import ObservationSource
 
 
 class Timeline:
-    """An agent with its history, a place in it, and what gives it more.
+    """An agent with its history, a position in it, and a source of further observations.
 
     Args:
-        history: Of its agent.
-        source: Gives observations; of a branch, the timeline that it left.
+        history: History of the agent.
+        source: Source of observations; for a branch, its parent timeline.
 
     Attributes:
-        agent: The agent; its mind is that of the place.
-        parent: The timeline that this one branched off, or None.
+        agent: The agent, in its state at the position.
+        parent: The timeline from which this one branched, or None.
     """
 
     def __init__(self, history: StepHistory, source: ObservationSource | Timeline) -> None:
@@ -36,27 +36,27 @@ class Timeline:
         self._rest: Iterator[tuple[Phase, Outcome]] = iter(())
         self._last: Step | None = None
 
-    # Where it is
+    # Position
 
     @property
     def mind(self) -> Mind:
-        """What is believed here; half-made when stopped inside a step."""
+        """The mind here; unfinished if stopped inside a step."""
         thought = self._paused.thought if self._paused else None
         return self.agent.mind if thought is None else thought.mind
 
     @property
     def at(self) -> int:
-        """How many steps led here."""
+        """Number of steps before this position."""
         return self._history.at
 
     @property
     def made(self) -> int:
-        """How many steps were ever made."""
+        """Total number of steps made."""
         return self._history.made
 
     @property
     def begin(self) -> int:
-        """How many steps there were before this timeline: 0 but for branches."""
+        """Number of steps before this timeline: 0 except for branches."""
         return self._history.begin
 
     @property
@@ -66,13 +66,13 @@ class Timeline:
 
     @property
     def last(self) -> Step | None:
-        """The last completed step, or None where the timeline begins."""
+        """The last completed step, or None at the beginning of the timeline."""
         return self._last
 
-    # Forth
+    # Forward
 
     def _cycle(self, phases: frozenset[Phase]) -> Step | None:
-        """On to the end of a step, or None: stopped inside it, or nothing more is perceived."""
+        """Run to the end of a step; None if stopped inside it, or if the source has ended."""
         before = self.agent.mind
         if self._paused is None:
             seen = self._perceived()
@@ -97,10 +97,10 @@ class Timeline:
         return step
 
     def _after(self, before: Mind, step: Step) -> None:
-        """Told of each step that is completed here, with the mind before it."""
+        """Called for each completed step with the mind before it."""
 
     def _perceived(self) -> Observation | None:
-        """What the next step begins with: what was perceived before, or new."""
+        """The observation of the next step: stored, or new from the source."""
         history = self._history
         if history.at < len(history.observations):
             return history.observations.seen(history.at)
@@ -121,7 +121,7 @@ class Timeline:
         return given.seen
 
     def _look_ahead(self) -> bool:
-        """One more step at the end of this timeline, for a branch; the place stays."""
+        """Extend this timeline by a step for a branch; the position is kept."""
         place = self._paused, self._rest, self._last
         made = self.made
         with self._history.elsewhere():
@@ -132,26 +132,26 @@ class Timeline:
         return self.made > made
 
     def _look_again(self) -> None:
-        """Told when the place has changed otherwise than by a step."""
+        """Called when the position has changed other than by a step."""
 
     def _arrive(self, step: Step | None) -> None:
         self._drop()
         self._last = step
 
     def _drop(self) -> None:
-        """Forget the half-made step, if there is one; what was perceived stays recorded."""
+        """Discard the unfinished step, if any; its observation stays recorded."""
         self._paused, self._rest = None, iter(())
 
     # Back
 
     def back(self, n: int = 1) -> Step | None:
-        """Go back by some steps; a step inside which it is stopped is left, and counts as one.
+        """Go back by some steps; leaving an unfinished step counts as one.
 
         Returns:
-            The step after which it is now, or None where the timeline begins.
+            The step before the new position, or None at the beginning of the timeline.
 
         Raises:
-            SettingsError: There are not so many.
+            SettingsError: There are fewer steps.
         """
         number = self.at - n + (self._paused is not None)
         if number < self.begin:
@@ -161,10 +161,10 @@ class Timeline:
         return self.go(number)
 
     def go(self, number: int) -> Step | None:
-        """Go to the state after step `number`; missing steps are taken, and breakpoints are ignored.
+        """Go to the state after step `number`; missing steps are made, and breakpoints are ignored.
 
         Raises:
-            SettingsError: There is no such step; the place stays.
+            SettingsError: There is no such step; the position is kept.
         """
         if number < self.begin:
             raise SettingsError(
@@ -180,10 +180,10 @@ class Timeline:
         return self._last
 
     def go_to_time(self, seconds: float) -> Step | None:
-        """Be after the first step that is not before a time; later ones are made if need be.
+        """Go to the state after the first step not before a time; missing steps are made.
 
         Raises:
-            SettingsError: The source ends before; the place stays.
+            SettingsError: The source ends before; the position is kept.
         """
         before = self.snapshot()
         made = range(self.begin + 1, self.made + 1)
@@ -200,11 +200,11 @@ class Timeline:
         return self._last
 
     def snapshot(self) -> Bookmark:
-        """This place, to come back to with `restore`; a few references, no copy."""
+        """This position, for `restore`; a few references, no copy."""
         return Bookmark(self.at, self._history.here, self._history)
 
     def restore(self, mark: Bookmark) -> None:
-        """Be again where a snapshot was taken.
+        """Return to the position of a snapshot.
 
         Raises:
             SettingsError: It is of another timeline.
@@ -217,10 +217,10 @@ class Timeline:
         self._history.jump(mark.number, mark.snapshot)
         self._look_again()
 
-    # What was
+    # Past steps
 
     def at_step(self, number: int) -> Step | None:
-        """A step that was made, without going there; None where the timeline begins.
+        """A step without moving there; None at the beginning of the timeline.
 
         Raises:
             SettingsError: It was not made.
@@ -234,14 +234,14 @@ class Timeline:
         return self._history.step(number)
 
     def mind_at(self, number: int) -> Mind:
-        """The mind after a step that was made."""
+        """The mind after a step."""
         self.at_step(number)
         return self._history.snapshot(number).mind
 
     def events(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
-        """All events so far, also after this step, each with the number of its step."""
+        """All events so far, including those after this position, with the numbers of their steps."""
         return self._history.events(first, last)
 
     def observation_at(self, number: int) -> Observation:
-        """What was perceived in a step; numbers begin at 1, with what was seen before any branch."""
+        """The observation of a step; numbers begin at 1 and include the steps before a branch."""
         return self._history.observations.seen(number - 1)

@@ -1,4 +1,4 @@
-"""Watches: expressions of the rule language whose values are shown after each step."""
+"""Breakpoints and watches: expressions of the rule language that are evaluated after each step."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from visup.stepping.breakpoints import ExpressionMonitor, StopCondition, WhenSto
 
 @dataclass(slots=True)
 class Breakpoint:
-    """A condition that ends every run of steps.
+    """A condition that stops stepping.
 
     Attributes:
         id: Number, from 1.
         stop: The condition.
-        enabled: Whether it is looked at.
-        hits: How often it has ended a run.
+        enabled: Whether it is evaluated.
+        hits: How often it has stopped.
     """
 
     id: int
@@ -33,13 +33,13 @@ class Breakpoint:
 
 @dataclass(slots=True)
 class WatchExpression:
-    """An expression that is judged after each step.
+    """An expression that is evaluated after each step.
 
     Attributes:
         id: Number, from 1.
         stop: The expression; also the condition that it changes.
-        breaks: Whether a change ends a run of steps.
-        judged: What it came to after the latest step, or None.
+        breaks: Whether a change stops stepping.
+        judged: Result after the latest step, or None.
     """
 
     id: int
@@ -53,7 +53,7 @@ class WatchExpression:
         """A watch on an expression.
 
         Raises:
-            RuleError: It cannot be read.
+            RuleError: It is not valid.
         """
         return cls(number, WhenStop(expression(text), True), breaks)
 
@@ -64,16 +64,16 @@ class WatchExpression:
 
     @property
     def readings(self) -> tuple[ExpressionValue, ...]:
-        """Its values, one for each choice of objects; what is the same both ways round once."""
+        """Its values, one per assignment of objects; symmetric ones once."""
         found: dict[tuple[tuple[int, ...], str], ExpressionValue] = {}
         for reading in self.judged.readings if self.judged else ():
             found.setdefault((tuple(sorted(reading.objects)), str(reading)), reading)
         return tuple(found.values())
 
     def look(self, before: Mind, after: Mind) -> None:
-        """Judge it after a step."""
+        """Evaluate it after a step."""
         _, self.judged = self._follow(self.stop.expression, before, after)
 
     def changed(self, before: Mind, step: Step) -> str:
-        """How its value has changed, or an empty text; to be called after each step."""
+        """How its value has changed, or an empty text; call it after each step."""
         return self.stop.met(before, step) if self.breaks else ""

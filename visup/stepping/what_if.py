@@ -1,7 +1,7 @@
-"""What if: beliefs that a branch insists upon, and other rules or tasks to reason with.
+"""What-if branches: enforced beliefs, and other rules or tasks.
 
-A belief is made again after every reasoner, in every step: what is measured goes on saying otherwise,
-and whatever comes later in the step reasons from the belief.
+A belief is enforced after every reasoner in every step, because measurements keep contradicting it; later
+reasoners of the step use it.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
 
 Assumption = Callable[[Mind], Mind]
-"""Gives a mind in which it is so; what it is about may not be there."""
+"""Returns a mind in which the assumption holds; its objects may not exist."""
 
 
 @dataclass(frozen=True, slots=True)
 class AssumedRelation:
-    """A relation is true, false or unknown, since a time in seconds.
+    """A relation is true, false or unknown since a time in seconds.
 
-    Where one answer of several excludes the others (converging, keeping their distance, diverging),
-    a false one makes the next one true.
+    For mutually exclusive relations (converging, keeping their distance, diverging), a false one makes an
+    adjacent one true.
     """
 
     name: str
@@ -64,7 +64,7 @@ class AssumedRelation:
         return self._coupled(mind) if self.name == "coupled" else mind
 
     def _coupled(self, mind: Mind) -> Mind:
-        """What is coupled is also kept apart from the relations."""
+        """Couplings are also stored separately from the relations."""
         low, high = sorted(self.objects)
         others = tuple(c for c in mind.couplings if c.objects != (low, high))
         if self.truth is not Truth.TRUE:
@@ -76,7 +76,7 @@ class AssumedRelation:
 
 @dataclass(frozen=True, slots=True)
 class AssumedIdentity:
-    """An object is of a model; 'unknown object' for none of them."""
+    """An object has the identity of a model; 'unknown object' for none."""
 
     object_id: int
     name: str
@@ -108,7 +108,7 @@ class AssumedPresence:
 
 @dataclass(frozen=True, slots=True)
 class AssumingReasoner:
-    """A reasoner after which some beliefs are made so again."""
+    """A reasoner wrapped to enforce beliefs after it."""
 
     reasoner: Reasoner
     beliefs: tuple[Assumption, ...]
@@ -129,14 +129,14 @@ def _contradicts(belief: Assumption, event: Event) -> bool:
 
 
 def with_assumptions(mind: Mind, beliefs: Iterable[Assumption]) -> Mind:
-    """The mind with some beliefs."""
+    """The mind with the assumptions enforced."""
     for belief in beliefs:
         mind = belief(mind)
     return mind
 
 
 def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> Reasoners:
-    """Reasoners that hold to some beliefs."""
+    """Reasoners wrapped to enforce beliefs."""
     if not beliefs:
         return reasoners
 
@@ -147,14 +147,14 @@ def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> R
 
 
 def with_rules(reasoners: Reasoners, rules: Sequence[Rule]) -> Reasoners:
-    """Reasoners that watch other rules."""
+    """Reasoners with other rules."""
     kept = tuple(t for t in reasoners.cogitate if not isinstance(t, RuleReasoner))
     early = any(t.early for t in reasoners.cogitate if isinstance(t, RuleReasoner))
     return replace(reasoners, cogitate=(*kept, RuleReasoner(tuple(rules), early=early)))
 
 
 def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
-    """Reasoners that supervise other tasks, from their beginnings."""
+    """Reasoners with other tasks, from their beginnings."""
     kept = tuple(
         t for t in reasoners.match if getattr(t, "__module__", "") != task_reasoner.__module__
     )
@@ -162,7 +162,7 @@ def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
 
 
 def without_tasks(mind: Mind) -> Mind:
-    """The mind as if no task had been supervised yet."""
+    """The mind without any task beliefs."""
     memory = {k: v for k, v in mind.memory.items() if k != MEMORY.name}
     return replace(mind, tasks=(), memory=MappingProxyType(memory))
 
@@ -195,11 +195,11 @@ def _with_cell(cells: RelationBlock, told: Relation, row: int, k: int) -> Relati
         code = UNKNOWN_CODE
     elif told.truth is Truth.FALSE:
         others = [c for c in range(len(column.names)) if c != code]
-        # A code without a name says nothing else; else what is next to it.
+        # Prefer a code without a name, which implies nothing else; otherwise an adjacent one.
         code = min(others, key=lambda c: (column.names[c] != "", abs(c - code)))
     state, since, at = cells.state.copy(), cells.since.copy(), column.rows[row]
     state[at, k], since[at, k] = code, told.since
-    # Other columns may be as sure as this one was: it has a row of its own from now on.
+    # The confidence row may be shared with other columns: this one gets a row of its own.
     numbers = np.concatenate([cells.numbers, cells.numbers[column.confidence][None]])
     numbers[-1, k] = told.confidence
     own = replace(column, confidence=len(numbers) - 1)

@@ -26,7 +26,7 @@ def read_pattern(text: str) -> Expression:
 
     Raises:
         RuleError: It is not a valid condition.
-        ManyErrors: It has several mistakes.
+        ErrorGroup: It has several mistakes.
     """
     if len(parts := list(_parts(text))) > 1:
         for part in parts:  # mistakes are reported at their own position

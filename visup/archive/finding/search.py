@@ -161,7 +161,7 @@ def read_search(text: str, *, unknown: bool = False) -> Search:
 
     Raises:
         RuleError: It is none of them.
-        ManyErrors: It has several mistakes.
+        ErrorGroup: It has several mistakes.
     """
     if text.endswith((".rules", ".task")):
         if unknown:

@@ -53,7 +53,7 @@ def find_scenario(word: str) -> Scenario:
 
     Raises:
         SettingsError: There is none, or the file is not as it should be.
-        ManyErrors: The file has several faults.
+        ErrorGroup: The file has several faults.
     """
     path = Path(word)
     if path.is_file() or path.suffix == ".toml":

@@ -220,7 +220,7 @@ def load_scenario(path: Path) -> Scenario:
 
     Raises:
         SettingsError: The file cannot be read, is not TOML, or has one fault.
-        ManyErrors: It has several.
+        ErrorGroup: It has several.
     """
     try:
         text = read_text_file(path)

@@ -1,5 +1,5 @@
-"""Evidence of alerts: for each a picture with what was believed, and a clip from before to after it.
+"""Evidence of alerts: for each a picture with the beliefs, and a clip from before to after it.
 
-Read `frame_ring.py` (what was seen a moment ago), `clip_spool.py` (a clip while it is made, which outlives a
-kill) and `keeper.py` (what is kept of which alert, and under which names).
+Read `frame_ring.py` (recent frames), `clip_spool.py` (a clip in progress, which survives a kill) and
+`keeper.py` (saves the evidence of each alert).
 """

@@ -1,8 +1,8 @@
-"""A clip while it is made: frames one after the other in a file, whole again after a kill, then WebM.
+"""A clip in progress: frames are appended to a file, which survives a kill, and then encoded as WebM.
 
-The video is written once its last frame is there, with VP8, which every browser plays: OpenCV's FFmpeg writes
-it without H.264, whose licence would bind whoever ships it. (The ready-made PyAV has x264 and x265 in it,
-which are under the GPL.)
+The video is encoded after its last frame with VP8, which every browser plays and which OpenCV's FFmpeg
+supports without the licence obligations of H.264. (The binary packages of PyAV include x264 and x265, which
+are under the GPL.)
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ SUFFIX = ".spool"
 _HEAD = struct.Struct("<dI")
 LARGEST_FRAME = 2**26
 FASTEST, SLOWEST = 30.0, 1.0
-"""Frames a second of a clip."""
+"""Limits of the frame rate of a clip, frames per second."""
 
 LEAST_FREE = 2**24
-"""Bytes that must be free on the disk before and after: an encoder does not say that it found no room."""
+"""Bytes that must be free on the disk before and after: the encoder does not report a full disk."""
 
 
 class ClipSpool:
@@ -53,12 +53,12 @@ class ClipSpool:
         self._file.flush()
 
     def close(self) -> None:
-        """No more frames."""
+        """Close the file."""
         self._file.close()
 
 
 def spooled(path: Path) -> Iterator[EncodedFrame]:
-    """The frames of a spool, up to the first that was not written whole."""
+    """The frames of a spool up to the first incomplete one."""
     with path.open("rb") as file:
         while len(head := file.read(_HEAD.size)) == _HEAD.size:
             time, size = _HEAD.unpack(head)
@@ -68,15 +68,15 @@ def spooled(path: Path) -> Iterator[EncodedFrame]:
 
 
 def write_clip_of(spool: Path, target: Path, fps: float) -> None:
-    """Make the video of a spool, which is deleted then.
+    """Encode the video of a spool, and delete the spool.
 
     Args:
         spool: Frames with their times.
-        target: The file to write, `.webm`; it appears whole or not at all.
-        fps: Frames a second at which the source was looked at.
+        target: The `.webm` file, written atomically.
+        fps: Processed frames per second of the source.
 
     Raises:
-        OutputError: There is no room for it; the spool stays.
+        OutputError: There is not enough space; the spool stays.
         OSError: A file cannot be read or written.
     """
     fps = min(FASTEST, max(SLOWEST, fps))
@@ -89,7 +89,7 @@ def write_clip_of(spool: Path, target: Path, fps: float) -> None:
                 if image is not None:
                     video.write(np.asarray(image, np.uint8))
         _check_room(target.parent)
-        if draft.exists():  # a spool without a whole frame makes no video
+        if draft.exists():  # a spool without a complete frame makes no video
             draft.replace(target)
     finally:
         draft.unlink(missing_ok=True)
@@ -97,7 +97,7 @@ def write_clip_of(spool: Path, target: Path, fps: float) -> None:
 
 
 def evenly(frames: Iterable[EncodedFrame], fps: float) -> Iterator[EncodedFrame]:
-    """Frames as a video of one rate shows them: at each of its moments the latest one, as long as it takes.
+    """Resample frames to a constant rate: at each tick the latest frame.
 
     >>> frames = [EncodedFrame(t, b"") for t in (0.0, 0.1, 1.0)]
     >>> [frame.time for frame in evenly(frames, 4.0)]

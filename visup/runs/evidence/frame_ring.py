@@ -15,10 +15,11 @@ from visup.report.video import playable_size
 
 QUALITY = 80
 SAME_S = 0.95
-"""So long a frame stands for those after it that show nothing new, seconds."""
+"""How long a frame replaces the following ones that show nothing new, seconds."""
 
 VISIBLE = 3
-"""Levels of a colour on a cell of 8 x 8 pixels; noise of a camera leaves one or two."""
+"""Difference of the mean of 8 x 8 pixels that counts as visible, grey levels; camera noise causes one or
+two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +60,9 @@ def jpeg_of(image: NDArray[np.uint8], quality: int = QUALITY) -> bytes:
 
 
 class FrameEncoder:
-    """Encodes the frames of a camera; one that shows nothing new is kept as the one before it.
+    """Encodes the frames of a camera; one that shows nothing new reuses the previous encoding.
 
-    Most cameras see nothing for most of the day. What differs by so little that noise hides it is taken up
-    once a second.
+    Most cameras see no change for most of the day. Changes below the noise are encoded about once a second.
     """
 
     def __init__(self) -> None:
@@ -71,7 +71,7 @@ class FrameEncoder:
         self._small: NDArray[np.uint8] | None = None
 
     def __call__(self, image: NDArray[np.uint8], time: float) -> EncodedFrame:
-        """A frame as it is kept.
+        """Encode a frame.
 
         Args:
             image: (H, W, 3) uint8 BGR.
@@ -95,10 +95,10 @@ class FrameRing:
 
     Args:
         span_s: How long a frame is kept, seconds of the source.
-        most_bytes: How much all of them may take; beyond, the oldest go earlier.
+        most_bytes: Limit of their total size; beyond it the oldest are dropped earlier.
 
     Attributes:
-        size: What they take now, bytes.
+        size: Present total size, bytes.
     """
 
     def __init__(self, span_s: float, most_bytes: int) -> None:
@@ -107,7 +107,7 @@ class FrameRing:
         self._frames: deque[EncodedFrame] = deque()
 
     def add(self, frame: EncodedFrame) -> None:
-        """Keep a further frame; what is too old, or too much, goes."""
+        """Add a frame; drop those that are too old or exceed the limit."""
         self._frames.append(frame)
         self.size += len(frame.jpeg)
         while self._frames and (

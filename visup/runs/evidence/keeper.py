@@ -1,8 +1,8 @@
-"""Keeps evidence of the alerts of a run, in the folder `evidence` beside its journal.
+"""Saves evidence of the alerts of a run in the folder `evidence` next to its journal.
 
-An alert has a picture at once, `alert-ID.jpg`, so that whoever is told can look; its clip follows some
-seconds later under a name that is known from the beginning. Alerts that open while a clip is being made share
-it. What belongs to which alert stands in `alert-ID.json`.
+An alert has a picture at once, `alert-ID.jpg`, for those who are notified; its clip follows some seconds
+later under a name known from the beginning. Alerts that open during a clip share it. `alert-ID.json` names
+the files of an alert.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ from visup.runs.settings import EvidenceOptions
 
 EVIDENCE = "evidence"
 LONGEST_CLIP_S = 120.0
-"""A clip that further alerts make longer ends here, and the next alert has a new one."""
+"""Limit of a clip that further alerts extend; the next alert begins a new one."""
 
 SNAPSHOT_QUALITY = 90
 ROOM_EVERY_S = 30.0
-"""Seconds between two looks at the room on the disk: an alert about it stays as long."""
+"""Seconds between checks of the free disk space; also the least duration of an alert about it."""
 KEYS = ("snapshot", "clip")
 
 
 class _Room:
-    """Free space on the disk of a folder, checked from time to time.
+    """Free space on the disk of a folder, checked at intervals.
 
     Args:
-        folder: Which.
+        folder: The folder.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._looked, self._free = folder, -ROOM_EVERY_S, math.inf
 
     def free(self) -> float:
-        """Bytes."""
+        """Free bytes."""
         now = time.monotonic()
         if now - self._looked >= ROOM_EVERY_S:
             self._looked = now
@@ -65,13 +65,13 @@ def _not_recorded(key: str, said: str, why: str) -> AlertCondition:
 
 
 class EvidenceKeeper:
-    """An observer that keeps a picture and a clip of each alert.
+    """An observer that saves a picture and a clip of each alert.
 
     Args:
-        folder: Of the run.
-        options: How long clips are, and how much memory frames before an alert may take.
-        fps: Frames a second that are looked at.
-        stamp: Camera, host, and time by the clock of the wall.
+        folder: Folder of the run.
+        options: Length of clips, and memory for frames before an alert.
+        fps: Processed frames per second.
+        stamp: Camera, host, and wall-clock time.
     """
 
     def __init__(
@@ -90,28 +90,28 @@ class EvidenceKeeper:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="evidence")
         self._writing: list[Any] = []
         for spool in sorted(folder.parent.glob(f"*/{EVIDENCE}/*{SUFFIX}")):
-            self._write_later(spool)  # whoever made it was killed
+            self._write_later(spool)  # left by a killed process
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Keep the frame for a while, and evidence of the alerts that open."""
+        """Buffer the frame, and save evidence of the alerts that open."""
         seen = self._encoded(frame.image, step.time)
-        self._guarded(lambda: self._go_on(seen))
+        self._guarded(lambda: self._extend_clip(seen))
         opened = [a for a in step.alerts if a.closed is None]
         if opened:
             self._guarded(lambda: self._keep(opened, step, frame, seen))
         self._ring.add(seen)
 
     def links(self, alert: Alert) -> Mapping[str, str]:
-        """Where the evidence of an alert is: `snapshot`, `clip`; nothing where there is none."""
+        """Links to the evidence of an alert: `snapshot`, `clip`; empty if there is none."""
         found = self._links.get(alert.id)
         if found is None:
-            found = self._noted(alert)
+            found = self._existing_record(alert)
         if alert.closed is not None:
             self._links.pop(alert.id, None)
         return found
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """The fault that evidence cannot be saved, while that is so."""
+        """The fault that evidence cannot be saved, while it lasts."""
         if self._fault:
             said = "Pictures and clips of alerts cannot be kept; supervision goes on."
             yield _not_recorded(EVIDENCE, said, self._fault)
@@ -122,29 +122,29 @@ class EvidenceKeeper:
             yield _not_recorded("room", said, left)
 
     def move_to(self, folder: Path) -> None:
-        """Keep what comes from now on beside another journal."""
+        """Continue in the folder of another journal."""
         self._end_clip()
         self._folder = folder / EVIDENCE
 
     def close(self, wait_s: float = 10.0) -> None:
-        """End the clip; what is not written then is left to whoever goes on with the run.
+        """End the clip; unfinished files are left to the process that resumes the run.
 
         Args:
-            wait_s: How long the last clips may take, seconds.
+            wait_s: Time limit for the last clips, seconds.
         """
         self._end_clip()
         wait(self._writing, timeout=wait_s)
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     def _guarded(self, act: Callable[[], None]) -> None:
-        """Evidence may be lost but supervision continues: errors are reported."""
+        """Run an action; its errors are reported, since losing evidence must not stop the supervision."""
         try:
             act()
         except Exception as fault:
             self._fault = error_line(fault)
             self._end_clip()
 
-    def _go_on(self, seen: EncodedFrame) -> None:
+    def _extend_clip(self, seen: EncodedFrame) -> None:
         if self._clip:
             self._clip.add(seen)
             if seen.time >= self._until:
@@ -165,7 +165,7 @@ class EvidenceKeeper:
         self._fault = ""
 
     def _clip_for(self, name: str, seen: EncodedFrame) -> None:
-        """Begin a clip with what was seen before, or have the one that is being made go on longer."""
+        """Begin a clip with the buffered frames, or extend the present one."""
         if self._clip and seen.time - self._begun > LONGEST_CLIP_S:
             self._end_clip()
         if self._clip is None:
@@ -187,14 +187,14 @@ class EvidenceKeeper:
         self._writing = [w for w in self._writing if not w.done()]
         left, self._left = self._left, []
         for one in (*left, spool):
-            with suppress(RuntimeError):  # no room for a thread: the next process does it
+            with suppress(RuntimeError):  # no memory for a thread: the next process does it
                 self._writing.append(self._worker.submit(self._write, one))
 
     def _write(self, spool: Path) -> None:
         try:
             write_clip_of(spool, spool.with_suffix(".webm"), self._fps)
         except FileNotFoundError:
-            return  # it was deleted meanwhile, to make room
+            return  # deleted meanwhile to free space
         except Exception as fault:
             self._fault = error_line(fault)
             self._left.append(spool)
@@ -204,8 +204,8 @@ class EvidenceKeeper:
         base = self._options.link
         return str(path) if base is None else f"{base}/{path.parent.parent.name}/{EVIDENCE}/{name}"
 
-    def _noted(self, alert: Alert) -> Mapping[str, str]:
-        """What a process before this one noted."""
+    def _existing_record(self, alert: Alert) -> Mapping[str, str]:
+        """The record of an earlier process."""
         try:
             told = json.loads(read_text_file(self._folder / f"alert-{alert.id}.json"))
             return {key: self._link(Path(str(told[key])).name) for key in KEYS}

@@ -1,7 +1,6 @@
-"""What a run is given besides its source: zones, behaviours of the user's own, and whether all of it will do.
+"""Inputs of a run besides its source: zones, user behaviours, and the preflight.
 
-Read `zones.py` and `plugins.py` (what is loaded), `presets.py` (what suits a kind of scene),
-`preflight.py` (what is known before the first frame) and `speed.py` (what a run takes of this machine);
-`run_folder.py` is where it is recorded, `run_sinks.py` where alerts go, `audience.py` who follows it,
-`stop_signals.py` how one stops it.
+Read `zones.py` and `plugins.py` (what is loaded), `presets.py` (settings for kinds of scenes), `preflight.py`
+(checks before the first frame) and `speed.py` (the load of a run); `run_folder.py` creates its folder,
+`run_sinks.py` opens sinks for alerts, `audience.py` has its observers, `stop_signals.py` stops it.
 """

@@ -1,7 +1,7 @@
-"""Answers that come to a run from elsewhere, such as the console: lines in a file of its folder.
+"""Answers to a run from other processes, such as the console: lines in a file of its folder.
 
-Whoever answers appends `ID=NAME`; the run reads on after each step. The last word on an object holds,
-so that a run that goes on after a break does not take up again what it knows already.
+An answer is a line `ID=NAME`; the run reads new lines after each step. The last answer on an object holds, so
+that a resumed run does not repeat those it has already.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from visup.runs.operator import parse_answers
 
 ANSWERS = "answers.txt"
 LARGEST_FILE = 2**16
-"""Bytes of answers to one run; no more are kept."""
+"""Maximum size of the answers to a run, bytes."""
 
 
 def put_answer(folder: Path, object_id: int, name: str) -> None:
     """Leave an answer for a live run, from any process.
 
     Args:
-        folder: Of the run.
+        folder: Folder of the run.
         object_id: The object.
         name: A model, an actor, or 'unknown' for none of the models.
 
     Raises:
-        SettingsError: The name cannot stand in such a line.
-        OutputError: The folder cannot be written, or holds too many answers already.
+        SettingsError: The name cannot be part of such a line.
+        OutputError: The folder cannot be written, or has too many answers already.
     """
     ((number, said),) = parse_answers([f"{object_id}={' '.join(name.split())}"]).items()
     path = folder / ANSWERS
@@ -48,12 +48,12 @@ def put_answer(folder: Path, object_id: int, name: str) -> None:
 
 
 class AnswerBox:
-    """An observer that gives an agent what is said in the folder of its run.
+    """An observer that passes answers in the run folder to an agent.
 
     Args:
         agent: The agent.
         folder: Gives the folder, which changes when a run rolls over; None for none.
-        tell: Told what is wrong with a line.
+        tell: Receives errors of lines.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class AnswerBox:
         self._waiting: dict[int, str] = {}
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Take up what was said since, of objects that are known."""
+        """Pass on new answers about known objects."""
         for line in self._new_lines():
             self._try(self._note, line)
         for number in [i for i in self._waiting if i in self._agent.mind.objects]:
@@ -88,7 +88,7 @@ class AnswerBox:
                 self._tell(str(fault))
 
     def _new_lines(self) -> list[str]:
-        """Whole lines that were not read yet."""
+        """New complete lines."""
         folder = self._folder()
         if folder is None:
             return []
@@ -99,7 +99,7 @@ class AnswerBox:
                 return []
             new = read_bounded(path, LARGEST_FILE)[self._read :]
         except OSError:
-            return []  # nobody answered yet, or what lies there is no file of answers
+            return []  # no answers yet, or not a regular file
         whole = new[: new.rfind(b"\n") + 1]
         self._read += len(whole)
         return whole.decode("utf-8", errors="replace").splitlines()

@@ -14,27 +14,27 @@ if TYPE_CHECKING:
 
 
 class RunProgress(Protocol):
-    """Told after each step how far a run has come."""
+    """Receives the progress of a run after each step."""
 
     def __call__(self, done: int, total: int | None, lag_s: float | None = None, /) -> None:
-        """Take it down.
+        """Report the progress.
 
         Args:
-            done: Frames that were looked at.
-            total: Frames that there are, or None where nobody knows.
-            lag_s: How long ago it was what is told now, seconds; None of what is not watched in real time.
+            done: Processed frames.
+            total: All frames, or None if not known.
+            lag_s: Age of the processed frame, seconds; None if not in real time.
         """
 
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """How a run does, after a step.
+    """Figures of a run after a step.
 
     Attributes:
-        steps: Frames that were looked at since the run began.
-        dropped: Frames that were dropped to keep pace, since this process watches.
-        lag_s: How long ago it was what the frame shows, seconds; None of what is not watched in real time.
-        phase_ms: What each phase of all steps took, since this process watches, milliseconds.
+        steps: Frames processed since the run began.
+        dropped: Frames dropped by this process to keep pace.
+        lag_s: Age of the frame, seconds; None if not in real time.
+        phase_ms: Total time of each phase in this process, milliseconds.
     """
 
     steps: int
@@ -48,12 +48,12 @@ class Audience:
     """The audience of a live run.
 
     Attributes:
-        observers: Given each step and its frame, after it is recorded.
-        progress: Given how far the run has come.
-        operator: Who answers questions; nobody by default.
-        notice: Given what cannot wait for a step, such as that a camera dropped: one sentence.
-        figures: Given how the run does, after each step.
-        places: Where the run that follows a live one goes; None where none does.
+        observers: Receive each step and its frame after it is recorded.
+        progress: Receives the progress.
+        operator: Answers questions; None by default.
+        notice: Receives messages that cannot wait for a step, such as that a camera dropped: one sentence.
+        figures: Receives the figures after each step.
+        places: Folders for runs that follow a live one; None if none follows.
     """
 
     observers: Sequence[Observer] = ()

@@ -1,7 +1,7 @@
-"""Behaviours of the user's own in a run: found, made with their settings.
+"""Finds and creates the user behaviours of a run with their settings.
 
-Their contracts are read in another process. Those that run in a process of their own are never imported
-here, unless another one of the same file is not.
+Their contracts are read in another process. Isolated behaviours are never imported here, unless another one
+of the same file is.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from visup.agent.plugins.registry import discover_behaviours
 from visup.runs.settings import WatchSettings
 
 OWN = "visup."
-"""Modules of visup itself, which need no process to look at them in."""
+"""Prefix of visup's own modules, whose contracts need no other process."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Offer:
-    """A file or module, and the contracts of what it offers; None where it is imported here anyway."""
+    """A file or module and the contracts of its behaviours; None if it is imported here anyway."""
 
     where: str
     contracts: tuple[Contract, ...] | None
@@ -34,8 +34,8 @@ def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
     """The behaviours that a run adds to those of visup: installed ones, then those of files and modules.
 
     Raises:
-        BehaviourError: One cannot be found or made.
-        SettingsError: A setting is not as it should be, or is for a behaviour that is not there.
+        BehaviourError: One cannot be found or created.
+        SettingsError: A setting is not valid, or belongs to no behaviour.
     """
     registry = discover_behaviours() if settings.plugins else None
     named = [registry.where(name) for name in settings.plugins] if registry else []
@@ -44,12 +44,12 @@ def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
     for where in (*named, *map(str, settings.behaviours)):
         own = where.startswith(OWN) or not CAN_ISOLATE
         offers.append(_Offer(where, None if own else tuple(read_contracts(where, values))))
-    made = [b for offer in offers for b in _made(offer, settings)]
+    made = [b for offer in offers for b in _create(offer, settings)]
     _check_known(settings, [b.contract.name for b in made])
     return made
 
 
-def _made(offer: _Offer, settings: WatchSettings) -> Iterable[Behaviour]:
+def _create(offer: _Offer, settings: WatchSettings) -> Iterable[Behaviour]:
     values = settings.plugin_settings
     told = offer.contracts
     apart = {c.name: c for c in told or () if c.isolate or c.name in settings.isolate}

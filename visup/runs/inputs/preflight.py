@@ -1,4 +1,4 @@
-"""What can be known before the first frame: whether a run can come to anything."""
+"""The preflight: checks before the first frame whether a run can succeed."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 
 def preflight(settings: WatchSettings) -> Iterator[str]:
-    """Open the source, load everything, and say what is found, a line each; warnings come last.
+    """Open the source, load everything, and yield a line for each finding; warnings come last.
 
     Args:
-        settings: Of the run.
+        settings: Settings of the run.
 
     Yields:
-        What there is; what may keep the run from coming to anything begins with `WARNING`.
+        Findings; warnings begin with `WARNING`.
 
     Raises:
-        VisupError: No such run can begin.
+        VisupError: The run cannot begin.
     """
     with open_video(settings) as video:
         frames = "" if video.frame_count is None else f", {video.frame_count} frames"
@@ -46,19 +46,19 @@ WARNING = "warning: "
 
 
 def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False) -> tuple[str, ...]:
-    """See whether the actors of the tasks can be recognised at all.
+    """Check whether the actors of the tasks can be recognised at all.
 
     Args:
-        settings: Of the run.
-        agent: As it was made from them.
-        answered: Whether the operator has said beforehand who is who.
+        settings: Settings of the run.
+        agent: The agent built from them.
+        answered: Whether the operator has identified objects in advance.
 
     Returns:
-        A sentence on each actor for whom nothing stands; none where a behaviour of the user's own, or the
-        operator, may say who it is.
+        A sentence on each actor that cannot be recognised; none if a user behaviour or the operator may
+        identify it.
 
     Raises:
-        SettingsError: No actor of any task can be recognised, so that nothing could ever be said.
+        SettingsError: No actor of any task can be recognised.
     """
     tasks = [t for name in settings.tasks for t in load_tasks(name)]
     lost = unrecognisable(tasks, agent.mind.actors, agent.models)
@@ -78,15 +78,15 @@ def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False)
 def unrecognisable(
     tasks: Sequence[Task], actors: Mapping[str, tuple[str, ...]], known: Collection[str]
 ) -> dict[str, tuple[str, ...]]:
-    """Actors that are identified by models only, none of which exists.
+    """Actors that are identified only by models, none of which exists.
 
     Args:
         tasks: All tasks of a run.
-        actors: Actor -> models, as they are bound.
-        known: Names of all models that there are.
+        actors: Actor -> bound models.
+        known: Names of all existing models.
 
     Returns:
-        Actor -> the models that it would need.
+        Actor -> the missing models.
     """
     lost: dict[str, tuple[str, ...]] = {}
     for task in tasks:
@@ -99,11 +99,11 @@ def unrecognisable(
 
 
 def readiness(settings: WatchSettings, agent: Agent) -> Iterator[str]:
-    """What a run is about, a line each: tasks with their stages and actors, models, zones.
+    """The content of a run, a line each: tasks with their stages and actors, models, zones.
 
     Args:
-        settings: Of the run.
-        agent: As it was made from them.
+        settings: Settings of the run.
+        agent: The agent built from them.
     """
     actors = agent.mind.actors
     for task in (t for name in settings.tasks for t in load_tasks(name)):
@@ -137,7 +137,7 @@ def _refusal(
 
 
 def told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
-    """A sentence on each actor that is what was taught, other than its task declares."""
+    """A sentence on each actor that is bound to a taught model instead of the declared ones."""
     return tuple(
         f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
         "models that its task names."

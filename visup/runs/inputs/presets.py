@@ -1,4 +1,4 @@
-"""Presets: which rules, how long things are remembered and how many frames a second suit a kind of scene."""
+"""Presets: rules, memory times and frame rates for kinds of scenes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ class Preset:
 
     Attributes:
         name: As it is typed.
-        about: For which scenes it is.
-        without: Shipped rules that are not watched.
-        rules_because: Why.
-        objects: How long things are remembered.
-        memory_because: Why so long.
-        enough_fps: Of a faster source frames are left out, but no fewer than so many a second are looked at;
-            None for all that there are.
-        pace_because: Why so many.
+        about: Its scenes.
+        without: Shipped rules that are switched off.
+        rules_because: Reason for that.
+        objects: How long objects are remembered.
+        memory_because: Reason for that.
+        enough_fps: Least frame rate to which faster sources are thinned out; None for all frames.
+        pace_because: Reason for that.
     """
 
     name: str

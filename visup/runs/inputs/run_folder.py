@@ -1,4 +1,4 @@
-"""The folder of a run: made new, never over another one."""
+"""Creates the folder of a run, never over an existing run."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from visup.redaction import redacted
 
 
 def fresh_folder(out: Path | None, source: str) -> Path:
-    """The folder of a run, made new; by default `runs/<source>`, numbered when that exists.
+    """Create the folder of a run; by default `runs/<source>`, numbered if that exists.
 
     Raises:
-        OutputError: It cannot be made, or holds a run already (what was recorded is never lost), which
-            may still go on.
+        OutputError: It cannot be created, or has a run already, which may still be active.
     """
     out = out or _numbered_folder(source)
     if (out / JOURNAL).exists():
-        # Nobody is told to delete a run that goes on.
+        # The hint must not suggest deleting an active run.
         acquire_lock(out / JOURNAL, "this run").release()
         raise OutputError(
             "the folder already contains a run",
@@ -33,7 +32,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
         probe = out / ".writable"
         probe.touch()
         probe.unlink()
-        sync(out.parent)  # that there is a folder is to be known after the power was lost, too
+        sync(out.parent)  # the entry of the folder must survive a loss of power
     except OSError as fault:
         raise OutputError(
             f"the output folder cannot be written: {fault.strerror}",
@@ -56,7 +55,7 @@ def discard_unbegun(folder: Path) -> None:
 
 
 def _numbered_folder(source: str) -> Path:
-    """`runs/<source>`, made new; numbered where that exists, so that no two runs are given the same."""
+    """Create `runs/<source>`, numbered if that exists, so that each run has its own."""
     source = redacted(source)
     stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
     stem = stem or Path(source).resolve().parent.name or "run"
@@ -67,6 +66,6 @@ def _numbered_folder(source: str) -> Path:
         except FileExistsError:
             continue
         except OSError:
-            break  # it is told when it is tried once more
+            break  # reported by the caller's next attempt
         return folder
     return folder

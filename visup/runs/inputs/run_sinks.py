@@ -13,13 +13,13 @@ from visup.sinks.webhook_access import WebhookAccess
 def sinks_of(
     options: RunOptions, source: str, stamp: RecordStamp, resumed_at: float | None = None
 ) -> Sinks:
-    """All sinks that a run sends alerts to.
+    """The sinks for the alerts of a run.
 
     Args:
-        options: Of the run.
-        source: What is watched.
-        stamp: What stands in every record besides what it tells.
-        resumed_at: When the run was last written to, seconds since 1970; None of one that begins.
+        options: Options of the run.
+        source: The source.
+        stamp: Common fields of all records.
+        resumed_at: When the run was last written to, seconds since 1970; None for a new run.
 
     Raises:
         VisupError: One cannot be opened.

@@ -1,4 +1,4 @@
-"""The settings file of a run: tables of behaviours, and what was fitted to labelled runs."""
+"""The settings file of a run: settings of behaviours, and parameters fitted to labelled runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read_settings_file(path: Path) -> dict[str, Any]:
         path: TOML with tables `[behaviours.NAME]`, and perhaps `[identity]`.
 
     Raises:
-        SettingsError: The file is missing, is not TOML, or holds something else.
+        SettingsError: The file is missing, is not TOML, or has other content.
     """
     document = read_toml(path)
     identity = document.pop(IDENTITY, {})
@@ -34,10 +34,10 @@ def read_settings_file(path: Path) -> dict[str, Any]:
 
 
 def fitted_settings(evidence: float, how: str) -> str:
-    """A settings file with what was fitted.
+    """A settings file with fitted parameters.
 
     Args:
-        evidence: How much a vote for an identity tells.
+        evidence: Weight of a vote for an identity, log-likelihood units.
         how: What it was fitted to, a sentence.
     """
     return f"# {how}\n[{IDENTITY}]\n{EVIDENCE} = {evidence:.3f}\n"

@@ -47,22 +47,22 @@ def check_signals(
     rules: Iterable[Rule],
     tasks: Iterable[Task],
 ) -> None:
-    """Refuse rules and tasks of which a signal would never be known.
+    """Check that every signal used by rules and tasks is provided.
 
     Args:
-        contracts: Of all behaviours; one that is no source of visup's may tell any signal.
-        told: What tells the signals of the settings.
-        rules: Of the run.
-        tasks: Of the run.
+        contracts: Contracts of all behaviours; a user behaviour with signals may provide any.
+        told: Behaviours for the signals of the settings.
+        rules: Rules of the run.
+        tasks: Tasks of the run.
 
     Raises:
-        SettingsError: Nobody tells a signal that is named.
+        SettingsError: A signal is not provided.
     """
     givers = [c for c in contracts if SIGNAL in c.gives]
     known = frozenset[str]().union(*(b.names for b in told))
     if len(givers) > len(list(told)) or (givers and not known):
         return
-    for name, who, where in _named(rules, tasks):
+    for name, who, where in _used_signals(rules, tasks):
         if name in known:
             continue
         what = f"{who} asks for the signal `{name}`, which no source provides"
@@ -71,8 +71,8 @@ def check_signals(
         raise SettingsError(what, where=where or None, expected=expected, hint=near)
 
 
-def _named(rules: Iterable[Rule], tasks: Iterable[Task]) -> Iterator[tuple[str, str, str]]:
-    """Each signal that is used, by what, and where."""
+def _used_signals(rules: Iterable[Rule], tasks: Iterable[Task]) -> Iterator[tuple[str, str, str]]:
+    """Each signal with its user and location."""
     for rule in rules:
         for call in (c for f in rule.formulas for c in calls(f) if c.name in SIGNAL_WORDS):
             if call.name != "signal_known":

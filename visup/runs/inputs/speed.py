@@ -1,4 +1,4 @@
-"""How many frames a second this machine can look at, measured on the source itself."""
+"""Measures the frame rate that this machine can process, on the source itself."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from visup.runs.wiring import build_agent, open_video
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """What was measured.
+    """A measured speed.
 
     Attributes:
-        possible: Frames a second that can be looked at, where nothing else is done.
-        wanted: Frames a second that the settings ask for.
+        possible: Frames per second that can be processed on an idle machine.
+        wanted: Frames per second that the settings request.
     """
 
     possible: float
@@ -25,7 +25,7 @@ class Speed:
 
     @property
     def load(self) -> float:
-        """The number of processors that the requested frame rates take.
+        """The share of a processor that the requested frame rate needs.
 
         >>> Speed(possible=20.0, wanted=5.0).load
         0.25
@@ -34,15 +34,14 @@ class Speed:
 
 
 def measured_speed(settings: WatchSettings, frames: int) -> Speed:
-    """Look at the first frames of a source as a run would.
+    """Process the first frames of a source as a run would.
 
     Args:
-        settings: Of the run.
-        frames: How many are looked at; of the first third the time does not count, since loops are
-            compiled there.
+        settings: Settings of the run.
+        frames: Number of frames; the first third does not count, since loops are compiled there.
 
     Raises:
-        VisupError: No such run can begin.
+        VisupError: The run cannot begin.
     """
     took = []
     agent = build_agent(settings)

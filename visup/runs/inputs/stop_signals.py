@@ -1,9 +1,9 @@
-"""Ctrl-C and a polite kill (SIGTERM, as service managers send it) end a run; they are never lost.
+"""Stop signals: Ctrl-C and SIGTERM (sent by service managers) end a run and are never lost.
 
-A service asks to be let finish its step (`at_once=False`), and hears by SIGHUP that its file has changed.
+A service lets its step finish first (`at_once=False`), and reloads its file on SIGHUP.
 
-Python raises KeyboardInterrupt wherever the program happens to be. Inside what compiled code calls back it
-is printed and dropped, and the run would go on; hence the request is remembered besides.
+Python raises KeyboardInterrupt at any point of the program. In a callback from compiled code it is printed
+and dropped, and the run would go on; hence the request is stored, too.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class StopRequest:
     """A request to stop or reload, from a signal.
 
     Attributes:
-        received: A stop.
-        reload: That settings are read again; whoever does so resets it.
-        closing: Set by whoever closes the books: then no signal raises that was to wait for a step.
+        received: Whether a stop was requested.
+        reload: Whether a reload was requested; reset by its handler.
+        closing: Set while a run is closed: signals that wait for a step then do not raise.
     """
 
     received: bool = False
@@ -35,15 +35,15 @@ class StopRequest:
 
 @contextmanager
 def stop_signals(*, at_once: bool = True, reload: bool = False) -> Iterator[StopRequest]:
-    """A stop signal raises KeyboardInterrupt here, and stays known.
+    """Make stop signals raise KeyboardInterrupt and record them.
 
     Args:
-        at_once: Raise at the first signal; else it is only noted, and the second one raises, for whoever
-            waits for a frame that does not come.
-        reload: Also note SIGHUP, where there is such a signal.
+        at_once: Raise at the first signal; otherwise the first is only recorded and the second raises, in
+            case the run waits for a frame that does not come.
+        reload: Also record SIGHUP, where it exists.
 
-    Only the main thread can receive signals; elsewhere nothing is changed. What is ignored stays so: a shell
-    starts what runs in the background deaf to Ctrl-C.
+    Only the main thread can receive signals; in others nothing is changed. Ignored signals stay ignored:
+    shells start background jobs with SIGINT ignored.
     """
     request = StopRequest()
 

@@ -1,6 +1,6 @@
-"""Settings files with zones: parts of the scene that rules can name, drawn by hand (TOML).
+"""Zone files (TOML): parts of the scene, drawn by hand, that rules can name.
 
-The format is told in ``docs/formats.md``.
+The format is described in ``docs/formats.md``.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
     """Load the zones of a file; all errors are reported together.
 
     Raises:
-        SettingsError: The file cannot be read, or is no such file.
-        ManyErrors: More than one zone is not as it should be.
+        SettingsError: The file cannot be read, or is no zone file.
+        ErrorGroup: Several zones are not valid.
     """
     return read_zones(_text(path), str(path))
 
@@ -47,8 +47,8 @@ def read_zones(text: str, path: str) -> tuple[Zone, ...]:
         path: Its name, for messages.
 
     Raises:
-        SettingsError: It is no such file.
-        ManyErrors: More than one zone is not as it should be.
+        SettingsError: It is no zone file.
+        ErrorGroup: Several zones are not valid.
     """
     entries, given = _entries(text, path)
     ground = _ground(given, path)
@@ -75,16 +75,16 @@ def read_zones(text: str, path: str) -> tuple[Zone, ...]:
 
 
 def load_ground(path: Path) -> Ground | None:
-    """Where points of the image are on the floor, or None when the file does not say so.
+    """The mapping from the image to the floor, or None if the file has none.
 
     Raises:
-        SettingsError: The file cannot be read, or its ground is not as it should be.
+        SettingsError: The file cannot be read, or its ground is not valid.
     """
     return _ground(_entries(_text(path), str(path))[1], str(path))
 
 
 def zones_text(zones: Iterable[Zone]) -> str:
-    """A settings file with some zones, which `read_zones` reads back; those on the floor as they are seen."""
+    """A zone file for `read_zones`; zones on the floor are written in image coordinates."""
     return "\n".join(map(_zone_text, zones))
 
 
@@ -127,7 +127,7 @@ def _text(path: Path) -> str:
 def _entries(text: str, path: str) -> tuple[list[Any], object]:
     try:
         found = tomllib.loads(text)
-    except (ValueError, RecursionError) as fault:  # also numbers and tables beyond all bounds
+    except (ValueError, RecursionError) as fault:  # also numbers and tables that are too large
         raise SettingsError(f"this is not TOML: {fault}", where=path) from fault
     entries, ground = found.pop("zone", None), found.pop("ground", None)
     if found:
@@ -159,14 +159,16 @@ def _zone(entry: object, where: str, h: Floats | None) -> Zone:
     where = f"{where} ('{name}')"
     if "floor" in entry:
         floor = _polygon(entry["floor"], where, "metres", least=1e-6)
-        return Zone(name, _seen(floor, h, where), _depth(entry.get("depth"), where), on_floor=True)
+        return Zone(
+            name, _in_image(floor, h, where), _depth(entry.get("depth"), where), on_floor=True
+        )
     return Zone(name, _polygon(entry.get("polygon"), where), _depth(entry.get("depth"), where))
 
 
-def _seen(
+def _in_image(
     floor: tuple[tuple[float, float], ...], h: Floats | None, where: str
 ) -> tuple[tuple[float, float], ...]:
-    """A polygon of the floor as it lies in the image."""
+    """A polygon of the floor in image coordinates."""
     if h is None:
         what = "the zone is drawn on the floor, but nothing says where the floor is"
         raise SettingsError(what, where=where, expected=_GROUND)
@@ -196,7 +198,7 @@ def _polygon(
 
 
 def area(polygon: tuple[tuple[float, float], ...]) -> float:
-    """Area that a polygon encloses, square pixels; 0 where its corners lie in a line."""
+    """Area of a polygon, square pixels; 0 if its corners are collinear."""
     turned = (*polygon[1:], polygon[0])
     double = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(polygon, turned, strict=True))
     return abs(double) / 2.0
@@ -222,6 +224,6 @@ def _pair(given: object) -> tuple[float, float] | None:
         return None
     try:
         x, y = (float(v) for v in given)
-    except OverflowError:  # of a whole number with hundreds of digits
+    except OverflowError:  # an integer with hundreds of digits
         return None
     return (x, y) if math.isfinite(x) and math.isfinite(y) else None

@@ -1,5 +1,5 @@
 """Support for unattended runs of months.
 
-One run follows the other (`next_run.py`), nobody is woken at night for what can wait (`quiet_hours.py`), and
-it is known what its time is spent on (`phase_meter.py`).
+Consecutive runs (`next_run.py`), quiet hours for alerts that can wait (`quiet_hours.py`), and the time spent
+in each phase (`phase_meter.py`).
 """

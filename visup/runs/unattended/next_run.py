@@ -1,7 +1,7 @@
 """Consecutive runs with the same agent, so that no beliefs are lost.
 
-The next run has a journal and a checkpoint of its own before the first step that it records, so that whoever
-is killed in between goes on with the one or the other. Books of the old one are closed beside the watching.
+The next run has its journal and checkpoint before its first step, so that a process killed in between resumes
+one or the other. The files of the old run are finished in the background.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from visup.runs.result import RunResult
 from visup.runs.settings import RunOptions
 
 ROLLED = "rolled"
-"""How a run ended that is followed by another, in its fact `ended`; `next_run` names that."""
+"""Value of the fact `ended` for a run followed by another, which `next_run` names."""
 
 TRY_AGAIN_S = 60.0
-"""Seconds until it is tried again, where the next run cannot be started."""
+"""Seconds between attempts to start the next run."""
 
 
 class RunPlaces(Protocol):
-    """Where the runs of a camera go."""
+    """Provides the folders for the runs of a camera."""
 
     def place(self) -> Path:
-        """A folder for a further run, not made yet.
+        """A folder for a further run, not yet created.
 
         Raises:
-            OutputError: There can be none.
+            OutputError: It cannot be created.
         """
         ...
 
@@ -39,16 +39,16 @@ class RunPlaces(Protocol):
         """Make a process that starts from now on resume this run.
 
         Raises:
-            OutputError: That cannot be noted.
+            OutputError: It cannot be recorded.
         """
         ...
 
 
 class RollOver:
-    """Knows when the next run begins, and closes the books of those before it.
+    """Decides when the next run begins, and finishes the files of earlier runs.
 
     Args:
-        options: Of the run.
+        options: Options of the run.
     """
 
     def __init__(self, options: RunOptions) -> None:
@@ -58,11 +58,11 @@ class RollOver:
         self._closing: list[threading.Thread] = []
 
     def due(self, time_s: float, size: int) -> bool:
-        """Whether the next run is to begin.
+        """Whether the next run is due.
 
         Args:
-            time_s: Of the step, seconds of the source.
-            size: Of the journal, bytes.
+            time_s: Time of the step, seconds of the source.
+            size: Size of the journal, bytes.
         """
         self._begun = time_s if self._begun is None else self._begun
         if time_s < self._not_before:
@@ -71,11 +71,11 @@ class RollOver:
         return long or (self._run_bytes is not None and size >= self._run_bytes)
 
     def begun(self, time_s: float) -> None:
-        """The next run has begun."""
+        """Record that the next run has begun."""
         self._begun = time_s
 
     def failed(self, time_s: float) -> None:
-        """It could not be begun."""
+        """Record that it could not begin."""
         self._not_before = time_s + TRY_AGAIN_S
 
     def close_books(
@@ -85,7 +85,7 @@ class RollOver:
         result: RunResult,
         tasks: Sequence[TaskBelief],
     ) -> None:
-        """Finish the files of a run that is followed by another, in a separate thread."""
+        """Finish the files of a run in a separate thread."""
 
         def close() -> None:
             checkpoints.close()
@@ -97,6 +97,6 @@ class RollOver:
         self._closing = [*(t for t in self._closing if t.is_alive()), thread]
 
     def wait(self, seconds: float) -> None:
-        """Wait for the books that are being closed."""
+        """Wait for the files being finished."""
         for thread in self._closing:
             thread.join(seconds)

@@ -11,17 +11,17 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.model.step import Step
 
 OBSERVE = "observe"
-"""After the phases of the cycle: the journal, sinks, whoever else follows."""
+"""After the phases of the cycle: the journal, sinks and other observers."""
 
 
 class PhaseMeter:
-    """Takes the steps of an agent and measures them.
+    """Executes and measures the steps of an agent.
 
     Args:
-        clock: Seconds from any start.
+        clock: Seconds of a monotonic clock.
 
     Attributes:
-        ms: What each phase took so far, milliseconds.
+        ms: Total time of each phase, milliseconds.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:

@@ -1,6 +1,6 @@
-"""Quiet hours: alerts that are not critical wait until they are over, and are sent if still open.
+"""Quiet hours: alerts that are not critical are held until their end, and sent if still open.
 
-An alert that opens and closes within them is in the journal, with its evidence; no sink hears of it.
+An alert that opens and closes within quiet hours is in the journal with its evidence, but not sent to sinks.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ FORM = "22:00-06:00, Sat 12:00-24:00, or Sat-Sun 00:00-24:00"
 
 @dataclass(frozen=True, slots=True)
 class QuietPeriod:
-    """A part of the day, on some days.
+    """A period of the day on some weekdays.
 
     Attributes:
-        days: On which it begins, 0 is Monday.
+        days: Weekdays on which it begins, 0 is Monday.
         begin: Minutes after midnight.
         end: Minutes after midnight; at or before `begin` it ends on the next day.
     """
@@ -37,11 +37,11 @@ class QuietPeriod:
     end: int
 
     def holds(self, day: int, minute: int) -> bool:
-        """Whether it is such a time.
+        """Whether a time is in the period.
 
         Args:
-            day: Of the week, 0 is Monday.
-            minute: After midnight.
+            day: Weekday, 0 is Monday.
+            minute: Minutes after midnight.
         """
         if self.begin < self.end:
             return day in self.days and self.begin <= minute < self.end
@@ -50,13 +50,13 @@ class QuietPeriod:
 
 
 def quiet_period(text: str) -> QuietPeriod:
-    """A period as it is written in a site file.
+    """Parse a period of a site file.
 
     >>> quiet_period("Sat-Mon 22:00-06:30").days == {5, 6, 0}
     True
 
     Raises:
-        SettingsError: It is not of that form.
+        SettingsError: It is malformed.
     """
     told = _PERIOD.fullmatch(text.strip())
     begin, end = (
@@ -75,13 +75,13 @@ def zone_of(name: str | None) -> tzinfo | None:
     """The time zone of a name; None for that of the machine.
 
     Raises:
-        SettingsError: Nobody knows it here.
+        SettingsError: It is unknown.
     """
     if name is None:
         return None
     try:
         return ZoneInfo(name)
-    except (OSError, ValueError) as fault:  # an unknown key is a KeyError of theirs
+    except (OSError, ValueError) as fault:  # ZoneInfoNotFoundError is a KeyError
         raise _unknown_zone(name) from fault
     except KeyError as fault:
         raise _unknown_zone(name) from fault
@@ -93,11 +93,11 @@ def _unknown_zone(name: str) -> SettingsError:
 
 @dataclass(frozen=True, slots=True)
 class QuietHours:
-    """When it is quiet.
+    """The quiet hours.
 
     Attributes:
-        periods: Any of them.
-        zone: Of their times; None for that of the machine.
+        periods: The periods.
+        zone: Their time zone; None for that of the machine.
     """
 
     periods: tuple[QuietPeriod, ...] = ()
@@ -105,15 +105,15 @@ class QuietHours:
 
     @classmethod
     def read(cls, texts: Sequence[str], zone: str | None) -> QuietHours:
-        """From the words of a site file.
+        """Parse the quiet hours of a site file.
 
         Raises:
-            SettingsError: They cannot be read.
+            SettingsError: They are not valid.
         """
         return cls(tuple(map(quiet_period, texts)), zone_of(zone))
 
     def hold(self, wall_s: float) -> bool:
-        """Whether it is quiet.
+        """Whether a time is in quiet hours.
 
         Args:
             wall_s: Seconds since 1970.
@@ -123,7 +123,7 @@ class QuietHours:
         return any(p.holds(local.weekday(), minute) for p in self.periods)
 
     def hold_throughout(self, since_s: float, until_s: float) -> bool:
-        """Whether it was quiet from one time to another, to the minute.
+        """Whether a whole interval is in quiet hours, to the minute.
 
         Args:
             since_s: Seconds since 1970.
@@ -135,12 +135,12 @@ class QuietHours:
 
 
 class QuietGate:
-    """Tells which alerts of a step are sent now.
+    """Decides which alerts of a step are sent now.
 
     Args:
-        hours: When it is quiet.
-        wall: Seconds since 1970 at a time of the source, or None where nobody knows.
-        resumed_at: When the last step before this process was, seconds since 1970; None of a run that begins.
+        hours: The quiet hours.
+        wall: Source time -> seconds since 1970, or None if not known.
+        resumed_at: Time of the last step before this process, seconds since 1970; None for a new run.
     """
 
     def __init__(
@@ -153,22 +153,22 @@ class QuietGate:
         self._held: set[int] = set()
 
     def __call__(self, step: Step) -> Sequence[Alert]:
-        """The alerts that are sent after a step."""
+        """The alerts to send after a step."""
         now = self._wall(step.time)
         quiet = now is not None and self._hours.hold(now)
-        self._take_up(step)
+        self._restore_held(step)
         due: list[Alert] = []
         for alert in step.alerts:
             if alert.closed is None and quiet and alert.severity < Severity.CRITICAL:
                 self._held.add(alert.id)
             elif alert.id in self._held:
-                self._held.discard(alert.id)  # it came and went, and nobody was told of it
+                self._held.discard(alert.id)  # opened and closed unsent
             else:
                 due.append(alert)
         return (*due, *self._released(step, quiet=quiet))
 
     def _released(self, step: Step, *, quiet: bool) -> Sequence[Alert]:
-        """Alerts that were held back and are sent now: the quiet hours are over, or they became critical."""
+        """Held alerts that are sent now: quiet hours have ended, or they became critical."""
         told = [
             a
             for a in step.mind.alerts
@@ -177,8 +177,8 @@ class QuietGate:
         self._held -= {a.id for a in told}
         return told
 
-    def _take_up(self, step: Step) -> None:
-        """What a process before this one held back: what opened in quiet hours that were not over then."""
+    def _restore_held(self, step: Step) -> None:
+        """Restore the alerts held by an earlier process: those opened in quiet hours that had not ended."""
         at, self._resumed_at = self._resumed_at, None
         if at is None:
             return

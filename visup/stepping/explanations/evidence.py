@@ -1,4 +1,4 @@
-"""Trees of reasons, down to what was perceived of which frame."""
+"""Trees of reasons, down to the percepts of frames."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class Why:
 
     Attributes:
         text: One clause.
-        parts: What it rests on.
-        frame_index: The frame that it speaks of, or None.
+        parts: The reasons for it.
+        frame_index: Its frame, or None.
         time: Its time, seconds.
-        percept: The percept that it is, or None.
+        percept: Its percept, or None.
     """
 
     text: str
@@ -50,12 +50,12 @@ class Why:
 
     @property
     def percepts(self) -> tuple[Percept, ...]:
-        """All percepts that it rests on."""
+        """All percepts in the tree."""
         return tuple(w.percept for w in self.walk() if w.percept is not None)
 
     @property
     def regions(self) -> tuple[int | None, tuple[Region, ...]]:
-        """The latest frame of which it rests on regions, and these; None and none where there are none."""
+        """The latest frame with regions in the tree, and these regions; (None, ()) without any."""
         found = [
             (w.frame_index, w.percept.value)
             for w in self.walk()
@@ -69,7 +69,7 @@ class Why:
 
 
 def explanation_tree(explained: RuleExplanation) -> Why:
-    """What the rule language explains, as a tree of reasons."""
+    """An explanation of the rule language as a tree of reasons."""
     return Why(explained.line(), tuple(explanation_tree(p) for p in explained.parts))
 
 
@@ -79,9 +79,9 @@ def region_percepts(
     """The percepts of a frame about one region.
 
     Args:
-        observation: What was perceived.
+        observation: The observation.
         region_id: The region.
-        names: Whether those that say what it is count too.
+        names: Whether to include percepts about its identity.
     """
     kinds = (Region, Hypothesis, Depth) if names else (Region,)
     return tuple(
@@ -97,13 +97,13 @@ def _about(value: Region | Hypothesis | Depth) -> int:
 
 
 def percept_reason(percept: Percept, observation: Observation) -> Why:
-    """A percept as the last of reasons."""
+    """A percept as a leaf of the tree."""
     text = f"{percept.source} reported {percept_text(percept.value)}"
     return Why(text, (), observation.frame_index, observation.time, percept)
 
 
 def percept_text(value: object) -> str:
-    """What was perceived, in a few words."""
+    """A percept value in a few words."""
     match value:
         case Region():
             x, y, w, h = value.bbox

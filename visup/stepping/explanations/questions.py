@@ -1,4 +1,4 @@
-"""Questions in words: `why alert 2`, `why touching 1 2`, `why not coupled 1 2`, `why not stage captured`."""
+"""Textual questions: `why alert 2`, `why touching 1 2`, `why not coupled 1 2`, `why not stage captured`."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from visup.stepping.explanations.why import ReasonFinder
 from visup.stepping.explanations.why_not import LastStep
 
 ABOUT = ("alert", "object", "identity", "relation", "rule", "stage", "verdict")
-"""What reasons can be asked for, by the first word."""
+"""First words of `why` questions."""
 NOT_YET = ("entry", "exit", "occlusion", "reappearance", "identified", "coupled", "rule", "stage")
-"""What can be asked why it is not, besides relations and the names of rules and stages."""
+"""First words of `why not` questions, besides relations and names of rules and stages."""
 _PRESENCE = {
     "exit": Presence.LEFT,
     "occlusion": Presence.HIDDEN,
@@ -29,11 +29,11 @@ _PRESENCE = {
 
 @dataclass(frozen=True, slots=True)
 class ParsedQuestion:
-    """A question taken apart.
+    """A parsed question.
 
     Attributes:
         about: One of `ABOUT` or `NOT_YET`.
-        name: Of a rule, relation, stage or task; may be empty.
+        name: Name of a rule, relation, stage or task; may be empty.
         ids: Numbers of an alert or of objects.
     """
 
@@ -46,13 +46,13 @@ def why(reasons: ReasonFinder, text: str) -> Why:
     """The answer to `why TEXT`.
 
     Raises:
-        VisupError: The question cannot be understood, or nothing is known of what it is about.
+        VisupError: The question is not valid, or its subject does not exist.
     """
-    asked = _taken_apart(text, reasons.mind, ABOUT)
+    asked = _parsed(text, reasons.mind, ABOUT)
     answers: dict[str, Callable[[], Why]] = {
-        "alert": lambda: reasons.alert(_one(asked, reasons.mind)),
-        "object": lambda: reasons.object(_one(asked, reasons.mind)),
-        "identity": lambda: reasons.identity(_one(asked, reasons.mind)),
+        "alert": lambda: reasons.alert(_single_id(asked, reasons.mind)),
+        "object": lambda: reasons.object(_single_id(asked, reasons.mind)),
+        "identity": lambda: reasons.identity(_single_id(asked, reasons.mind)),
         "relation": lambda: reasons.relation(asked.name, asked.ids),
         "rule": lambda: reasons.rule(asked.name, asked.ids),
         "stage": lambda: reasons.stage(asked.name),
@@ -65,17 +65,17 @@ def why_not(step: LastStep, text: str) -> Why:
     """The answer to `why not TEXT`.
 
     Raises:
-        VisupError: The question cannot be understood, or nothing is known of what it is about.
+        VisupError: The question is not valid, or its subject does not exist.
     """
     mind = step.mind
-    asked = _taken_apart(text, mind, (*NOT_YET, "relation"))
+    asked = _parsed(text, mind, (*NOT_YET, "relation"))
     if asked.about in _PRESENCE:
         wanted = _PRESENCE[asked.about]
-        return whynot.presence_unmet(step, _one(asked, mind), wanted)
+        return whynot.presence_unmet(step, _single_id(asked, mind), wanted)
     answers: dict[str, Callable[[], Why]] = {
-        "entry": lambda: whynot.entry_unmet(step, _one(asked, mind)),
-        "identified": lambda: whynot.identity_unmet(step, _one(asked, mind)),
-        "coupled": lambda: whynot.coupling_unmet(step, *_two(asked)),
+        "entry": lambda: whynot.entry_unmet(step, _single_id(asked, mind)),
+        "identified": lambda: whynot.identity_unmet(step, _single_id(asked, mind)),
+        "coupled": lambda: whynot.coupling_unmet(step, *_two_ids(asked)),
         "rule": lambda: whynot.alert_unmet(mind, asked.name, asked.ids),
         "stage": lambda: whynot.stage_unmet(mind, asked.name),
         "relation": lambda: whynot.relation_unmet(mind, asked.name, asked.ids),
@@ -83,7 +83,7 @@ def why_not(step: LastStep, text: str) -> Why:
     return answers[asked.about]()
 
 
-def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestion:
+def _parsed(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestion:
     """`alert 2`, `relation touching 1 2`, `touching(1, 2)`, `captured`, ..."""
     words = re.findall(r"[^\s,()?]+", text)
     ids = tuple(int(w) for w in words if w.isdecimal())
@@ -112,7 +112,7 @@ def _complete(asked: ParsedQuestion, text: str) -> ParsedQuestion:
     return asked
 
 
-def _one(asked: ParsedQuestion, mind: Mind) -> int:
+def _single_id(asked: ParsedQuestion, mind: Mind) -> int:
     """The number in a question; if there is only one alert or object, that one."""
     if asked.ids:
         return asked.ids[0]
@@ -123,7 +123,7 @@ def _one(asked: ParsedQuestion, mind: Mind) -> int:
     raise SettingsError(f"which {asked.about}?", expected=numbers)
 
 
-def _two(asked: ParsedQuestion) -> tuple[int, int]:
+def _two_ids(asked: ParsedQuestion) -> tuple[int, int]:
     if len(asked.ids) != 2:
         raise SettingsError(
             f"'{asked.about}' is about two objects", expected="such as: coupled 1 2"

@@ -1,4 +1,4 @@
-"""Why an alert is open, a belief is held, a stage or verdict is what it is: down to the percepts."""
+"""Explains alerts, beliefs, stages and verdicts, down to the percepts."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ from visup.stepping.explanations.evidence import (
 )
 
 LOOK_BACK = 250
-"""How many steps back the latest percepts that name an object are looked for."""
+"""Steps to search backwards for the latest percepts that identify an object."""
 
 
 REPORTED = "what was last reported of it:"
-"""Heads the latest events of a stage."""
+"""Heading of the latest events of a stage."""
 
 
 class RunTimeline(Protocol):
-    """The source of explanations: a stepper."""
+    """The part of a stepper that explanations use."""
 
     @property
     def at(self) -> int: ...  # noqa: D102
@@ -59,12 +59,12 @@ class RunTimeline(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ReasonFinder:
-    """Gives reasons as they were after one step.
+    """Finds reasons for the beliefs after one step.
 
     Attributes:
-        course: Where past steps are found.
+        course: Gives access to past steps.
         number: The step.
-        mind: What was believed after it.
+        mind: The mind after it.
     """
 
     course: RunTimeline
@@ -72,16 +72,16 @@ class ReasonFinder:
     mind: Mind
 
     def after(self, number: int) -> ReasonFinder:
-        """The reasons as they were after another step."""
+        """The same for another step."""
         if number == self.number:
             return self
         return ReasonFinder(self.course, number, self.course.mind_at(number))
 
     def of(self, what: object) -> Why:
-        """Explain something.
+        """Explain a belief.
 
         Raises:
-            SettingsError: Nothing is known of it.
+            SettingsError: It cannot be explained.
         """
         match what:
             case Alert():
@@ -101,7 +101,7 @@ class ReasonFinder:
         raise SettingsError(f"a {type(what).__name__} cannot be explained")
 
     def alert(self, alert_id: int) -> Why:
-        """Why an alert was opened, and why it stays open; those that are over are found too."""
+        """Why an alert was opened, and why it stays open; closed alerts are found, too."""
         number, event = self._opening(alert_id)
         then = self.after(number)
         now = next((a for a in self.mind.alerts if a.id == alert_id), None)
@@ -121,14 +121,14 @@ class ReasonFinder:
         raise SettingsError(f"no alert {alert_id} has been raised so far", expected=known)
 
     def _cause(self, kind: str, event: Event) -> Why:
-        """Why a concern of some kind held after this step."""
+        """Why an alert condition held after this step."""
         if kind in {rule.name for rule in rule_memory(self.mind).rules}:
             return self.rule(kind, event.objects)
         stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
         if kind == "stage_failing":
             bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
             failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
-            if failing:  # which tell of their actors
+            if failing:  # these include their actors
                 return Why("because", (*stated, *failing))
         if kind == BEHAVIOUR_FAILED:
             stated += self._failed()
@@ -143,10 +143,10 @@ class ReasonFinder:
         )
 
     def rule(self, name: str, objects: tuple[int, ...]) -> Why:
-        """Why a rule is true, false or unknown of some objects, and what is known of these.
+        """Why a rule is true, false or unknown for some objects, with the beliefs about them.
 
         Raises:
-            RuleError: There is no such rule, or the objects are not those of a choice for it.
+            RuleError: There is no such rule, or it is not evaluated for these objects.
         """
         orders = list(permutations(objects))
         found = [explain(self.mind, name, *ids) for ids in orders[: 6 if len(objects) < 4 else 1]]
@@ -165,17 +165,17 @@ class ReasonFinder:
         Args:
             name: The relation.
             objects: Ids.
-            deep: Whether to tell the regions.
+            deep: Whether to include the regions.
 
         Raises:
-            SettingsError: It is not judged.
+            SettingsError: It is not evaluated.
         """
         r = self.mind.relation(name, *objects)
         if r is None:
             named = f"{name}({', '.join(map(str, objects))})"
             raise SettingsError(f"{named} is not judged", expected="a relation of objects in view")
         who = ", ".join(short(self.mind, i) for i in objects)
-        # Since when some are false is not kept: they carry the time of the step.
+        # Some false relations have no start time: their `since` is the time of the step.
         lasting = r.since < self.mind.time
         stands = (
             f"has been {r.truth.value} since {r.since:.2f} s" if lasting else f"is {r.truth.value}"
@@ -213,10 +213,10 @@ class ReasonFinder:
         return (name,) if self.mind.relation(name, *objects) is not None else ()
 
     def object(self, object_id: int) -> Why:
-        """Why an object is believed to be there and to be what it is."""
+        """Why an object is believed to be present, and its identity."""
         b = self._belief(object_id)
         return Why(
-            f"object {b.id} is believed to be {b.presence.value}; it is {_named(b)}",
+            f"object {b.id} is believed to be {b.presence.value}; it is {_display_name(b)}",
             (self._sight(object_id), self.identity(object_id)),
             *self._here,
         )
@@ -232,12 +232,14 @@ class ReasonFinder:
             )
             for c in b.candidates
         )
-        nobody = Why(f"none of the models: likelihood {b.unknown:.2f}")
+        unnamed = Why(f"none of the models: likelihood {b.unknown:.2f}")
         looks = self._looks(b)
-        return Why(f"object {b.id} is {_named(b)}", (*stated, *votes, nobody, *looks), *self._here)
+        return Why(
+            f"object {b.id} is {_display_name(b)}", (*stated, *votes, unnamed, *looks), *self._here
+        )
 
     def _looks(self, b: ObjectBelief) -> tuple[Why, ...]:
-        """The latest percepts that say what it looks like."""
+        """The latest percepts about its identity."""
         number = self._step_of(b.last_seen)
         for back in range(number, max(self.course.begin, number - LOOK_BACK), -1):
             seen = self.course.observation_at(back)
@@ -248,7 +250,7 @@ class ReasonFinder:
         return (Why("nothing was said of what it looks like"),)
 
     def _sight(self, object_id: int) -> Why:
-        """When an object was seen last, and as which region."""
+        """When and as which region an object was last seen."""
         b = self._belief(object_id)
         seen = self.course.observation_at(self._step_of(b.last_seen))
         who = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
@@ -303,7 +305,7 @@ class ReasonFinder:
         )
 
     def verdict(self, name: str | None = None) -> Why:
-        """Why the verdict of a task is what it is; of the only task when no name is given.
+        """Why the verdict on a task is what it is; by default the only task.
 
         Raises:
             SettingsError: There is no such task.
@@ -371,7 +373,7 @@ class ReasonFinder:
         return belief
 
     def _step_of(self, time: float) -> int:
-        """The step of the frame at a time, or the first after it that is known."""
+        """The step of the frame at a time, or the first known one after it."""
         numbers = range(self.course.begin + 1, self.number + 1)
         place = bisect_left(numbers, time, key=lambda n: self.course.observation_at(n).time)
         return numbers[min(place, len(numbers) - 1)]
@@ -381,5 +383,5 @@ class ReasonFinder:
         return self.mind.frame_index, self.mind.time
 
 
-def _named(b: ObjectBelief) -> str:
+def _display_name(b: ObjectBelief) -> str:
     return f"{b.name}, likelihood {b.confidence:.2f}"

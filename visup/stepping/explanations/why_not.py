@@ -1,4 +1,4 @@
-"""Why something has not happened: which condition is not met, and by how much."""
+"""Explains why something has not happened: the unmet conditions with their margins."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ STANDS = {
     Status.FAILED: "has failed",
     Status.UNKNOWN: "cannot be judged",
 }
-"""How a stage stands, where its status alone is no clause."""
+"""Clauses for statuses of stages."""
 
 
 def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
@@ -45,14 +45,13 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     Args:
         mind: The mind.
         name: The rule.
-        ids: Objects; the choice that comes nearest when left out.
+        ids: Objects; by default the assignment closest to true.
 
     Returns:
-        Its conditions that are false or unknown, each with its margin; what suspends it; or that it is
-        true after all.
+        Its false or unknown conditions with their margins; what suspends it; or that it is true.
 
     Raises:
-        RuleError: There is no such rule, or the objects are not those of a choice for it.
+        RuleError: There is no such rule, or it is not evaluated for these objects.
     """
     found = [explain(mind, name, *ids)] if ids else _each(mind, name)
     if not found:
@@ -78,7 +77,7 @@ def _each(mind: Mind, name: str) -> list[RuleExplanation]:
 
 
 def _unmet(node: RuleExplanation) -> Iterator[Why]:
-    """What keeps a formula from being true: its parts that are not; a comparison with its quantities."""
+    """The parts of a formula that are not true; comparisons with their quantities."""
     for part in node.parts:
         if part.verdict is None:
             yield Why(part.line())
@@ -87,7 +86,7 @@ def _unmet(node: RuleExplanation) -> Iterator[Why]:
 
 
 def stage_unmet(mind: Mind, stage: str) -> Why:
-    """Why a stage is not under way.
+    """Why a stage is not active.
 
     Raises:
         SettingsError: There is no such stage.
@@ -125,13 +124,13 @@ def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
 
 @dataclass(frozen=True, slots=True)
 class LastStep:
-    """The last step, to be judged again by reasoners that explain themselves.
+    """The last step, for re-evaluation by reasoners that explain themselves.
 
     Attributes:
-        mind: After the step.
-        before: The mind before it, or None when no step was made yet.
-        observation: What was perceived in it.
-        reasoners: All of them, in the order in which they run.
+        mind: The mind after the step.
+        before: The mind before it, or None before the first step.
+        observation: Its observation.
+        reasoners: All reasoners in order.
     """
 
     mind: Mind
@@ -142,7 +141,7 @@ class LastStep:
     def conditions(
         self, kind: type[ExplainingReasoner], decision: str, objects: tuple[int, ...]
     ) -> tuple[Condition, ...]:
-        """What a decision of a reasoner of some kind hung on in this step."""
+        """The conditions of a reasoner's decision in this step."""
         if self.before is None or self.observation is None:
             return (Condition("a step has been taken", False),)
         seen = self.observation
@@ -154,7 +153,7 @@ class LastStep:
             answers=MappingProxyType({**self.before.answers, **self.mind.answers}),
         )
         for reasoner in self.reasoners:
-            bare = getattr(reasoner, "reasoner", reasoner)  # one that is made to hold to beliefs
+            bare = getattr(reasoner, "reasoner", reasoner)  # unwrap `AssumingReasoner`
             if isinstance(bare, kind):
                 return bare.explain(mind, seen).get((decision, objects), ())
             mind = reasoner(mind, seen).mind
@@ -183,11 +182,11 @@ _CHANGES = {
     Presence.HIDDEN: "occlusion",
     Presence.SEEN: "reappearance",
 }
-"""The decision by which an object comes to be believed somewhere."""
+"""Presence -> the decision that leads to it."""
 
 
 def presence_unmet(step: LastStep, object_id: int, wanted: Presence) -> Why:
-    """Why an object is not believed hidden, gone, or seen."""
+    """Why an object is not believed to be hidden, gone or seen."""
     belief = _belief(step.mind, object_id)
     if belief.presence is wanted:
         return Why(f"object {object_id} is {wanted.value}")
@@ -249,7 +248,7 @@ def relation_unmet(mind: Mind, name: str, objects: tuple[int, ...]) -> Why:
 
 
 def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
-    """Why no alert of a kind is open, where a rule gives it."""
+    """Why no alert of a kind is open, if a rule raises it."""
     for alert in mind.alerts:
         if alert.kind == kind and (not objects or set(alert.objects) == set(objects)):
             return Why(f"alert {alert.id} is open since {alert.opened:.2f} s: {alert.cause}")
