@@ -1,10 +1,10 @@
 """The task as an automaton, and the filter that tracks its state with a probability.
 
-Read in this order: `states.py` (where one can be in a course), `derivatives.py` (how it begins and goes on),
-`automaton.py` (the states, numbered), `stage_hmm.py` (the probabilities), `forward_recursion.py` (the
-forward algorithm), `task_filter.py` (the filter, and what a model gives it), `transitions.py` and
-`hidden_phases.py` (the exact model), `backpointers.py` (the best way to a state), `prognosis.py` (what
-comes next, and the probability of success). The second model, used for supervision, is in `supervision/`.
+Read in this order: `states.py` (states of a course), `derivatives.py` (their successors),
+`automaton.py` (numbered states), `stage_hmm.py` (the probabilities), `forward_recursion.py` (the forward
+algorithm), `task_filter.py` (the filter and its model interface), `transitions.py` and `hidden_phases.py`
+(the exact model), `backpointers.py` (the best path to a state), `prognosis.py` (next stages and the
+probability of success). The second model, used for supervision, is in `supervision/`.
 """
 
 from visup.tasks.automaton.automaton import END, Automaton, Transition

@@ -1,7 +1,7 @@
-"""The states of a course, numbered, each worked out when it is first come to.
+"""The automaton of a course: numbered states, computed on demand.
 
-A task may have more states than anyone wants to see (any order), or no end of them (recursion),
-so nothing is compiled before it is needed. States that are the same (`course.form`) are one node.
+A task may have very many states (any order) or infinitely many (recursion), so nothing is compiled before it
+is needed. Structurally equal states (`structural_key`) are one node.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from visup.tasks.grammar.nodes import Task
 V = TypeVar("V")
 W = TypeVar("W")
 END = -1
-"""In place of a node: the course is over."""
+"""In place of a node: the end of the course."""
 TRANSITIONS_PER_NODE = 10
-DEEPEST = 60  # courses around a step; each takes some of the depth that Python allows
+DEEPEST = 60  # nested courses around a step, limited by Python's recursion depth
 NEW = -1
-"""In place of a step that is carried over: it begins by the way."""
+"""In place of a carried step: the step begins with the transition."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One way to go on from a node.
+    """A transition from a node.
 
     Attributes:
-        target: The node it leads to, or `END`.
-        left: Positions of the steps that are over by it.
-        carried: For each step of the target its position in the node, or `NEW`.
-        share: Its share among the ways that leave the same steps.
+        target: The target node, or `END`.
+        left: Positions of the steps that it completes.
+        carried: For each step of the target its position in the source node, or `NEW`.
+        share: Its share among the transitions that complete the same steps.
     """
 
     target: int
@@ -52,12 +52,12 @@ class Transition:
 
     @property
     def begun(self) -> tuple[int, ...]:
-        """Positions in the target of the steps that begin by it."""
+        """Positions in the target of the steps that begin with it."""
         return tuple(i for i, c in enumerate(self.carried) if c == NEW)
 
 
 class Automaton:
-    """The states of a task and the ways between them.
+    """The states of a task and their transitions.
 
     Args:
         task: The task.
@@ -68,46 +68,45 @@ class Automaton:
         self._states: list[State[int]] = []
         self._steps: list[tuple[TaskStep, ...]] = []
         self._numbers: dict[object, int] = {}
-        self._ways: dict[int, tuple[Transition, ...]] = {}
+        self._transitions: dict[int, tuple[Transition, ...]] = {}
         entered = list(enter(task, begin(task), NEW, 0.0))
         self.start = tuple((self._number(s), 1.0 / len(entered)) for s in entered)
-        """Nodes in which the task may begin, each with its share; `END` where it may be left out."""
+        """Initial nodes, each with its share; `END` if the task may be empty."""
 
     def __len__(self) -> int:
         return len(self._states)
 
     def steps(self, node: int) -> tuple[TaskStep, ...]:
-        """The steps under way, in the order of the text; none at the end."""
+        """The active steps in the order of the text; none at the end."""
         return () if node == END else self._steps[node]
 
     def transitions(self, node: int) -> tuple[Transition, ...]:
-        """All ways to go on; none at the end."""
+        """All transitions of a node; none at the end."""
         if node == END:
             return ()
-        if node not in self._ways:
-            self._ways[node] = self._worked_out(node)
-        return self._ways[node]
+        if node not in self._transitions:
+            self._transitions[node] = self._computed(node)
+        return self._transitions[node]
 
     def node(self, state: State[W]) -> int:
-        """The number of a state, whatever is kept about its steps."""
+        """The number of a state, regardless of its payloads."""
         return self._number(with_payloads(state, [Leaf(x.step, NEW) for x in leaves(state)]))
 
     def state(self, node: int) -> State[int]:
-        """The state of a node; about each step its position is kept."""
+        """The state of a node; the payload of each step is its position."""
         return self._states[node]
 
     def explored(self, most: int) -> list[int]:
-        """The first nodes, breadth first from the start.
+        """The first nodes in breadth-first order.
 
-        It ends early where ways grow without bound, as they do with stages that come back to
-        themselves inside others: so many ways as ten for each node are looked at, and what is
-        nested too deep is not gone on from.
+        Ends early where transitions grow without bound, as with recursive stages inside others: at most
+        `TRANSITIONS_PER_NODE` per node are expanded, and no state nested deeper than `DEEPEST`.
         """
         found = {n: None for n, _ in self.start if n != END}
         seen = 0
         for done, node in enumerate(_growing(found)):
             if seen > TRANSITIONS_PER_NODE * most:
-                return list(found)[:done]  # the ways of the others are better not worked out
+                return list(found)[:done]  # do not expand the remaining nodes
             if depth(self._states[node]) > DEEPEST:
                 continue
             seen += len(self.transitions(node))
@@ -126,12 +125,12 @@ class Automaton:
             self._steps.append(tuple(x.step for x in leaves(state)))
         return self._numbers[key]
 
-    def _worked_out(self, node: int) -> tuple[Transition, ...]:
-        found = [self._way(m) for m in derivatives(self._task, self._states[node], NEW, 0.0)]
+    def _computed(self, node: int) -> tuple[Transition, ...]:
+        found = [self._transition(m) for m in derivatives(self._task, self._states[node], NEW, 0.0)]
         alike = Counter(w.left for w in found)
         return tuple(replace(w, share=1.0 / alike[w.left]) for w in found)
 
-    def _way(self, derivative: Derivative[int]) -> Transition:
+    def _transition(self, derivative: Derivative[int]) -> Transition:
         carried = (
             () if derivative.state is None else tuple(x.payload for x in leaves(derivative.state))
         )
@@ -141,19 +140,19 @@ class Automaton:
 
 
 def with_payloads(state: State[W], new: list[Leaf[V]]) -> State[V]:
-    """A state with other things kept about its steps."""
-    # The tree is rebuilt from its leaves, so that nothing of the old kind remains in it.
+    """A state with other payloads of its steps."""
+    # The tree is rebuilt from its leaves, so that no payload of the old type remains.
     return with_leaves(state, iter(new))  # type: ignore[arg-type]
 
 
 def _numbered(state: State[int]) -> State[int]:
-    """A state each of whose steps keeps its own position."""
+    """A state with the position of each step as its payload."""
     places = count()
     return with_leaves(state, (replace(x, payload=next(places)) for x in leaves(state)))
 
 
 def _growing(found: dict[int, None]) -> Iterator[int]:
-    """The keys of a dictionary that grows while one goes through them."""
+    """Iterate over the keys of a dictionary that grows meanwhile."""
     done = 0
     while done < len(found):
         keys: Iterable[int] = list(found)[done:]

@@ -1,4 +1,4 @@
-"""What lies behind a task by the best way to where it is, and what of it is taken back."""
+"""Backpointers: the completed steps on the best path to a state, and revisions of them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 
 from visup.tasks.automaton.states import TaskStep
 
-MOST_BEHIND = 32  # at least so many steps are remembered, and less than twice as many
+MOST_BEHIND = 32  # completed steps remembered: at least this number, less than twice as many
 
 
 @dataclass(frozen=True, slots=True)
 class Backpointer:
-    """A step that lies behind, with those before it: the best way to a place.
+    """A completed step with its predecessors on the best path to a state.
 
     Attributes:
         step: The step.
-        left: When it was left, seconds.
-        before: What lies further back; None where that is forgotten too.
-        length: How many steps lie behind, with those forgotten.
+        left: When it was completed, seconds.
+        before: Its predecessor; None if there is none, or if it is forgotten.
+        length: Number of completed steps, including forgotten ones.
     """
 
     step: TaskStep
@@ -29,12 +29,12 @@ class Backpointer:
 
 @dataclass(frozen=True, slots=True)
 class Revision:
-    """A step that was reported to be over and is now believed not to have been.
+    """A step that was reported as completed and is no longer believed to be.
 
     Attributes:
         step: The step.
-        reported: When it was believed to have ended, seconds.
-        revised: When that was taken back, seconds.
+        reported: When it was believed to be completed, seconds.
+        revised: When that was revised, seconds.
     """
 
     step: TaskStep
@@ -51,7 +51,7 @@ class Revision:
 def extended(
     backpointer: Backpointer | None, left: tuple[TaskStep, ...], now: float
 ) -> Backpointer | None:
-    """A trail with some steps more that were left now; what lies too far back is forgotten."""
+    """A path extended by the steps completed now; the oldest ones are forgotten."""
     for step in left:
         backpointer = Backpointer(
             step, now, backpointer, backpointer.length + 1 if backpointer else 1
@@ -62,7 +62,7 @@ def extended(
 
 
 def behind(backpointer: Backpointer | None) -> Iterator[Backpointer]:
-    """What lies behind, the last first, as far as it is remembered."""
+    """The remembered completed steps, latest first."""
     while backpointer is not None:
         yield backpointer
         backpointer = backpointer.before
@@ -74,7 +74,7 @@ def _cut(backpointer: Backpointer, most: int) -> Backpointer:
 
 
 def revisions(old: Backpointer | None, new: Backpointer | None, now: float) -> Iterator[Revision]:
-    """Steps that lay behind by the best way before, and do not by the best way now, the last first."""
+    """Steps completed on the previous best path but not on the present one, latest first."""
     while old is not None and old is not new:
         while new is not None and new.length > old.length:
             new = new.before
@@ -87,7 +87,7 @@ def revisions(old: Backpointer | None, new: Backpointer | None, now: float) -> I
 
 
 def _same(one: Backpointer | None, other: Backpointer | None) -> bool:
-    """Whether two trails of one length pass through the same steps, as far as they are remembered."""
+    """Whether two paths of the same length have the same remembered steps."""
     while one is not None and other is not None and one is not other:
         if one.step != other.step:
             return False

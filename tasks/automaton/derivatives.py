@@ -1,10 +1,9 @@
 """States of a course and their derivatives: how it begins and continues.
 
-A state is what remains of a course with its steps under way marked; moving on gives the states
-that may come next. It is the derivative of a regular expression, with a stack where stages
-are recursive and with several steps under way where a course asks for things at the same time,
-so every task of the language has its states, whether or not its language is regular. States
-are values: a supervisor may follow as many of them side by side as it likes.
+A state is the rest of a course with its active steps marked; its derivatives are the states that may come
+next. This is the derivative of a regular expression, with a stack for recursive stages and several active
+steps for parallel courses, so that every task has states, whether or not its language is regular. States are
+values: a supervisor can follow any number of them in parallel.
 """
 
 from __future__ import annotations
@@ -59,12 +58,12 @@ DEEPEST = 200
 
 @dataclass(frozen=True, slots=True)
 class Derivative(Generic[W]):
-    """One way to go on.
+    """One derivative of a state.
 
     Attributes:
-        state: Where it leads, or None for the end of the course.
-        left: Steps that are over by it.
-        entered: Steps that begin by it.
+        state: The next state, or None for the end of the course.
+        left: The steps that it completes.
+        entered: The steps that it begins.
     """
 
     state: State[W] | None
@@ -73,34 +72,34 @@ class Derivative(Generic[W]):
 
 
 def begin(task: Task) -> Continuation:
-    """The whole task, not yet begun."""
+    """The whole task before its beginning."""
     return Continuation(Reference(task.name), task.name)
 
 
 def enter(
     task: Task, continuation: Continuation, payload: W, now: float
 ) -> Iterator[State[W] | None]:
-    """All ways in which a course can begin.
+    """All initial states of a course.
 
     Args:
-        task: The task whose stages references mean.
+        task: The task that defines the stages.
         continuation: The course.
-        payload: What each step starts with.
+        payload: Initial payload of each step.
         now: Seconds, from which each `within` counts.
 
     Yields:
-        States; None where the course may be left out whole.
+        States; None if the course may be empty.
     """
     return _Entrance(task, payload, now).states(continuation)
 
 
 def derivatives(task: Task, state: State[W], payload: W, now: float) -> Iterator[Derivative[W]]:
-    """All ways to go on by leaving a step (or, at an end, several at the same time).
+    """All derivatives of a state by completing a step (or, at an end, several at the same time).
 
     Args:
         task: The task.
-        state: Where one is.
-        payload: What each entered step starts with.
+        state: The state.
+        payload: Initial payload of each entered step.
         now: Seconds, from which each `within` counts.
     """
     match state:
@@ -120,13 +119,13 @@ def derivatives(task: Task, state: State[W], payload: W, now: float) -> Iterator
 
 @dataclass(frozen=True, slots=True)
 class _Entrance(Generic[W]):
-    """How courses begin at one moment.
+    """Computes the initial states of courses at one moment.
 
     Attributes:
-        task: The task whose stages references mean.
-        payload: What each step starts with.
+        task: The task that defines the stages.
+        payload: Initial payload of each step.
         now: Seconds, from which each `within` counts.
-        depth: How many references were followed without a step; a guard.
+        depth: Number of references followed without a step; a guard against endless recursion.
     """
 
     task: Task
@@ -135,7 +134,7 @@ class _Entrance(Generic[W]):
     depth: int = 0
 
     def states(self, todo: Continuation) -> Iterator[State[W] | None]:
-        """All ways in which a course can begin; see `enter`."""
+        """All initial states of a course; see `enter`."""
         if self.depth > DEEPEST:
             return
         match todo.course:
@@ -145,12 +144,12 @@ class _Entrance(Generic[W]):
                 yield from self._stage(replace(todo, stage=name), todo.stage)
             case Sequence(items=items):
                 rest = items[1] if len(items) == 2 else Sequence(items[1:])
-                yield from self._then(todo, items[0], rest)
+                yield from self._in_sequence(todo, items[0], rest)
             case Choice(options=options):
                 for option in options:
                     yield from self.states(replace(todo, course=option))
             case Together(parts=parts):
-                yield from self._together(todo, parts)
+                yield from self._in_parallel(todo, parts)
             case AnyOrder() as any_order:
                 yield from self._any_order(todo, any_order)
             case Already(item=item):
@@ -182,23 +181,27 @@ class _Entrance(Generic[W]):
             return
         deeper = replace(self, depth=self.depth + 1)
         if isinstance(stage.body, Actors):
-            # An action in the strict form is asked for by the stage that refers to it.
+            # An action in the strict form belongs to the stage that refers to it.
             action = Action(stage.name, stage.body.names)
             yield from deeper.states(replace(todo, course=action, stage=asked_in))
         else:
             inside = todo.inside | {stage.name}
             yield from deeper.states(replace(todo, course=stage.body, inside=inside))
 
-    def _then(self, todo: Continuation, first: Course, rest: Course) -> Iterator[State[W] | None]:
+    def _in_sequence(
+        self, todo: Continuation, first: Course, rest: Course
+    ) -> Iterator[State[W] | None]:
         later = replace(todo, course=rest)
         for state in self.states(replace(todo, course=first)):
             if state is not None:
                 yield SequenceState(state, later)
-            # `first` is left out; a repetition of nothing would never end.
+            # `first` is skipped; repeating an empty course would never end.
             elif not isinstance(rest, Repeated | Counted) or rest.item != first:
                 yield from self.states(later)
 
-    def _together(self, todo: Continuation, parts: tuple[Course, ...]) -> Iterator[State[W] | None]:
+    def _in_parallel(
+        self, todo: Continuation, parts: tuple[Course, ...]
+    ) -> Iterator[State[W] | None]:
         for way in product(*(tuple(self.states(replace(todo, course=p))) for p in parts)):
             under_way = tuple(s for s in way if s is not None)
             if not under_way:
@@ -215,17 +218,17 @@ class _Entrance(Generic[W]):
             if left == 1:
                 yield from self.states(replace(todo, course=item))
             elif len(others) == 1 and least == 2:
-                yield from self._then(todo, item, others[0])
+                yield from self._in_sequence(todo, item, others[0])
             else:
                 count = None if left - 1 == len(others) else left - 1
                 fewest = None if least == left else max(0, least - 1)
                 again = AnyOrder(others, count=count, least=fewest, new=course.new)
-                yield from self._then(todo, item, again)
+                yield from self._in_sequence(todo, item, again)
         if least == 0:
             yield None
 
     def _counted(self, todo: Continuation, counted: Counted) -> Iterator[State[W] | None]:
-        """Once, and after it as often as is left to do."""
+        """The item once, followed by the remaining repetitions."""
         if counted.most == 0:
             yield None
             return
@@ -234,7 +237,7 @@ class _Entrance(Generic[W]):
         else:
             most = None if counted.most is None else counted.most - 1
             again = Counted(counted.item, max(0, counted.least - 1), most)
-            yield from self._then(todo, counted.item, again)
+            yield from self._in_sequence(todo, counted.item, again)
         if counted.least == 0:
             yield None
 
@@ -242,7 +245,7 @@ class _Entrance(Generic[W]):
         if repeated.mark == "?":
             yield from self.states(replace(todo, course=repeated.item))
         else:
-            yield from self._then(todo, repeated.item, Repeated(repeated.item, "*"))
+            yield from self._in_sequence(todo, repeated.item, Repeated(repeated.item, "*"))
         if repeated.mark != "+":
             yield None
 
@@ -267,11 +270,11 @@ def _parallel_derivatives(
 def _surrounded(
     task: Task, todo: Continuation, course: Timed | Conditioned, now: float
 ) -> Continuation:
-    """The course inside clauses or conditions, which surround each of its steps."""
+    """The continuation inside clauses or conditions, which apply to each of its steps."""
     todo = replace(todo, course=course.item)
     if isinstance(course, Timed):
         return _timed(task, todo, course.clauses, now)
-    kinds = {c.kind for c in course.conditions} - {"pauses"}  # which hold each for itself
+    kinds = {c.kind for c in course.conditions} - {"pauses"}  # pause conditions accumulate
     outer = tuple(c for c in todo.conditions if c.kind not in kinds)
     return replace(todo, conditions=(*outer, *course.conditions))
 
@@ -291,7 +294,7 @@ def _timed(
 
 
 def _delay(task: Task, course: Timed | Conditioned) -> tuple[float, float] | None:
-    """The least and the greatest delay, seconds, with which a course begins, where it says so."""
+    """The least and greatest delay of a course, seconds, or None."""
     clauses = course.clauses if isinstance(course, Timed) else ()
     said = next((c for c in clauses if isinstance(c, Delay)), None)
     if said is None:

@@ -1,10 +1,9 @@
-"""The forward algorithm over hypotheses that are made as they are needed.
+"""The forward algorithm over hypotheses created on demand.
 
-Each hypothesis has its mass, the probability of all ways that lead to it together, and the
-probability of the best of these ways. Ways that lead to the same hypothesis are merged: masses
-add up, and what is remembered is what the best way remembers (Viterbi). What is dropped is
-accounted for: at the time of dropping, given all that was seen until then, the truth is among it
-with the probability of its mass. Summed over time that bounds how often the truth is ever lost.
+Each hypothesis has a mass, the total probability of all paths to it, and the probability of the best of these
+paths. Paths to the same hypothesis are merged: masses are summed, and the history of the best path is kept
+(Viterbi). Dropped mass is recorded: given the evidence at that time, it is the probability that the truth is
+dropped. Summed over time it bounds how often the truth is lost.
 """
 
 from __future__ import annotations
@@ -19,12 +18,12 @@ K = TypeVar("K", bound=Hashable)
 
 @dataclass(frozen=True, slots=True)
 class Weighted(Generic[H]):
-    """What is remembered by a hypothesis, with its weights.
+    """A hypothesis with its weights.
 
     Attributes:
-        value: The hypothesis, with what the best way to it remembers.
-        mass: Probability, given all that was seen.
-        best: Probability of the best way to it, relative to the best of all.
+        value: The hypothesis with the history of its best path.
+        mass: Posterior probability.
+        best: Probability of its best path, relative to the best of all.
     """
 
     value: H
@@ -37,10 +36,9 @@ class Pruned(Generic[K, H]):
     """The belief after one step.
 
     Attributes:
-        retained: Hypotheses by key; their masses sum to 1. Empty when nothing has any mass.
-        dropped: Share of the mass that was dropped in this step.
-        evidence: Mass before it was made to sum to 1: how likely what was seen is, given all that
-            was seen before.
+        retained: Hypotheses by key; their masses sum to 1. Empty if no mass is left.
+        dropped: Share of the mass dropped in this step.
+        evidence: Mass before normalisation: the likelihood of the observation given all previous ones.
     """
 
     retained: Mapping[K, Weighted[H]] = field(default_factory=dict)
@@ -49,10 +47,10 @@ class Pruned(Generic[K, H]):
 
 
 def merged(grown: Iterable[tuple[K, H, float, float]]) -> dict[K, Weighted[H]]:
-    """Ways by where they lead: masses add up, the best way is remembered.
+    """Merge paths by hypothesis: masses are summed, the best path is kept.
 
     Args:
-        grown: (key, what is remembered, mass, probability of the best way) of each way.
+        grown: (key, hypothesis, mass, probability of the best path) of each path.
     """
     found: dict[K, tuple[H, float, float]] = {}
     for key, value, mass, best in grown:
@@ -67,12 +65,12 @@ def merged(grown: Iterable[tuple[K, H, float, float]]) -> dict[K, Weighted[H]]:
 
 
 def pruned(found: Mapping[K, Weighted[H]], most: int, least: float) -> Pruned[K, H]:
-    """The heaviest hypotheses, the heaviest first, with masses that sum to 1.
+    """The hypotheses with the largest masses in decreasing order, normalised to 1.
 
     Args:
-        found: All of them.
-        most: How many are retained at most.
-        least: What has a smaller share of the mass than this is dropped.
+        found: All hypotheses.
+        most: Maximum number to retain.
+        least: Hypotheses with a smaller share of the mass are dropped.
     """
     total = sum(w.mass for w in found.values())
     if total <= 0.0:

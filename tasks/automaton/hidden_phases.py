@@ -1,6 +1,6 @@
-"""The model in which the phase of each step is hidden: what the enumerating oracle certifies.
+"""The model with hidden phases of steps, which is verified against an enumerating oracle.
 
-Hypotheses are the hidden states of a task (`transitions.py`) with the best way to each; their
+Hypotheses are the hidden states of a task (`transitions.py`) with the best path to each; their
 probabilities are those of `stage_hmm.py`.
 """
 
@@ -30,14 +30,14 @@ STATUSES = {
 
 
 class ActionEvidence(NamedTuple):
-    """What is seen of an action between its actors, and how sure that is, 0 to 1."""
+    """The observed status of an action between its actors, and its confidence, 0 to 1."""
 
     seen: ActionStatus
     confidence: float = 1.0
 
 
 Evidence: TypeAlias = Mapping[ActionKey, ActionEvidence]
-"""What is seen of actions; of those that are not in it nothing is."""
+"""Action -> evidence; actions without an entry are unobserved."""
 
 HiddenPosterior: TypeAlias = TaskPosterior[HiddenState, Backpointer | None]
 
@@ -100,7 +100,7 @@ class HiddenPhases:
         return self.transitions.transitions(state, dt)
 
     def _likelihood(self, state: HiddenState, evidence: Evidence) -> float:
-        """How much likelier the evidence is in a state than in an idle scene."""
+        """Likelihood ratio of the evidence in a state to an idle scene."""
         fit = 1.0
         for key, kind in self.transitions.required(state):
             if key in evidence:

@@ -1,4 +1,4 @@
-"""What comes next in a task, and whether it can still end well, from where it is."""
+"""Prognosis of a task: the next stages, and the probability of success."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from visup.tasks.automaton.stage_hmm import WAITING, StageHmm
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.transitions import HiddenState
 
-MOST_NODES = 1_000  # beyond so many nodes success is counted as none
-SMALLEST = 1e-9  # ways less likely than this are not followed
+MOST_NODES = 1_000  # beyond this number of nodes success counts as impossible
+SMALLEST = 1e-9  # less likely paths are not followed
 SWEEPS = 500
 
 
 class Prognosis:
-    """What the model expects of the rest of a task.
+    """The model's predictions for the rest of a task.
 
-    The fate of each step, whether it is left at last or lost, is taken to be independent of how
-    long the others take; where one step is under way at a time, that is exact.
+    The fate of each step, completed or lost, is assumed to be independent of the durations of the others;
+    with one active step at a time this is exact.
 
     Args:
         automaton: The states of the course.
         hmm: The probabilities.
-        most: So many nodes are looked at to tell success, breadth first.
+        most: Number of nodes explored for the probability of success, breadth first.
     """
 
     def __init__(self, automaton: Automaton, hmm: StageHmm, most: int = MOST_NODES) -> None:
@@ -35,10 +35,9 @@ class Prognosis:
         self._next: dict[int, Mapping[str, float]] = {}
 
     def success(self, state: HiddenState) -> float:
-        """Probability that the course reaches its end from a place.
+        """Probability that the course reaches its end from a state.
 
-        Of a task with more states than are looked at it is a lower bound: beyond them nothing is
-        counted.
+        A lower bound for tasks with more states than are explored.
         """
         if state.node == END:
             return 1.0
@@ -46,15 +45,15 @@ class Prognosis:
             self._hopes = self._solved()
         hope = self._hopes.get(state.node)
         if hope is None:
-            # Come to only by following the task far: as from the state itself, looked at anew.
+            # An unexplored node: compute it from its own transitions.
             hope = self._hoped(state.node, self._hopes)
         return hope * self._fate(state)
 
     def next_stages(self, state: HiddenState) -> Mapping[str, float]:
-        """For each stage the probability that it is the next to begin.
+        """Stage -> probability that it is the next to begin.
 
-        The end of the task stands among them under an empty name; what is left of 1 is lost before
-        any of them is come to, so that success is never likelier than all of them together.
+        The end of the task has an empty name; the rest of 1 is the probability of being lost before, so that
+        success is never more likely than all of them together.
         """
         if state.node == END:
             return {"": 1.0}
@@ -67,7 +66,7 @@ class Prognosis:
         return {stage: fate * chance for stage, chance in self._next[state.node].items()}
 
     def _fate(self, state: HiddenState) -> float:
-        """Probability that all steps under way are left at last, and none is lost."""
+        """Probability that all active steps are completed and none is lost."""
         steps = self._automaton.steps(state.node)
         return math.prod(self._process.fate(s, p) for s, p in zip(steps, state.phases, strict=True))
 
@@ -89,18 +88,18 @@ class Prognosis:
                 self._follow(transition.target, here, likely, found, depth + 1)
 
     def _shares(self, node: int) -> list[tuple[Transition, float]]:
-        """The ways on from a node, each with its share once its steps may be left."""
+        """The transitions of a node with their shares once its steps may be completed."""
         transitions = self._automaton.transitions(node)
         total = sum(w.share for w in transitions)
         return [(w, w.share / total) for w in transitions]
 
     def _solved(self) -> dict[int, float]:
-        """For each node the probability to reach the end, apart from the fates of its own steps."""
+        """Node -> probability of reaching the end, apart from the fates of its own steps."""
         nodes = self._automaton.explored(self._most)
         hopes = dict.fromkeys(nodes, 0.0)
         for _ in range(SWEEPS):
             change = 0.0
-            for node in reversed(nodes):  # ends come last, so that most is settled in one sweep
+            for node in reversed(nodes):  # end states come last, so that one sweep settles most
                 hope = self._hoped(node, hopes)
                 change = max(change, abs(hope - hopes[node]))
                 hopes[node] = hope
@@ -119,12 +118,12 @@ class Prognosis:
         return hopes.get(transition.target, 0.0) * self._fate_of_begun(transition)
 
     def _fate_of_begun(self, transition: Transition) -> float:
-        """Probability that all steps that a way begins are left at last, and none is lost."""
+        """Probability that all steps begun by a transition are completed and none is lost."""
         begun = begun_by(self._automaton, transition)
         return math.prod(self._process.fate(s, WAITING) for s in begun)
 
 
 def begun_by(automaton: Automaton, transition: Transition) -> list[TaskStep]:
-    """The steps that begin by a way."""
+    """The steps begun by a transition."""
     steps = automaton.steps(transition.target)
     return [steps[i] for i in transition.begun]

@@ -1,8 +1,8 @@
-"""How a task goes and how it is seen, as probabilities: the model behind recognition.
+"""The hidden Markov model of a task: transition rates and observation probabilities.
 
-Hidden is where the task is: the state of its course (which steps are under way, `derivatives.py`) and
-the *phase* of each of these steps. A step waits to begin, is going on (in one phase, or in several
-one after the other where its course says `for`), is failing, or is lost for good:
+The hidden state is the state of the course (its active steps, `derivatives.py`) and the *phase* of each of
+these steps. A step is waiting to begin, going on (in one phase, or several successive ones if its course says
+`for`), failing, or lost for good:
 
     waiting --begin--> going 1 --> ... --> going k --leave--> what comes next
                           ^   |                |
@@ -10,16 +10,16 @@ one after the other where its course says `for`), is failing, or is lost for goo
                           |   v                v
                           failing  --lose--> lost
 
-All rates are per second, so that nothing hangs on the frame rate: in `dt` seconds a phase with
-exits of rates r1, r2, ... is left with probability 1 - exp(-(r1 + r2 + ...) dt), by each exit in
-proportion to its rate. In one step of time each step changes its phase at most once, and after
-that the course goes on at most once. Ways on that leave the same steps share their rate equally;
-a way that leaves several steps at once is as slow as the slowest of them.
+All rates are per second, so that results do not depend on the frame rate: in `dt` seconds a phase with exit
+rates r1, r2, ... is left with probability 1 - exp(-(r1 + r2 + ...) dt), by each exit in proportion to its
+rate. In one time step each step changes its phase at most once, and then the course moves on at most once.
+Transitions that complete the same steps share their rate equally; one that completes several steps is as slow
+as the slowest.
 
-Seen is, for each action of the task and its actors, whether it holds, whether its contrary does,
-neither, or nothing at all, which says nothing. `missing` is the probability that neither is seen
-of what is going on, `spurious` that the contrary is; the same with the two exchanged for what is
-failing. Of what nobody asks for, or what still waits, either is seen with probability `spurious`.
+The observation of each action of the task and its actors is that it holds, that its contrary does, that
+neither does, or none at all, which carries no information. `missing` is the probability that neither is
+observed of an ongoing action, `spurious` that the contrary is; for a failing action the two are exchanged. Of
+actions that are waiting or not required, each is observed with probability `spurious`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from visup.tasks.automaton.states import TaskStep
 
 
 class ActionStatus(IntEnum):
-    """What is seen of an action between its actors."""
+    """The observed status of an action between its actors."""
 
     HOLDS = 0
     NEITHER = 1
@@ -43,7 +43,7 @@ class ActionStatus(IntEnum):
 
 
 class PhaseKind(Enum):
-    """What the phase of a step is, whatever its number."""
+    """The kind of a phase, regardless of its number."""
 
     WAITING = "waiting"
     GOING = "going"
@@ -52,7 +52,7 @@ class PhaseKind(Enum):
 
 
 WAITING = 0
-"""The first phase of every step; then come those of going on, then failing, then lost."""
+"""The first phase of every step; the phases of going on, failing and lost follow."""
 
 
 @dataclass(frozen=True)
@@ -60,22 +60,21 @@ class StageHmm:
     """The probabilities of the model; rates per second.
 
     Attributes:
-        begin: Rate at which a step that waits begins.
-        leave: Rate at which the course goes on from a step that has gone through all its phases.
-        skip: Rate at which it goes on from one that has not.
-        fail: Rate at which what is going on begins to fail.
-        recover: Rate at which what is failing goes on again, from its first phase.
-        lose: Rate at which what is failing is lost for good.
-        missing: Probability that nothing is seen of what is going on, or failing.
-        spurious: Probability that something is seen that is not so.
-        phases: Number of phases in which a step goes on whose course says `for`; each takes an
-            equal part of that time on average.
-        unseen: Probability that the course goes on without the beginning of the next step being
-            seen, although that is seen to come nearer.
-        pass_over: Probability that a step is left that was not seen through; its square where the
-            step was seen not to happen.
-        look_s: What is seen of one thing in neighbouring frames is seen wrongly together: it counts
-            as one look in so many seconds.
+        begin: Rate at which a waiting step begins.
+        leave: Rate at which the course moves on from a step that has passed all its phases.
+        skip: Rate at which it moves on from one that has not.
+        fail: Rate at which an ongoing step begins to fail.
+        recover: Rate at which a failing step recovers, to its first phase.
+        lose: Rate at which a failing step is lost for good.
+        missing: Probability that an ongoing or failing action is not observed.
+        spurious: Probability of a false observation.
+        phases: Number of phases of a step with `for`; each takes an equal part of that time on average.
+        unseen: Probability that the course moves on without the beginning of the next step being observed,
+            although its approach is.
+        pass_over: Probability that a step is passed that was not seen through; squared if it was seen not to
+            happen.
+        look_s: Correlation time of observations, seconds: errors in neighbouring frames are dependent, so
+            that this time counts as one observation.
     """
 
     begin: float = 1.0
@@ -92,11 +91,11 @@ class StageHmm:
     look_s: float = 0.4
 
     def count(self, step: TaskStep) -> int:
-        """Number of phases in which a step goes on."""
+        """Number of ongoing phases of a step."""
         return 1 if step.hold_s is None else self.phases
 
     def kind(self, step: TaskStep, phase: int) -> PhaseKind:
-        """What a phase of a step is."""
+        """The kind of a phase of a step."""
         if phase == WAITING:
             return PhaseKind.WAITING
         beyond = phase - self.count(step)
@@ -105,13 +104,13 @@ class StageHmm:
         )
 
     def exits(self, step: TaskStep, phase: int) -> tuple[tuple[int, float], ...]:
-        """Phases that may come next while the step stays under way, each with its rate."""
+        """Phases that may come next while the step stays active, each with its rate."""
         last = self.count(step)
         match self.kind(step, phase):
             case PhaseKind.WAITING:
                 return ((1, self.begin),)
             case PhaseKind.GOING if phase < last:
-                assert step.hold_s is not None  # only a `for` makes several phases
+                assert step.hold_s is not None  # only steps with `for` have several phases
                 return ((phase + 1, last / max(step.hold_s, 1e-9)), (last + 1, self.fail))
             case PhaseKind.GOING:
                 return ((last + 1, self.fail),)
@@ -124,14 +123,14 @@ class StageHmm:
         return within(dt, phase, self.exits(step, phase))
 
     def leaving(self, step: TaskStep, phase: int) -> float:
-        """Rate at which the course goes on from a step in a phase."""
+        """Rate at which the course moves on from a step in a phase."""
         if self.kind(step, phase) is PhaseKind.LOST:
             return 0.0
         return self.leave if phase == self.count(step) else self.skip
 
     @cached_property
     def chances(self) -> dict[PhaseKind, tuple[float, float, float]]:
-        """For each kind of phase the probability to see HOLDS, NEITHER and CONTRARY."""
+        """Kind of phase -> probabilities of observing HOLDS, NEITHER and CONTRARY."""
         noise, rest = self.spurious, 1.0 - self.missing - self.spurious
         idle = (noise, 1.0 - 2 * noise, noise)
         bad = (noise, self.missing, rest)
@@ -143,12 +142,12 @@ class StageHmm:
         }
 
     def likelihood(self, kind: PhaseKind, seen: ActionStatus, confidence: float = 1.0) -> float:
-        """How much likelier something is seen of a step in such a phase than of an idle action.
+        """Likelihood ratio of an observation for a step in a phase to that for an idle action.
 
         Args:
-            kind: Of the phase.
-            seen: What is seen.
-            confidence: 0 to 1: with the rest of it, anything might have been seen alike.
+            kind: Kind of the phase.
+            seen: The observation.
+            confidence: 0 to 1; with the remaining probability the observation is uninformative.
         """
         if seen is ActionStatus.UNKNOWN:
             return 1.0
@@ -157,11 +156,11 @@ class StageHmm:
         return (confidence * of + blur) / (confidence * idle + blur)
 
     def fit(self, seen: ActionStatus, confidence: float, dt: float) -> float:
-        """How well something seen for `dt` seconds fits a step that should go on; 1 at best.
+        """How well an observation during `dt` seconds fits an ongoing step; 1 at best.
 
-        The likelihood of what is seen against that of seeing it hold, one look in `look_s`. Where
-        nothing is seen it fits as well as looks at what is going on do on average, so that a course
-        of which nothing can be seen is not held against one that is seen to go on.
+        The ratio of its likelihood to that of HOLDS, with one observation per `look_s`. A missing observation
+        fits as well as those of an ongoing step on average, so that an unobservable course is not at a
+        disadvantage against one that is seen to go on.
         """
         blur, going = (1.0 - confidence) / 3, self.chances[PhaseKind.GOING]
         whole = confidence * going[ActionStatus.HOLDS] + blur
@@ -172,14 +171,14 @@ class StageHmm:
         return float(ratio ** (dt / self.look_s))
 
     def false_alarm(self, confidence: float) -> float:
-        """How much likelier it is that what held for a look was a false alarm than that it was so.
+        """Likelihood ratio of a false alarm to a true observation, for one that held for a look.
 
-        A false alarm lasts as long as it lasts, so that it counts once and not at every look.
+        It counts once, not at every look, because the errors of a lasting false alarm are dependent.
         """
         return 1.0 - confidence * (1.0 - self.spurious / (1.0 - self.spurious))
 
     def fate(self, step: TaskStep, phase: int) -> float:
-        """Probability that a step in a phase is left at all, and not lost before."""
+        """Probability that a step in a phase is eventually completed and not lost."""
         return self._fates(step.hold_s)[phase]
 
     def _fates(self, hold_s: float | None) -> Sequence[float]:
@@ -193,7 +192,7 @@ class StageHmm:
         return {}
 
     def _solved(self, step: TaskStep) -> Sequence[float]:
-        """For each phase the probability to be left at last; a linear system, solved by sweeps."""
+        """Probability of eventual completion for each phase: a linear system, solved iteratively."""
         last = self.count(step)
         fates = [0.0] * (last + 3)
         for _ in range(10_000):
@@ -211,7 +210,7 @@ class StageHmm:
 def within(
     dt: float, stays: int, exits: Sequence[tuple[int, float]]
 ) -> Iterator[tuple[int, float]]:
-    """What exits of constant rates bring in `dt` seconds, each with its probability."""
+    """Outcomes of exits with constant rates after `dt` seconds, each with its probability."""
     total = sum(rate for _, rate in exits)
     gone = -math.expm1(-total * dt)
     yield stays, 1.0 - gone
@@ -224,4 +223,4 @@ DEFAULT_HMM = StageHmm()
 SUPERVISION_HMM = StageHmm(
     begin=0.1, fail=0.02, recover=0.05, lose=0.125, missing=0.37, spurious=0.075
 )
-"""Of relations in the mind, which are true for a while, then neither for a while, and then again."""
+"""For relations in the mind, which alternate between true and neither."""

@@ -1,6 +1,6 @@
-"""States of a course: what remains of it with its steps under way marked, as frozen values.
+"""States of a course: the rest of it with its active steps marked, as frozen values.
 
-Read next: `derivatives.py` (how a course begins, and how it goes on from a state).
+Read next: `derivatives.py` (initial and next states of a course).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ W = TypeVar("W")
 
 @dataclass(frozen=True, slots=True)
 class RunningDeadline:
-    """A `within` that runs.
+    """A running `within` clause.
 
     Attributes:
         seconds: As written.
-        stage: The stage that says it.
-        pauses: The pause conditions around it, during which it does not run.
-        at: When the time is over, seconds; takes no part in equality, so that two ways to the
-            same place are seen to be the same place.
+        stage: The stage that has the clause.
+        pauses: The surrounding pause conditions, during which it does not run.
+        at: When it expires, seconds; excluded from equality, so that two paths to the same state are
+            recognised as such.
     """
 
     seconds: float
@@ -39,15 +39,15 @@ class TaskStep:
 
     Attributes:
         action: Its name; for a comparison or a zone its key (see `structure.fact_key`).
-        actors: Who should do it.
-        stage: The innermost stage that asks for it.
-        hold_s: Seconds for which it must hold, or None when the course does not say.
-        deadlines: Each `within` that has the action inside.
-        conditions: By what it begins, ends, progresses or fails, where the course says so, one of a kind;
-            and by what it is paused, the outermost first.
-        inside: Every stage that has the action inside, the innermost with them.
-        already: Whether it is done also by what has been so since before its turn.
-        delay: Least and greatest time, seconds, from the end of what comes before until it begins, or None.
+        actors: Its actors.
+        stage: The innermost stage that requires it.
+        hold_s: Seconds for which it must hold, or None.
+        deadlines: Each `within` around the action.
+        conditions: At most one condition each by which it begins, ends, progresses or fails; and all pause
+            conditions, outermost first.
+        inside: All stages around the action, including the innermost.
+        already: Whether it is also satisfied if it holds since before its turn.
+        delay: Least and greatest time from the end of its predecessor to its beginning, seconds, or None.
     """
 
     action: str
@@ -61,32 +61,32 @@ class TaskStep:
     delay: tuple[float, float] | None = None
 
     def condition(self, kind: str) -> StageCondition | None:
-        """What the course says of how it begins, ends, progresses or fails, or None."""
+        """The condition of a kind (begins, ends, progresses, fails), or None."""
         return next((s for s in self.conditions if s.kind == kind), None)
 
     @property
     def pauses(self) -> tuple[StageCondition, ...]:
-        """The conditions that pause it, the outermost first."""
+        """Its pause conditions, outermost first."""
         return paused_by(self.conditions)
 
     @property
     def is_told(self) -> bool:
-        """Whether the course says by what it begins, ends, progresses or fails."""
+        """Whether it has conditions by which it begins, ends, progresses or fails."""
         return len(self.conditions) > len(self.pauses)
 
     def same_as(self, other: TaskStep) -> bool:
-        """Whether both ask the same action of the same actors."""
+        """Whether both require the same action of the same actors."""
         return (self.action, self.actors) == (other.action, other.actors)
 
 
 def paused_by(conditions: tuple[StageCondition, ...]) -> tuple[StageCondition, ...]:
-    """Those of some stage conditions that pause."""
+    """The pause conditions among stage conditions."""
     return tuple(c for c in conditions if c.kind == "pauses")
 
 
 @dataclass(frozen=True, slots=True)
 class Leaf(Generic[W]):
-    """A step under way, with what its supervisor keeps about it."""
+    """An active step with the supervisor's payload."""
 
     step: TaskStep
     payload: W
@@ -94,7 +94,7 @@ class Leaf(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class Continuation:
-    """A course not yet begun, with what surrounds it: its stages, its clauses and conditions."""
+    """A course not yet begun, with its surrounding stages, clauses and conditions."""
 
     course: Course
     stage: str
@@ -107,7 +107,7 @@ class Continuation:
 
 @dataclass(frozen=True, slots=True)
 class SequenceState(Generic[W]):
-    """What is under way, and what comes after it."""
+    """An active state and the course after it."""
 
     head: State[W]
     rest: Continuation
@@ -115,7 +115,7 @@ class SequenceState(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class ParallelState(Generic[W]):
-    """What is under way at the same time."""
+    """Parallel active states."""
 
     parts: tuple[State[W], ...]
 
@@ -124,7 +124,7 @@ State: TypeAlias = Leaf[W] | SequenceState[W] | ParallelState[W]
 
 
 def leaves(state: State[W]) -> tuple[Leaf[W], ...]:
-    """The steps under way in a state, in the order of the text."""
+    """The active steps of a state, in the order of the text."""
     match state:
         case Leaf():
             return (state,)
@@ -135,7 +135,7 @@ def leaves(state: State[W]) -> tuple[Leaf[W], ...]:
 
 
 def depth(state: State[W]) -> int:
-    """How deep a state is: 1 for a single step, one more for each course around it."""
+    """Nesting depth of a state: 1 for a single step, one more for each course around it."""
     match state:
         case Leaf():
             return 1
@@ -146,7 +146,7 @@ def depth(state: State[W]) -> int:
 
 
 def with_leaves(state: State[W], new: Iterator[Leaf[W]]) -> State[W]:
-    """The same state with each step under way replaced by the next of `new`."""
+    """The same state with each active step replaced by the next of `new`."""
     match state:
         case Leaf():
             return next(new)
@@ -157,7 +157,7 @@ def with_leaves(state: State[W], new: Iterator[Leaf[W]]) -> State[W]:
 
 
 def structural_key(state: State[W]) -> object:
-    """What tells two states apart apart from what is kept about their steps; hashable."""
+    """A hashable key that identifies a state apart from its payloads."""
     match state:
         case Leaf(step=step):
             return step

@@ -1,10 +1,10 @@
-"""The task filter: where a task is, from observations that may be wrong or missing.
+"""The task filter: estimates the state of a task from observations that may be wrong or missing.
 
-One filter supervises and is certified. It is the forward algorithm (`forward_recursion.py`) over hypotheses
-that a model gives it: `HiddenPhases`, where the phase of a step is hidden and the posterior exact,
-and the model of supervision, which reads the phases off what was seen. It is a probabilistic
-parser: the mass of what is followed is the prefix probability of what was seen, the states of the
-automaton are the parser's stacks, and equal ones are merged.
+The same filter is used for supervision and verified exactly. It is the forward algorithm
+(`forward_recursion.py`) over the hypotheses of a model: `HiddenPhases`, with hidden phases and an exact
+posterior, or the model of supervision, which derives the phases from the observations. It is a probabilistic
+parser: the total mass is the prefix probability of the observations, the states of the automaton are the
+parser's stacks, and equal ones are merged.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ L = TypeVar("L", bound=Hashable)
 
 @dataclass(frozen=True, slots=True)
 class TaskPosterior(Generic[K, H]):
-    """Where a task may be.
+    """The posterior of the state of a task.
 
     Attributes:
         time: Seconds.
-        hypotheses: Each with its probability and the best way to it, the likeliest first.
-        lost: How likely it is that the truth was dropped on the way: one minus the product of what
-            was retained at each step, each judged by what had been seen until then.
-        evidence: Logarithm of how likely all that was seen is, up to what all hypotheses share.
+        hypotheses: Hypotheses with their probabilities and best paths, most likely first.
+        lost: Probability that the truth was dropped: one minus the product of the mass retained at each step,
+            given the observations up to that step.
+        evidence: Log-likelihood of all observations, up to a term common to all hypotheses.
     """
 
     time: float
@@ -43,16 +43,16 @@ class TaskPosterior(Generic[K, H]):
 
     @property
     def best(self) -> K:
-        """The key of the likeliest hypothesis."""
+        """The key of the most likely hypothesis."""
         return next(iter(self.hypotheses))
 
     @property
     def likeliest(self) -> H:
-        """The likeliest hypothesis."""
+        """The most likely hypothesis."""
         return self.hypotheses[self.best].value
 
     def marginals(self, labels: Callable[[K, H], Iterable[L]]) -> dict[L, float]:
-        """For each label the probability of all hypotheses that bear it."""
+        """Label -> total probability of the hypotheses with it."""
         found: dict[L, float] = {}
         for key, weighted in self.hypotheses.items():
             for label in labels(key, weighted.value):
@@ -61,41 +61,41 @@ class TaskPosterior(Generic[K, H]):
 
 
 class TaskModel(Protocol[K, H, E]):
-    """How hypotheses about a task arise, and how well observations fit them."""
+    """Generates hypotheses about a task and their likelihoods."""
 
     @property
     def automaton(self) -> Automaton:
         """The states of the course."""
 
     def begin(self, now: float) -> Iterable[tuple[K, H, float]]:
-        """The hypotheses in which a task may begin, each with its key and its probability."""
+        """The initial hypotheses with their keys and probabilities."""
 
     def extended(
         self, posterior: TaskPosterior[K, H], evidence: E, now: float, dt: float
     ) -> Iterator[tuple[K, H, float, float]]:
-        """All that may come of the hypotheses in `dt` seconds.
+        """All successors of the hypotheses after `dt` seconds.
 
         Yields:
-            Key, hypothesis, mass and probability of the best way, both weighted with how well the
-            evidence fits. What has the same key is merged.
+            Key, hypothesis, mass and probability of the best path, both weighted by the likelihood of the
+            evidence. Equal keys are merged.
         """
 
     def stage_statuses(self, key: K, hypothesis: H) -> Collection[tuple[str, Status]]:
-        """The stages under way by a hypothesis, each with its statuses; ("", DONE) at the end."""
+        """The active stages of a hypothesis with their statuses; ("", DONE) at the end."""
 
     def next_stages(self, key: K, hypothesis: H) -> Mapping[str, float]:
-        """For each stage the probability that it is the next to begin; under "" the end."""
+        """Stage -> probability that it is the next to begin; "" for the end."""
 
     def success(self, key: K, hypothesis: H) -> float:
         """Probability that the course reaches its end from a hypothesis."""
 
 
 class TaskFilter(Generic[K, H, E]):
-    """Follows one task.
+    """Filters the state of one task.
 
     Args:
         model: The model of the task.
-        most: How many hypotheses are retained at most.
+        most: Maximum number of hypotheses.
         least: Hypotheses with a smaller probability are dropped; 0 for the exact posterior.
     """
 
@@ -109,20 +109,20 @@ class TaskFilter(Generic[K, H, E]):
         return self.model.automaton
 
     def start(self, now: float = 0.0) -> TaskPosterior[K, H]:
-        """The posterior before anything was seen."""
+        """The prior before the first observation."""
         begun = merged((key, h, share, share) for key, h, share in self.model.begin(now))
         return TaskPosterior(now, pruned(begun, len(begun), 0.0).retained)
 
     def step(
         self, posterior: TaskPosterior[K, H], evidence: E, dt: float, now: float | None = None
     ) -> TaskPosterior[K, H]:
-        """Take in what is seen.
+        """Update the posterior with an observation.
 
         Args:
-            posterior: What was believed; it stays as it is.
-            evidence: What is seen, as the model takes it.
+            posterior: The previous posterior, which is not modified.
+            evidence: The observation in the form of the model.
             dt: Seconds since the posterior; 0 for the first observation.
-            now: Seconds, where that is not `dt` after the posterior: a gap may count as less.
+            now: Seconds, if it is not `dt` after the posterior: a gap may count as less.
         """
         now = posterior.time + dt if now is None else now
         new = pruned(
@@ -133,10 +133,9 @@ class TaskFilter(Generic[K, H, E]):
         return TaskPosterior(now, new.retained, lost, posterior.evidence + likelihood)
 
     def stages(self, posterior: TaskPosterior[K, H]) -> dict[tuple[str, Status], float]:
-        """For each stage and status the probability that a step of it is under way and stands so.
+        """(Stage, status) -> probability that a step of the stage is active with this status.
 
-        With steps under way at the same time they sum to more than 1. The end has no stage: it is
-        given by an empty name, done.
+        With parallel steps they sum to more than 1. The end has an empty name and status DONE.
         """
         return posterior.marginals(self.model.stage_statuses)
 
@@ -146,7 +145,7 @@ class TaskFilter(Generic[K, H, E]):
         return max(found, key=lambda k: found[k])
 
     def ranking(self, posterior: TaskPosterior[K, H]) -> list[tuple[str, float]]:
-        """Stages by the probability that they are under way, the likeliest first."""
+        """Stages by the probability that they are active, most likely first."""
         found = posterior.marginals(
             lambda key, h: {stage for stage, _ in self.model.stage_statuses(key, h)}
         )
@@ -155,7 +154,7 @@ class TaskFilter(Generic[K, H, E]):
     def next_stages(self, posterior: TaskPosterior[K, H]) -> list[tuple[str, float]]:
         """Stages by the probability that they are the next to begin, and "" for the end.
 
-        The rest is for what is lost before.
+        The rest of 1 is the probability of being lost before.
         """
         found: dict[str, float] = {}
         for key, weighted in posterior.hypotheses.items():
@@ -164,6 +163,6 @@ class TaskFilter(Generic[K, H, E]):
         return sorted(found.items(), key=lambda item: -item[1])
 
     def success(self, posterior: TaskPosterior[K, H]) -> float:
-        """Probability that the course as followed reaches its end under the model."""
+        """Probability that the course reaches its end under the model."""
         weights = posterior.hypotheses.items()
         return min(1.0, sum(w.mass * self.model.success(key, w.value) for key, w in weights))

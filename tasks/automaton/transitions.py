@@ -1,7 +1,7 @@
-"""How likely each place in a task leads to each other in some seconds, worked out when needed.
+"""Transition probabilities between hidden states over a time step, computed on demand.
 
-A place is a node of the automaton with the phase of each step under way (`HiddenState`). What leads from
-one to the next is the product of the phases' changes, and then the choice of a way on, or of none.
+A hidden state is a node of the automaton with the phase of each active step (`HiddenState`). A transition is
+a combination of phase changes, followed by at most one transition of the automaton.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition
 from visup.tasks.automaton.stage_hmm import WAITING, PhaseKind, StageHmm
 from visup.tasks.automaton.states import TaskStep
 
-MOST_SPANS = 64  # so many different times between frames are remembered
-SPAN_DIGITS = 4  # times between frames are told apart to a tenth of a millisecond
+MOST_SPANS = 64  # cached time steps
+SPAN_DIGITS = 4  # time steps are rounded to a tenth of a millisecond
 
 
 class HiddenState(NamedTuple):
-    """Where a task may be: a node, and the phase of each of its steps."""
+    """A hidden state: a node, and the phase of each of its steps."""
 
     node: int
     phases: tuple[int, ...]
@@ -29,12 +29,12 @@ class HiddenState(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class HiddenTransition:
-    """One way from a place to the next.
+    """A transition between hidden states.
 
     Attributes:
-        to: Where it leads.
+        to: The target.
         chance: Its probability.
-        left: The steps that are over by it.
+        left: The steps that it completes.
     """
 
     to: HiddenState
@@ -43,11 +43,11 @@ class HiddenTransition:
 
 
 Required = tuple[tuple[tuple[str, tuple[str, ...]], PhaseKind], ...]
-"""What is to be seen at a place: each action with its actors, and how it stands."""
+"""The expected observations in a state: each action with its actors, and its phase kind."""
 
 
 class HiddenTransitions:
-    """Passages between the places of a task.
+    """Transitions between the hidden states of a task.
 
     Args:
         automaton: The states of its course.
@@ -61,12 +61,12 @@ class HiddenTransitions:
         self._asked: dict[HiddenState, Required] = {}
 
     def begin(self) -> Iterator[tuple[HiddenState, float]]:
-        """Places in which the task may begin, each with its probability."""
+        """Initial states with their probabilities."""
         for node, share in self.automaton.start:
             yield HiddenState(node, (WAITING,) * len(self.automaton.steps(node))), share
 
     def after(self, dt: float) -> dict[HiddenState, tuple[HiddenTransition, ...]]:
-        """The passages that are known for a time between frames; `passages` adds to them."""
+        """The cached transitions for a time step; `transitions` adds to them."""
         span = round(dt, SPAN_DIGITS)
         if span not in self._passages:
             if len(self._passages) >= MOST_SPANS:
@@ -75,14 +75,14 @@ class HiddenTransitions:
         return self._passages[span]
 
     def transitions(self, state: HiddenState, dt: float) -> tuple[HiddenTransition, ...]:
-        """All passages from a place in `dt` seconds; their probabilities sum to 1."""
+        """All transitions from a state in `dt` seconds; their probabilities sum to 1."""
         known = self.after(dt)
         if state not in known:
             known[state] = _merged(self._passed(state, round(dt, SPAN_DIGITS)))
         return known[state]
 
     def required(self, state: HiddenState) -> Required:
-        """What is expected at a state; an action that several steps require is listed once."""
+        """The expected observations in a state; an action required by several steps is listed once."""
         if state not in self._asked:
             found: dict[tuple[str, tuple[str, ...]], PhaseKind] = {}
             for step, phase in zip(self.automaton.steps(state.node), state.phases, strict=True):
@@ -100,10 +100,10 @@ class HiddenTransitions:
         for changed in product(*changes):
             phases = tuple(phase for phase, _ in changed)
             chance = math.prod(p for _, p in changed)
-            yield from self._gone_on(HiddenState(state.node, phases), chance, dt)
+            yield from self._moved_on(HiddenState(state.node, phases), chance, dt)
 
-    def _gone_on(self, state: HiddenState, chance: float, dt: float) -> Iterator[HiddenTransition]:
-        """A place where phases have changed already, and the ways on from it."""
+    def _moved_on(self, state: HiddenState, chance: float, dt: float) -> Iterator[HiddenTransition]:
+        """A state after its phase changes, and the transitions from it."""
         node, phases = state
         transitions = self.automaton.transitions(node)
         rates = [self.rate(node, phases, w) for w in transitions]
@@ -120,7 +120,7 @@ class HiddenTransitions:
                     )
 
     def rate(self, node: int, phases: tuple[int, ...], transition: Transition) -> float:
-        """Rate of a way on: as slow as the slowest step that it leaves."""
+        """Rate of a transition: that of the slowest step that it completes."""
         steps = self.automaton.steps(node)
         return transition.share * min(
             self.hmm.leaving(steps[i], phases[i]) for i in transition.left

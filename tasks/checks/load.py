@@ -32,7 +32,7 @@ def parse_task(
 
     Raises:
         TaskError: When it has one mistake.
-        ManyErrors: When it has several; all are told at once, in the order of the text.
+        ErrorGroup: When it has several; all are told at once, in the order of the text.
     """
     task, faults = diagnose(text, file, actions)
     raise_all(faults, TaskError)
@@ -53,7 +53,7 @@ def load_task(
 
     Raises:
         TaskError: When there is no such file or task, it has one mistake, or it holds several tasks.
-        ManyErrors: When it has several mistakes.
+        ErrorGroup: When it has several mistakes.
     """
     tasks = load_tasks(path_or_name, actions)
     if len(tasks) > 1:
@@ -74,7 +74,7 @@ def load_tasks(
 
     Raises:
         TaskError: When there is no such file or task, or it has one mistake.
-        ManyErrors: When it has several.
+        ErrorGroup: When it has several.
     """
     path, wanted = _parted(path_or_name)
     tasks = tasks_of(parse_task(read_text(path), path, actions))

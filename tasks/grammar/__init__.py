@@ -2,7 +2,7 @@
 
 Read in this order: `tasks.lark` (the language), `conditions.py` and `ast_courses.py` (the nodes
 inside a stage), `nodes.py` (the file as a whole), `parser.py` (text to tree), `statement.py` (one
-statement of the text), `analysis.py` (what is reachable, nullable, recursive), `structure.py` (stages
-and actors of a task), `units.py` (units peculiar to tasks), `graphs.py` (graphs of stage names),
-`actor_builder.py` (what is said of actors).
+statement of the text), `analysis.py` (reachability, nullability, recursion), `structure.py` (stages and
+actors of a task), `units.py` (units of amounts), `graphs.py` (graphs of stage names), `actor_builder.py`
+(declarations of actors).
 """

@@ -1,6 +1,6 @@
-"""From the words about actors to their nodes: what is said of an actor, bystanders, parts."""
+"""Builds the nodes of actors, bystanders and parts from parsed text."""
 
-# ruff: noqa: D102  # each method is named for the rule of the grammar whose words it gets
+# ruff: noqa: D102  # each method is named for its grammar rule
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from visup.tasks.grammar.nodes import Actor, Actors, Name, Number, ParameterRef
 
 
 class ActorBuilder(Transformer[Token, Any]):
-    """One method for each rule of the grammar that is about actors."""
+    """One method for each grammar rule about actors."""
 
     def actors(self, items: list[Token]) -> Actors:
         return Actors(_names(items), span_of(items[0]).to(span_of(items[-1])))
@@ -38,10 +38,10 @@ class ActorBuilder(Transformer[Token, Any]):
         name, *rest = items[1:] if optional else items
         size = next((i for i in rest if isinstance(i, Number | ParameterRef)), None)
         traits = [t for i in rest if isinstance(i, list) for t in i]
-        models, criteria = _who(traits)
+        models, criteria = _models_and_criteria(traits)
         return Actor(str(name), models, size, optional, span_of(name), criteria)
 
-    # What is said of an actor: each a list of criteria, models as `OtherModels`.
+    # Descriptions of an actor: each a list of criteria, with models as `OtherModels`.
     def models(self, items: list[Token]) -> list[Criterion]:
         return [OtherModels(tuple(map(str, items)))]
 
@@ -74,7 +74,7 @@ class ActorBuilder(Transformer[Token, Any]):
 
     def bystander(self, items: list[Any]) -> Actor:
         _, name, *rest = items
-        models, criteria = _who([t for i in rest for t in i])
+        models, criteria = _models_and_criteria([t for i in rest for t in i])
         return Actor(str(name), models, span=span_of(name), criteria=criteria, bystander=True)
 
     def ignored(self, items: list[Token]) -> Actor:
@@ -82,14 +82,16 @@ class ActorBuilder(Transformer[Token, Any]):
 
 
 def span_of(token: Token) -> Span:
-    """Where a token stands; of a head only the part in angle brackets."""
+    """The span of a token; for a head only the part in angle brackets."""
     line, column = token.line or 0, token.column or 0
     width = str(token).index(">") + 1 if token.type == "HEAD" else len(token)
     return Span(line, column, line, column + width)
 
 
-def _who(traits: Several[Criterion]) -> tuple[tuple[str, ...], tuple[Criterion, ...]]:
-    """The models that are said first, and all other criteria in the order of their kinds."""
+def _models_and_criteria(
+    traits: Several[Criterion],
+) -> tuple[tuple[str, ...], tuple[Criterion, ...]]:
+    """The models named first, and all other criteria ordered by kind."""
     models = next((t for t in traits if isinstance(t, OtherModels)), None)
     others = in_order(t for t in traits if t is not models)
     return (models.names if models is not None else ()), others

@@ -1,7 +1,7 @@
-"""Analysis of a grammar: what is reachable, nullable, terminating, and how soon.
+"""Analysis of a grammar: reachability, nullability, termination, and least durations.
 
-Each question about all stages is answered in time linear in the size of the file: stages are
-looked at after those that they refer to, and only circles need a second look.
+Each analysis takes time linear in the size of the file: stages are processed after those that they refer to,
+and only cycles are iterated.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ NEVER = float("inf")
 
 
 class Grammar:
-    """Questions about the grammar of a task; stages that are not defined take no time and end.
+    """Analyses of the grammar of a task; undefined stages count as terminating and take no time.
 
     Args:
         task: The task, with at least one rule.
@@ -52,7 +52,7 @@ class Grammar:
 
     @cached_property
     def asked(self) -> list[tuple[str, Fact]]:
-        """Everything that a stage asks for, with the name of the stage."""
+        """Every required action and comparison with the name of its stage."""
         found = []
         for stage in self.stages.values():
             if isinstance(stage.body, Actors):
@@ -70,44 +70,44 @@ class Grammar:
 
     @cached_property
     def reached(self) -> frozenset[str]:
-        """Stages that the tasks of the file can come to, themselves with them."""
+        """Stages reachable from the tasks of the file, including these."""
         return reachable(self.mentions, [r for r in self.task.roots if r in self.stages])
 
     def unreachable(self) -> list[Stage]:
-        """Stages that the task never reaches; of a cycle only the first."""
+        """Unreachable stages; of a cycle only the first."""
         lost = [s for s in self.stages.values() if s.name not in self.reached]
         named = {n for s in lost for n in self.mentions[s.name] if n != s.name}
         roots = [s for s in lost if s.name not in named]
         return roots or lost[:1]
 
     def nullable(self, course: Course) -> bool:
-        """Whether nothing need be seen of a course."""
+        """Whether a course may be empty."""
         return self._empty(course, self._empty_stages)
 
     def left_recursive(self) -> list[Stage]:
-        """Stages that come to themselves before any action; of each circle only the first."""
+        """Stages that lead to themselves before any action; of each cycle only the first."""
         order = {name: i for i, name in enumerate(self.stages)}
         firsts = {name: tuple(self._first_of(stage)) for name, stage in self.stages.items()}
         found = [min(circle, key=order.__getitem__) for circle in cycles(firsts)]
         return [self.stages[n] for n in sorted(found, key=order.__getitem__)]
 
     def non_terminating(self) -> list[Stage]:
-        """Stages that can never end; only the first."""
+        """Stages that cannot terminate; only the first."""
         lasting = [s for n, s in self.stages.items() if self._least_times[n] == NEVER]
         named = {n for s in lasting for n in self.mentions[s.name]}
         own = [s for s in lasting if s.name in named]
         return (own or lasting)[:1]
 
     def min_duration(self, course: Course) -> float:
-        """Seconds that a course takes at least, by its `for` clauses."""
+        """Least duration of a course by its `for` clauses, seconds."""
         return self._least(course, self._least_times)
 
     def is_sequential(self, course: Course) -> bool:
-        """Whether a course has things in it that follow one another."""
+        """Whether a course has parts that follow one another."""
         return self._has_turns(walk(course), self._turning)
 
     def sole_fact(self, course: Course) -> Fact | None:
-        """The action or comparison that a course asks for when it asks for no more, or None."""
+        """The action or comparison of a course that requires only one, or None."""
         seen = set()
         while True:
             match course:
@@ -126,7 +126,7 @@ class Grammar:
                     return self._as_fact(course)
 
     def _as_fact(self, course: Course) -> Fact | None:
-        """A fact, or what a reference to an action in the strict form stands for."""
+        """A fact, or the action of a reference in the strict form."""
         if isinstance(course, Action | Comparison):
             return course
         if isinstance(course, Reference):
@@ -143,7 +143,7 @@ class Grammar:
 
     @cached_property
     def _bottom_up(self) -> list[tuple[str, Course]]:
-        """Stages with a course, each after those that it refers to, as far as there are no circles."""
+        """Stages with a course, each after those that it refers to, apart from cycles."""
         named = ((n, self.stages[n].body) for n in dependencies_first(self.mentions))
         return [(n, body) for n, body in named if not isinstance(body, Actors)]
 
@@ -182,7 +182,7 @@ class Grammar:
         return set() if isinstance(stage.body, Actors) else set(self._first(stage.body))
 
     def _first(self, course: Course) -> Iterable[str]:
-        """Stages that a course may come to before any action."""
+        """Stages that a course may lead to before any action."""
         match course:
             case Reference(stage=name):
                 return [name] if name in self.stages else []
@@ -207,7 +207,7 @@ class Grammar:
 
     @cached_property
     def _least_times(self) -> dict[str, float]:
-        """Least seconds of each stage: the least fixed point from above, as in shortest paths."""
+        """Least duration of each stage, seconds, by relaxation as in shortest paths."""
         times = dict.fromkeys(self.stages, NEVER)
         times |= {n: 0.0 for n, s in self.stages.items() if isinstance(s.body, Actors)}
         for _ in range(len(times) + 1):
@@ -245,7 +245,7 @@ class Grammar:
 
     @cached_property
     def _turning(self) -> frozenset[str]:
-        """Stages that have things in them that follow one another."""
+        """Stages with parts that follow one another."""
         users: dict[str, list[str]] = {}
         for name, named in self.mentions.items():
             for other in named:

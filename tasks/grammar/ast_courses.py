@@ -1,4 +1,4 @@
-"""Courses: what stages ask for, as frozen nodes that print themselves back as source.
+"""Courses: the content of stages, as frozen nodes that print themselves as source.
 
 Read before: `conditions.py` (actions and conditions). Read next: `nodes.py` (the file as a whole).
 """
@@ -17,7 +17,7 @@ from visup.tasks.grammar.conditions import Action, Amount, Condition
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """`for 5 s`: what precedes it must hold for that long without interruption."""
+    """`for 5 s`: the preceding course must hold for that long without interruption."""
 
     duration: Amount
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -28,7 +28,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Deadline:
-    """`within 60 s`: what precedes it must be over within that time after it began."""
+    """`within 60 s`: the preceding course must end within that time after its beginning."""
 
     duration: Amount
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -39,11 +39,11 @@ class Deadline:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """`after 10 s to 60 s`: it begins so long after what comes before it is over, no sooner and no later.
+    """`after 10 s to 60 s`: the course begins within this interval after the end of its predecessor.
 
     Attributes:
         duration: The least delay.
-        most: The greatest, or None when it may begin at any time after the least.
+        most: The greatest delay, or None for no limit.
     """
 
     duration: Amount
@@ -63,9 +63,9 @@ class StageCondition:
     """`fails when diverging(a, b) for 2 s`: by what an action begins, ends, progresses, fails or is paused.
 
     Attributes:
-        kind: Which of the five.
-        condition: What must be seen.
-        lasting: How long it must be seen without a break, or None.
+        kind: One of the five kinds.
+        condition: The condition.
+        lasting: How long it must hold without interruption, or None.
     """
 
     kind: ConditionKind
@@ -80,7 +80,7 @@ class StageCondition:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """`<approach>`: the stage of that name, here."""
+    """`<approach>`: a reference to a stage."""
 
     stage: str
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -91,7 +91,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Repeated:
-    """`a?` (may be left out), `a*` (any number of times), `a+` (at least once)."""
+    """`a?` (optional), `a*` (any number of times), `a+` (at least once)."""
 
     item: Course
     mark: Literal["?", "*", "+"]
@@ -106,8 +106,8 @@ class Counted:
     """`a at least 2 times at most 5 times`.
 
     Attributes:
-        least: How often at least; 1 when the file does not say, 0 to say that it may be left out.
-        most: How often at most, or None.
+        least: Least count; 1 by default, 0 for an optional course.
+        most: Greatest count, or None.
     """
 
     item: Course
@@ -120,7 +120,7 @@ class Counted:
 
     @property
     def times(self) -> str:
-        """How often, as it is written."""
+        """The count as source text."""
         said = []
         if self.least != 1 or self.most is None:
             said.append(f"at least {self.least} {_times(self.least)}")
@@ -169,10 +169,10 @@ class AnyOrder:
     """`any order (a, b, c)`, `any 2 of (a, b, c)`, `for each new part a`: once each, one after the other.
 
     Attributes:
-        count: How many of them at most; None for all.
-        copies: Of what and how many things the items are each one, as `leg` and 4; or None.
-        least: How many of them at least; None for as many as at most.
-        new: What is another one each time round, as `part`; empty where none is.
+        count: Greatest number of items; None for all.
+        copies: Kind and number of the things that the items are for, such as `leg` and 4; or None.
+        least: Least number of items; None for the same as `count`.
+        new: The actor that is a new one in each round, such as `part`; or empty.
     """
 
     items: tuple[Course, ...]
@@ -198,7 +198,7 @@ class AnyOrder:
 
 @dataclass(frozen=True, slots=True)
 class Already:
-    """`already a`: done also by what has been so since before its turn."""
+    """`already a`: also satisfied by an action that holds since before its turn."""
 
     item: Course
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -243,7 +243,7 @@ Course: TypeAlias = (
     | Comparison
     | Reference
 )
-"""What a stage asks for."""
+"""The content of a stage."""
 
 CHOICE, SEQUENCE, TOGETHER, JUDGED, CLAUSED, REPEATED, ATOM = range(7)
 BINDS: dict[type, int] = {
@@ -272,7 +272,7 @@ def children(course: Course) -> tuple[Course, ...]:
 
 
 def walk(course: Course) -> Iterator[Course]:
-    """A course and all courses inside it, outermost first, in the order of the text."""
+    """A course and all courses inside it, in preorder."""
     todo = [course]
     while todo:
         course = todo.pop()
@@ -281,7 +281,7 @@ def walk(course: Course) -> Iterator[Course]:
 
 
 def _within(course: Course, least: int, unlike: type | None = None) -> str:
-    """A course as text, in brackets when it binds looser than its place asks for."""
+    """A course as text, in brackets if it binds less tightly than required."""
     text = str(course)
     loose = BINDS.get(type(course), ATOM) < least
     return f"({text})" if loose or (unlike and isinstance(course, unlike)) else text

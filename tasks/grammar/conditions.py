@@ -1,8 +1,8 @@
-"""What holds or does not: the conditions of rules, of actors instead of object variables.
+"""Conditions of tasks: those of rules, with actors instead of object variables.
 
-An action is a predicate whose arguments are actors and zones; `not`, `and`, `or`, comparisons and
-numbers are those of `rules/formula`. What is peculiar to tasks stands here: names that know where they
-stand, and parameters in place of numbers.
+An action is a predicate whose arguments are actors and zones; `not`, `and`, `or`, comparisons and numbers are
+those of `rules/formula`. This module adds what is specific to tasks: names with source positions, and
+parameters in place of numbers.
 
 Read next: `ast_courses.py` (courses), `nodes.py` (the file as a whole).
 """
@@ -32,35 +32,35 @@ Action: TypeAlias = Predicate
 
 
 class Name(str):
-    """A name where it is used, such as an actor in an action; equal to its text.
+    """A name with its source position, such as an actor in an action; equal to its text.
 
     Args:
         text: The name.
-        span: Where it stands.
+        span: Its position.
     """
 
     span: Span
 
     def __new__(cls, text: str, span: Span = NOWHERE) -> Name:
-        """A name at a place."""
+        """Create a name at a position."""
         name = super().__new__(cls, text)
         name.span = span
         return name
 
 
 class PartName(Name):
-    """`gripper of arm` where an actor stands: the actor `gripper`, and its machine.
+    """`gripper of arm` in place of an actor: the actor `gripper`, and its machine.
 
     Args:
         text: The name of the part.
         machine: The actor of which it is a part.
-        span: Where both stand.
+        span: Position of both.
     """
 
     machine: Name
 
     def __new__(cls, text: str, machine: Name, span: Span = NOWHERE) -> PartName:
-        """A part at a place."""
+        """Create a part at a position."""
         name = cast("PartName", super().__new__(cls, text, span))
         name.machine = machine
         return name
@@ -68,7 +68,7 @@ class PartName(Name):
 
 @dataclass(frozen=True, slots=True)
 class ParameterRef:
-    """`patience`: the name of a parameter where a number may stand; see `Task.amount`."""
+    """`patience`: the name of a parameter in place of a number; see `Task.amount`."""
 
     name: str
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -82,7 +82,7 @@ Amount: TypeAlias = Number | ParameterRef
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """`20 px and 100 px`: what stands behind `between`, the ends included."""
+    """`20 px and 100 px`: the operand of `between`, inclusive."""
 
     low: Amount
     high: Amount
@@ -93,15 +93,15 @@ class Range:
 
 
 EVERY = "every"
-"""In place of the sign of a comparison: an action that happens again and again."""
+"""In place of a comparison operator: a periodic action."""
 
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """`2 s to 4 s`: what stands behind `every`, from one time that something happens to the next.
+    """`2 s to 4 s`: the operand of `every`, the time between two occurrences.
 
     Attributes:
-        least: The shortest, or None when it may happen again at any time.
+        least: The shortest, or None for no limit.
         most: The longest.
     """
 
@@ -115,13 +115,13 @@ class Period:
 
 @dataclass(frozen=True, slots=True)
 class Lasted(PastOperator):
-    """`(touching(a, b) for 2 s)`: a condition, within one, that must have held for so long."""
+    """`(touching(a, b) for 2 s)`: a nested condition that must have held for a duration."""
 
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     @property
     def duration(self) -> Amount:
-        """How long."""
+        """The duration."""
         assert self.window is not None
         return cast("Amount", self.window.high)
 
@@ -130,7 +130,7 @@ class Lasted(PastOperator):
 
 
 def lasted(part: Condition, duration: Amount, span: Span = NOWHERE) -> Lasted:
-    """A condition that must have held for so long."""
+    """A condition that must have held for a duration."""
     return Lasted("always", part, TimeWindow(ZERO, cast("Number", duration)), span)
 
 
@@ -144,17 +144,17 @@ def facts_of(condition: Condition) -> Iterator[Fact]:
 
 
 def durations_of(condition: Condition) -> Iterator[Amount]:
-    """How long conditions within a condition must have held."""
+    """The durations within a condition."""
     return (n.duration for n in walk(condition) if isinstance(n, Lasted))
 
 
 def action_of(fact: Fact) -> Predicate | Measure:
-    """An action itself, or the quantity of a comparison with those between whom it is measured."""
+    """The action itself, or the quantity of a comparison with its objects."""
     return cast("Measure", fact.left) if isinstance(fact, Comparison) else fact
 
 
 def bounds_of(comparison: Comparison) -> tuple[Amount, ...]:
-    """What a quantity is compared with: one amount, or the two ends of a range; or the ends of a period."""
+    """The operands of a comparison: one amount, or the ends of a range or period."""
     right = cast("Amount | Range | Period", comparison.right)
     if isinstance(right, Period):
         return (right.most,) if right.least is None else (right.least, right.most)
@@ -162,16 +162,16 @@ def bounds_of(comparison: Comparison) -> tuple[Amount, ...]:
 
 
 def is_periodic(fact: Fact) -> bool:
-    """Whether a fact is an action that happens again and again."""
+    """Whether a fact is a periodic action."""
     return isinstance(fact, Comparison) and fact.operator == EVERY
 
 
 def once(periodic: Comparison) -> Predicate:
-    """The action that happens again and again."""
+    """The action of a periodic one."""
     again = action_of(periodic)
     return Predicate(again.name, again.words, again.span)
 
 
 def actors_of(fact: Fact) -> tuple[Name, ...]:
-    """The actors and zones of a fact, each where it stands."""
+    """The actors and zones of a fact, with positions."""
     return cast("tuple[Name, ...]", action_of(fact).words)

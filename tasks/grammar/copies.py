@@ -1,8 +1,8 @@
 """Several things of one kind: `for each of 4 legs <mount(leg)>`, `for each new part <take(part)>`.
 
-The first has the actors `leg_1` to `leg_4`, each of them another leg. The second is a loop with another
-part each time round: `part_1` to `part_12` stand for all parts that may come, and a round is begun
-by one that had no turn yet. Nobody waits for those that do not come.
+The first has the actors `leg_1` to `leg_4`, each a different leg. The second is a loop with a new part in
+each round: `part_1` to `part_12` stand for all parts that may come, and a round is begun by one that had no
+round yet. Parts that do not come are not waited for.
 
 Read before: `templates.py` (stages of any actor), `nodes.py`.
 """
@@ -18,13 +18,13 @@ from visup.tasks.grammar.nodes import Actor, Actors, Invariant, Stage
 from visup.tasks.grammar.templates import bound, names_in
 
 MOST_COPIES = 13
-"""So many are made at most: more than may stand in any order, which is told."""
+"""Maximum number of copies: one more than the limit of `any order`, so that exceeding it is reported."""
 MOST_ROUNDS = 12
-"""So many rounds a loop has at most in which something is new each time."""
+"""Maximum number of rounds of a loop with a new actor in each."""
 
 
 def as_rounds(course: Counted | Repeated) -> AnyOrder | None:
-    """A repetition of a loop with something new each time says how many rounds it has; None for others."""
+    """The loop of a repetition with a new actor in each round, with its number of rounds; None for others."""
     loop = course.item
     if not isinstance(loop, AnyOrder) or not loop.new or loop.count is not None or loop.least != 1:
         return None
@@ -36,20 +36,20 @@ def as_rounds(course: Counted | Repeated) -> AnyOrder | None:
 
 
 def in_turn(loop: AnyOrder) -> bool:
-    """Whether the rounds that a loop with something new has behind it were those of the first of them.
+    """Whether the completed rounds of a loop with new actors are its first ones.
 
-    Which is which does not matter before anything is seen, so that other ways to go on tell nothing new.
+    The actors are interchangeable before anything is seen, so other orders are redundant.
     """
     first = loop.new and copy_names(loop.new, 1 + MOST_ROUNDS - len(loop.items))[-1]
     return not first or first in names_in(loop.items[0])
 
 
 def one_of(plural: str, course: Course) -> str:
-    """What a course calls one of several things.
+    """The singular name that a course uses for one of several things.
 
     Args:
-        plural: What they are called together, such as `legs`.
-        course: What is done with each.
+        plural: The plural name, such as `legs`.
+        course: The course for each.
     """
     singular = [plural.removesuffix("s"), plural.removesuffix("es"), plural]
     singular += [plural.removesuffix("ies") + "y"] if plural.endswith("ies") else []
@@ -58,7 +58,7 @@ def one_of(plural: str, course: Course) -> str:
 
 
 def copy_names(name: str, count: int) -> tuple[str, ...]:
-    """The actors that stand for so many things.
+    """The actors of numbered copies.
 
     >>> copy_names("leg", 2)
     ('leg_1', 'leg_2')
@@ -67,7 +67,7 @@ def copy_names(name: str, count: int) -> tuple[str, ...]:
 
 
 def with_copies(declared: Sequence[Actor], stages: Sequence[Stage]) -> list[Actor]:
-    """The declarations of actors, with one for each of several things instead of that of their kind."""
+    """The declarations of actors, with that of a kind replaced by one for each copy."""
     courses = list(_copies(stages))
     kinds = dict.fromkeys(name for name, _, _ in courses)
     waited = {n: max((k for m, k, c in courses if m == n and not c.new), default=0) for n in kinds}
@@ -86,7 +86,7 @@ def with_copies(declared: Sequence[Actor], stages: Sequence[Stage]) -> list[Acto
 def for_each_copy(
     invariants: Sequence[Invariant], actors: Sequence[Actor]
 ) -> tuple[Invariant, ...]:
-    """The invariants, with one for each of those of which a loop has another one in each round."""
+    """The invariants, with those about a loop's new actor replaced by one for each copy."""
     found = list(invariants)
     for kind in dict.fromkeys(a.spare for a in actors if a.spare):
         copies = [a.name for a in actors if a.spare == kind]
@@ -98,7 +98,7 @@ def for_each_copy(
 
 
 def _of_kind(kind: Actor, count: int) -> Iterator[Actor]:
-    """So many actors of a kind, each another one."""
+    """A number of distinct actors of a kind."""
     first = kind if kind.models or kind.criteria else replace(kind, models=(kind.name,))
     for k, copy in enumerate(copy_names(kind.name, count)):
         criteria = in_order((*first.criteria, Another())) if k else first.criteria
@@ -106,7 +106,7 @@ def _of_kind(kind: Actor, count: int) -> Iterator[Actor]:
 
 
 def _copies(stages: Sequence[Stage]) -> Iterator[tuple[str, int, AnyOrder]]:
-    """What several things are called, how many there are, and where that is said."""
+    """The singular name, number and loop of each group of copies."""
     bodies = (s.body for s in stages if not isinstance(s.body, Actors))
     courses = (c for body in bodies for c in walk(body))
     several = (c for c in courses if isinstance(c, AnyOrder))
@@ -114,5 +114,5 @@ def _copies(stages: Sequence[Stage]) -> Iterator[tuple[str, int, AnyOrder]]:
 
 
 def alike(loop: AnyOrder) -> bool:
-    """Whether all rounds of a loop are the same, since they do not name what is new."""
+    """Whether all rounds of a loop are the same, since they do not name the new actor."""
     return len({str(i) for i in loop.items[:2]}) == 1

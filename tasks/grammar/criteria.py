@@ -1,6 +1,6 @@
-"""By what an actor is told, besides its models: colour, size, order, place, conduct, its machine.
+"""Criteria that identify an actor besides its models: colour, size, order, place, conduct, machine.
 
-Each criterion is a frozen node that prints itself back, as all nodes of a task file do.
+Each criterion is a frozen node that prints itself as source, like all nodes of a task file.
 
 Read next: `nodes.py` (the declaration of an actor), `../casting/fitness.py` (what they mean).
 """
@@ -20,7 +20,7 @@ Side = Literal["left", "right", "top", "bottom"]
 
 @dataclass(frozen=True, slots=True)
 class Colours:
-    """`red or dark blue`: one of some colours, each one or two words."""
+    """`red or dark blue`: alternative colours of one or two words."""
 
     names: tuple[str, ...]
 
@@ -30,7 +30,7 @@ class Colours:
 
 @dataclass(frozen=True, slots=True)
 class OtherModels:
-    """`... and mug`: models beside those that an actor has already, which cannot be (E236)."""
+    """`... and mug`: models in addition to earlier ones, which is an error (E236)."""
 
     names: tuple[str, ...]
 
@@ -40,7 +40,7 @@ class OtherModels:
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """`the leftmost`: first in some order among all that fits the other criteria."""
+    """`the leftmost`: first in some order among the objects that fit the other criteria."""
 
     rank: Rank
 
@@ -58,7 +58,7 @@ class Another:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """`larger than 40 px`: its largest extent in the image against an amount."""
+    """`larger than 40 px`: a limit of its largest extent in the image."""
 
     compared: Literal["larger", "smaller"]
     amount: Amount
@@ -69,7 +69,7 @@ class Extent:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """`at (410, 160)`: what is or was there when it was first seen, pixels."""
+    """`at (410, 160)`: the object that is there, or was when first seen, pixels."""
 
     at: tuple[float, float]
 
@@ -82,8 +82,8 @@ class Conduct:
     """`what enters from the left`, `what moves first`, `what rests`.
 
     Attributes:
-        kind: What it does.
-        side: Of what enters: the side of the image over which; empty for any.
+        kind: The kind of conduct.
+        side: Side of the image over which it enters; empty for any.
     """
 
     kind: Literal["enters", "moves", "rests"]
@@ -96,7 +96,7 @@ class Conduct:
 
 @dataclass(frozen=True, slots=True)
 class PartOf:
-    """`part of arm`: a part of the machine that another actor is."""
+    """`part of arm`: a part of another actor, the machine."""
 
     machine: Name
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -111,11 +111,11 @@ Criterion: TypeAlias = (
 
 
 def in_order(criteria: Iterable[Criterion]) -> tuple[Criterion, ...]:
-    """Criteria as they are printed, each once: looks first, `another`, orders, then the rest."""
-    return tuple(sorted(dict.fromkeys(criteria), key=_turn))
+    """Criteria in printing order, each once: looks first, `another`, orders, then the rest."""
+    return tuple(sorted(dict.fromkeys(criteria), key=_rank))
 
 
-def _turn(criterion: Criterion) -> int:
+def _rank(criterion: Criterion) -> int:
     if isinstance(criterion, Colours | OtherModels):
         return 0
     if isinstance(criterion, Another):
@@ -124,7 +124,7 @@ def _turn(criterion: Criterion) -> int:
 
 
 def declared_as(models: Sequence[str], criteria: Sequence[Criterion]) -> str:
-    """What is said of an actor behind its name: 'is cup and red', 'at (410, 160)', or nothing."""
+    """The declaration of an actor after its name: 'is cup and red', 'at (410, 160)', or nothing."""
     nouns = [" or ".join(models)] if models else []
     nouns += [str(c) for c in criteria if isinstance(c, Colours | OtherModels)]
     others = [c for c in criteria if not isinstance(c, Colours | OtherModels | Another)]

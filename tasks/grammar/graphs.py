@@ -1,7 +1,7 @@
-"""Graphs of names: what is reached, in which order to look at them, which lie on cycles.
+"""Graph algorithms on names: reachability, topological order, cycles.
 
-Most graphs of stages have no cycle, which `graphlib` tells at once; networkx, which takes a fifth of a
-second to import, is asked about the others only.
+Most graphs of stages are acyclic, for which `graphlib` suffices; networkx, which takes 0.2 s to import, is
+used only for the others.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     import networkx
 
 Graph = Mapping[str, tuple[str, ...]]
-"""Name -> the names that it leads to, all of them keys."""
+"""Name -> its successors, all of which are keys."""
 
 
 def reachable(graph: Graph, starts: Iterable[str]) -> frozenset[str]:
-    """All that can be come to from some nodes, themselves with them."""
+    """All nodes reachable from some nodes, including these."""
     seen: set[str] = set()
     todo = list(starts)
     while todo:
@@ -30,7 +30,7 @@ def reachable(graph: Graph, starts: Iterable[str]) -> frozenset[str]:
 
 
 def dependencies_first(graph: Graph) -> list[str]:
-    """All nodes, each after those that it leads to, as far as there are no cycles."""
+    """All nodes in reverse topological order, apart from cycles."""
     try:
         return list(TopologicalSorter(graph).static_order())
     except CycleError:
@@ -40,7 +40,7 @@ def dependencies_first(graph: Graph) -> list[str]:
 
 
 def cycles(graph: Graph) -> list[list[str]]:
-    """The strongly connected components of a graph that hold a cycle."""
+    """The strongly connected components that contain a cycle."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError:

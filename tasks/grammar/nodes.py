@@ -1,7 +1,7 @@
-"""The tree of a task file: frozen nodes that print themselves back as source.
+"""The tree of a task file: frozen nodes that print themselves as source.
 
-`str(node)` is text of the task language and reads back as the same node; where a node stands in
-its file (`span`) takes no part in equality. Spacing, comments and needless brackets are not kept.
+`str(node)` is text of the task language that parses to the same node; the position of a node (`span`) does
+not affect equality. Spacing, comments and redundant brackets are not preserved.
 
 Read before: `conditions.py` and `ast_courses.py`. Read next: `parser.py` (text to tree).
 """
@@ -78,7 +78,7 @@ __all__ = [
 
 
 FloorPoint: TypeAlias = tuple[Number, Number]
-"""A place on the floor: two lengths, in metres or parts of them."""
+"""A position on the floor: two lengths."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +94,14 @@ class Actors:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A rule: a name and what it stands for.
+    """A grammar rule: a name and its definition.
 
     Attributes:
         name: The name between the angle brackets.
         body: Its course, or `Actors` when the rule is an action in the strict form.
-        text: What the narrative says when it begins; empty when the file says nothing.
+        text: Text of the narrative when it begins; empty if the file has none.
         is_task: Whether it is marked with `task`.
-        span: Where its head stands.
+        span: Position of its head.
     """
 
     name: str
@@ -121,14 +121,14 @@ class Actor:
 
     Attributes:
         name: Its name in the file.
-        models: The models that it may be; empty when nothing is said of them.
+        models: The models that it may be; may be empty.
         size: Its largest extent, or None.
-        optional: Whether what is asked of it may be left out.
-        criteria: By what else it is told.
-        bystander: Whether it has no part in the task and is let be; without a name, all that plays no
-            actor is.
-        spare: Of a loop with something new each time round, what that is: nobody waits for this one, but
-            what is asked of it may not be left out. Empty for all others.
+        optional: Whether its actions may be left out.
+        criteria: Further criteria.
+        bystander: Whether it takes no part in the task and is ignored; without a name, all objects that play
+            no actor are.
+        spare: For a loop with a new actor in each round, the name of that actor: this one is not waited for,
+            but its actions may not be left out. Empty for all others.
     """
 
     name: str
@@ -160,8 +160,8 @@ class ZoneDeclaration:
 
     Attributes:
         name: Its name.
-        corners: In the image, pixels; none for a zone drawn elsewhere, or on the floor.
-        floor: Corners on the floor, of a zone in which a body is where it stands.
+        corners: In the image, pixels; none for a zone defined elsewhere, or on the floor.
+        floor: Corners on the floor; an object is in such a zone by its foot point.
     """
 
     name: str
@@ -176,11 +176,11 @@ class ZoneDeclaration:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """`ground is (80, 400) = (0 m, 0 m), ...`: points of the image, and where they are on the floor.
+    """`ground is (80, 400) = (0 m, 0 m), ...`: corresponding points of the image and the floor.
 
     Attributes:
         image: (x, y) of each, pixels.
-        floor: Its place on the floor.
+        floor: Their positions on the floor.
     """
 
     image: tuple[tuple[float, float], ...]
@@ -211,7 +211,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Include:
-    """`include "common.task"`: the statements of another file, as if they stood here."""
+    """`include "common.task"`: the statements of another file, inserted here."""
 
     path: str
     span: Span = field(default=NOWHERE, compare=False, repr=False)
@@ -243,15 +243,15 @@ class Task:
     Attributes:
         stages: Its rules in the order of the file.
         actors: Declarations of actors.
-        invariants: What must never or always hold.
-        zones: Parts of the image that it names.
-        parameters: Amounts that it names.
-        includes: Files that it includes; their statements stand among the others.
-        bystanders: Who has no part in it and is let be.
-        grounds: Where points of the image are on the floor; more than one is a mistake.
+        invariants: Invariants (never, always).
+        zones: Declarations of zones.
+        parameters: Declarations of parameters.
+        includes: Included files; their statements are among the others.
+        bystanders: Declarations of bystanders.
+        grounds: Correspondences of image and floor; more than one is an error.
         file: Name of the file, for messages.
-        root: The rule that is the task when the file has several; empty for its first one.
-        recovered: Stages of which the file says what may be done when they fail.
+        root: The rule that is the task if the file has several; empty for the first.
+        recovered: Stages with a recovery from failure.
     """
 
     stages: tuple[Stage, ...]
@@ -268,7 +268,7 @@ class Task:
 
     @property
     def ground(self) -> Ground | None:
-        """Where points of the image are on the floor, or None while nobody says so."""
+        """The correspondence of image and floor, or None."""
         return next(iter(self.grounds), None)
 
     @property
@@ -293,22 +293,21 @@ class Task:
         return next((s for s in self.stages if s.name == name), None)
 
     def actor(self, name: str) -> Actor:
-        """What is declared of an actor, or of a bystander."""
+        """The declaration of an actor or bystander."""
         declared = (*self.actors, *self.bystanders)
         return next((a for a in declared if a.name == name), Actor(name))
 
     def models(self, actor: str) -> tuple[str, ...]:
         """Models that an actor may be: as declared, else the one of the actor's own name.
 
-        An actor that is told by its looks, its place or its conduct alone may be any model, or none:
-        it has no models.
+        An actor identified only by its looks, place or conduct has no models: it may be any or none.
         """
         declared = self.actor(actor)
         alone = any(not isinstance(c, PartOf) for c in declared.criteria)
         return declared.models or (() if alone else (actor,))
 
     def amount(self, amount: Amount) -> Number:
-        """What an amount stands for: itself, or what its parameter is; 0 when nobody knows."""
+        """The value of an amount: itself, or that of its parameter; 0 if undefined."""
         if isinstance(amount, Number):
             return amount
         found = next((p.amount for p in self.parameters if p.name == amount.name), None)

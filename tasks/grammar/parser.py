@@ -1,4 +1,4 @@
-"""From text to tree, by the grammar in `tasks.lark`."""
+"""Parses text to a tree by the grammar in `tasks.lark`."""
 
 from __future__ import annotations
 
@@ -64,43 +64,43 @@ N = TypeVar("N")
 
 
 class _Placed(Protocol):
-    """A node that knows where it stands."""
+    """A node with a source position."""
 
     @property
     def span(self) -> Span: ...
 
 
 def read(text: str, file: str = "<text>") -> Task:
-    """The tree of a text, by syntax alone.
+    """Parse a text without semantic checks.
 
     Args:
         text: A whole task file, or some of its statements.
         file: Its name, for messages.
 
     Returns:
-        The tree; whether its names make sense is not looked at (see `check`).
+        The tree; its names are not checked (see `check`).
 
     Raises:
-        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+        lark.exceptions.UnexpectedInput: At a syntax error.
     """
     return collect(read_statements(text), file)
 
 
 def read_statements(text: str) -> list[object]:
-    """The statements of a text in their order.
+    """The statements of a text in order.
 
     Raises:
-        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+        lark.exceptions.UnexpectedInput: At a syntax error.
     """
-    # The parser makes the tree as it goes, which its types do not say.
+    # With a transformer the parser returns its result, which its types do not express.
     return cast("list[object]", parser().parse(text))
 
 
 def tokens(text: str) -> list[Token]:
-    """The words of a text that is in the language, in their order.
+    """The tokens of a valid text in order.
 
     Raises:
-        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+        lark.exceptions.UnexpectedInput: At a syntax error.
     """
     reader = parser().parse_interactive(text)
     found = list(reader.iter_parse())
@@ -109,7 +109,7 @@ def tokens(text: str) -> list[Token]:
 
 
 def collect(statements: Several[object], file: str) -> Task:
-    """The tree that some statements make."""
+    """The tree of some statements."""
 
     def of(kind: type[N]) -> tuple[N, ...]:
         return tuple(s for s in statements if isinstance(s, kind))
@@ -139,18 +139,18 @@ def grammar() -> str:
 
 @lru_cache(maxsize=1)
 def parser() -> Lark:
-    """The parser of task files; it gives their statements."""
+    """The parser of task files, which returns their statements."""
     return Lark(
         grammar(),
         parser="lalr",
         lexer="contextual",
         maybe_placeholders=False,
-        transformer=_TaskBuilder(),  # at once: a tree of Lark's own in between costs half of the time
+        transformer=_TaskBuilder(),  # during parsing: an intermediate Lark tree would take half of the time
     )
 
 
 class _TaskBuilder(ActorBuilder):
-    """One method for each rule of the grammar."""
+    """One method for each grammar rule."""
 
     def start(self, items: list[Any]) -> list[Any]:
         return items

@@ -1,4 +1,4 @@
-"""`gripper of arm`, said where an actor stands, declares the actor `gripper` as a part of `arm`."""
+"""`gripper of arm` in place of an actor declares the actor `gripper` as a part of `arm`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from visup.tasks.grammar.nodes import Actor, Actors, Conditioned, Invariant, Sta
 def with_parts(
     declared: Sequence[Actor], stages: Sequence[Stage], invariants: Sequence[Invariant]
 ) -> tuple[Actor, ...]:
-    """The declarations of actors, with what conditions say of parts among them.
+    """The declarations of actors, including the parts declared in conditions.
 
     Args:
         declared: The declarations of a file.

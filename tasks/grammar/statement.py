@@ -1,4 +1,4 @@
-"""A statement that does not parse, and a mistake recognised in it."""
+"""A statement with a syntax error, and a mistake recognised in it."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ QUOTED = re.compile(r'"[^"\n]*"')
 
 
 def blank_strings(text: str) -> str:
-    """A text with what stands in double quotes blank, so that no word of it is taken for code."""
+    """A text with the content of string literals blanked, so that it is not taken for code."""
     return QUOTED.sub(lambda m: " " * len(m[0]), text) if '"' in text else text
 
 
 @dataclass(frozen=True, slots=True)
 class StatementText:
-    """A statement that does not parse, and where it begins in its file (counted from 1).
+    """A statement with a syntax error and its position in the file (counted from 1).
 
     Attributes:
-        text: The statement, texts in quotes blank.
+        text: The statement with string literals blanked.
         line: Its line.
         column: Its column.
-        raw: The statement as it was written.
+        raw: The original statement.
     """
 
     text: str
@@ -36,20 +36,20 @@ class StatementText:
     raw: str = ""
 
     def position(self, offset: int) -> tuple[int, int]:
-        """Line and column in the file of an offset in the statement."""
+        """Line and column of an offset in the statement."""
         row = self.text.count("\n", 0, offset)
         start = self.text.rfind("\n", 0, offset) + 1
         return self.line + row, offset - start + (self.column if row == 0 else 1)
 
     @property
     def end(self) -> tuple[int, int]:
-        """Line and column just behind its last character."""
+        """Line and column just after its last character."""
         return self.position(len(self.text))
 
 
 @dataclass(frozen=True, slots=True)
 class RecognisedError:
-    """A recognised mistake: offsets in the statement, and what is said of it."""
+    """A recognised mistake: offsets in the statement, and the message."""
 
     code: str
     start: int
@@ -60,4 +60,4 @@ class RecognisedError:
 
 
 ErrorPattern = Callable[[str], RecognisedError | None]
-"""Looks at the text of a statement and finds its mistake, or None."""
+"""Finds a mistake in the text of a statement, or returns None."""

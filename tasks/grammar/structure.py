@@ -1,4 +1,4 @@
-"""Which stages a task has and who acts in them, read off its tree."""
+"""The structure of a task: its stages and their actors."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ from visup.tasks.grammar.nodes import (
 from visup.tasks.grammar.units import SIZE, dimension, value
 
 T = TypeVar("T")
-MAX_CACHED = 64  # of so many tasks what was read off is remembered
+MAX_CACHED = 64  # cached tasks per function
 
 
 def cached_by_identity(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
-    """A function of a task that is worked out once for each, as long as it is the same object.
+    """Cache a function of a task by the identity of the task object.
 
-    Supervision asks at each step; comparing whole trees would take as long as reading them.
+    Supervision calls such functions at each step; comparing whole trees would take as long as traversing
+    them.
     """
     known: dict[int, tuple[Task, T]] = {}
 
@@ -48,7 +49,7 @@ def cached_by_identity(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
 
 
 def tasks_of(file: Task) -> tuple[Task, ...]:
-    """The tasks of a file, one by one, each with the invariants that can concern it."""
+    """The tasks of a file, each with its relevant invariants."""
     found = []
     for name in file.roots:
         root = file.stage(name)
@@ -60,7 +61,7 @@ def tasks_of(file: Task) -> tuple[Task, ...]:
 
 @cached_by_identity
 def stage_names(task: Task) -> tuple[str, ...]:
-    """The stages that ask for actions themselves, in the order in which the task comes to them."""
+    """The stages that directly require actions, in the order of the task."""
     root = task.stage(task.name)
     reached = _reached(task, root) if root else []
     names = dict.fromkeys(s.name for s in reached if _asks(task, s))
@@ -68,13 +69,13 @@ def stage_names(task: Task) -> tuple[str, ...]:
 
 
 def stages_inside(task: Task, name: str) -> frozenset[str]:
-    """The names of all stages that a stage comes to, itself with them."""
+    """The names of all stages reachable from a stage, including itself."""
     stage = task.stage(name)
     return frozenset(s.name for s in _reached(task, stage)) if stage else frozenset()
 
 
 def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
-    """The actors of the actions that one stage asks for itself, in the order of the text."""
+    """The actors of the actions that one stage directly requires, in the order of the text."""
     rule = task.stage(stage)
     if rule is None or isinstance(rule.body, Actors):
         return ()
@@ -83,7 +84,7 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
 
 @cached_by_identity
 def task_actors(task: Task) -> tuple[str, ...]:
-    """All actors of a task, in the order in which its stages ask for them; machines of parts last."""
+    """All actors of a task in the order of its stages; machines of parts last."""
     root = task.stage(task.name)
     grouped = [s.name for s in _reached(task, root)] if root else []
     staged = [a for s in (*stage_names(task), *grouped) for a in stage_actors(task, s)]
@@ -95,12 +96,12 @@ def task_actors(task: Task) -> tuple[str, ...]:
 
 
 def spare_kinds(task: Task) -> tuple[str, ...]:
-    """What is another one in each round of a loop of the task, as `part` of `for each new part`."""
+    """The actors that are new in each round of a loop, such as `part` of `for each new part`."""
     return tuple(dict.fromkeys(a.spare for a in task.actors if a.spare))
 
 
 def machines_of(task: Task, actor: str) -> tuple[str, ...]:
-    """The machine of which an actor is a part, the one of which that is a part, and so on."""
+    """The machine of which an actor is a part, the machine of that one, and so on."""
     found: dict[str, None] = {}
     machine = task.actor(actor).machine
     while machine is not None and machine not in found and machine != actor:
@@ -110,12 +111,12 @@ def machines_of(task: Task, actor: str) -> tuple[str, ...]:
 
 
 def undrawn_zones(task: Task) -> tuple[str, ...]:
-    """The zones that a task names without corners: someone else must have drawn them."""
+    """The zones of a task without corners, which must be defined elsewhere."""
     return tuple(z.name for z in task.zones if not z.corners and not z.floor)
 
 
 def needs_ground(task: Task) -> bool:
-    """Whether a task speaks of places on the floor: zones in metres, gaps in metres."""
+    """Whether a task uses floor coordinates: zones or gaps in metres."""
     facts = [f for s in task.stages for f in _facts(s)]
     facts += [f for i in task.invariants for f in facts_of(i.condition)]
     ends = (a for f in facts if isinstance(f, Comparison) for a in bounds_of(f))
@@ -123,7 +124,7 @@ def needs_ground(task: Task) -> bool:
 
 
 def signals_named(task: Task) -> tuple[str, ...]:
-    """The signals that a task asks for, each once."""
+    """The signals of a task, each once."""
     facts = [f for s in task.stages for f in _facts(s)]
     facts += [f for i in task.invariants for f in facts_of(i.condition)]
     asked = (action_of(f) for f in facts if action_of(f).name in SIGNAL_WORDS)
@@ -131,7 +132,7 @@ def signals_named(task: Task) -> tuple[str, ...]:
 
 
 def pause_conditions(task: Task) -> Iterator[StageCondition]:
-    """What pauses some stage of a task, as often as it is said."""
+    """All pause conditions of a task, in order with duplicates."""
     for stage in task.stages:
         courses = () if isinstance(stage.body, Actors) else walk(stage.body)
         told = (
@@ -154,8 +155,8 @@ def declared_sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) ->
     """The real sizes that some tasks declare, by model.
 
     Args:
-        tasks: Tasks without mistakes; where two disagree the first goes before.
-        bound: Actor -> models, as the user bound them; it goes before the declarations.
+        tasks: Valid tasks; the first takes precedence.
+        bound: Actor -> models bound by the user, which take precedence over declarations.
 
     Returns:
         Model name -> largest extent, metres.
@@ -175,18 +176,17 @@ def with_taught_actors(
     known: Collection[str],
     taught: Collection[str],
 ) -> dict[str, tuple[str, ...]]:
-    """Actors as they were given, and those that are what was taught under their name.
+    """The given actors, and those bound to a taught model of their name.
 
-    An actor of which nothing is declared stands for the model of its own name anyway. One that is
-    declared to look like models which nobody has (`actor station is trex`, written for another
-    scene) is what was taught as `station`, where something was. One told by its colour, place or
-    conduct has no models, and stays as it is told.
+    An actor without a declaration is the model of its own name anyway. One declared with missing models
+    (`actor station is trex`, written for another scene) is bound to the taught model `station`, if there is
+    one. One identified by colour, place or conduct has no models and is left unchanged.
 
     Args:
         tasks: All tasks of a run.
-        given: Actor -> models, as the user bound them; it goes before everything else.
-        known: Names of all models that there are.
-        taught: Names of those that were taught.
+        given: Actor -> models bound by the user, which take precedence.
+        known: Names of all models.
+        taught: Names of the taught models.
     """
     actors = dict(given)
     for actor in dict.fromkeys(a for task in tasks for a in task_actors(task)):
@@ -198,10 +198,10 @@ def with_taught_actors(
 
 
 def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
-    """The key of a fact of a task, and the actors of whom it speaks.
+    """The key of a fact of a task, and its actors.
 
-    A plain action is its own key; in that of a comparison stand its sign and amount, in that of an
-    action on a zone the zone, of a signal its name.
+    A plain action is its own key; the key of a comparison includes operator and amount, that of an action on
+    a zone the zone, that of a signal its name.
     """
     action, zones = action_of(fact), {z.name for z in task.zones}
     if action.name in SIGNAL_WORDS:
@@ -219,7 +219,7 @@ _SIGN = re.compile(r"(?:^|\s)(?=(?:[<>]=?|between|every)\s)")
 
 
 def key_text(key: str, actors: Iterable[str]) -> str:
-    """A fact as it is written, by its key (see `fact_key`).
+    """The source text of a fact by its key (see `fact_key`).
 
     >>> key_text("inside berth every 5 s", ["car"])
     'inside(car, berth) every 5 s'
@@ -232,7 +232,7 @@ def key_text(key: str, actors: Iterable[str]) -> str:
 
 
 def period_of(task: Task, periodic: Comparison) -> tuple[float, float]:
-    """The shortest and the longest time from one beat of a periodic action to the next, seconds."""
+    """The shortest and the longest time between two occurrences of a periodic action, seconds."""
     ends = [value(task.amount(a)) for a in bounds_of(periodic)]
     return (ends[0] if len(ends) > 1 else 0.0), ends[-1]
 
@@ -252,7 +252,7 @@ def _names(task: Task, node: Course) -> tuple[str, ...]:
 
 
 def _asks(task: Task, stage: Stage) -> bool:
-    # What is said of the progress of a group asks for nothing: its stages do.
+    # Conditions on the progress of a group require nothing; its stages do.
     return not isinstance(stage.body, Actors) and any(
         isinstance(n, Action | Comparison) or (isinstance(n, Reference) and _names(task, n))
         for n in walk(stage.body)
@@ -260,7 +260,7 @@ def _asks(task: Task, stage: Stage) -> bool:
 
 
 def _reached(task: Task, stage: Stage) -> list[Stage]:
-    """A stage and all that it refers to, depth first, each once."""
+    """A stage and all reachable from it, depth first, each once."""
     known = {s.name: s for s in reversed(task.stages)}
     found: dict[str, Stage] = {}
     todo = [stage]
@@ -276,11 +276,11 @@ def _reached(task: Task, stage: Stage) -> list[Stage]:
 
 
 def with_bystanders(task: Task, names: Iterable[str]) -> Task:
-    """The task with further models that have no part in it and are let be; those that it declares stay.
+    """The task with further bystanders.
 
     Args:
         task: The task.
-        names: Of models or of taught things.
+        names: Names of models or taught objects.
     """
     declared = {a.name for a in (*task.actors, *task.bystanders)}
     more = (Actor(n, (n,), bystander=True) for n in dict.fromkeys(names) if n not in declared)

@@ -1,8 +1,8 @@
-"""What is said once and meant several times: stages with actors as parameters, ways out of a failure.
+"""Templates: stages with actors as parameters, and recoveries from failure.
 
-`<mount(leg)> ::= ...` is a pattern. Each `<mount(leg_1)>` that is asked for is a stage of its own, made
-from it; the pattern itself is none. `on failure of <grasp>: <back_off> <grasp>` puts that way beside
-`<grasp>` wherever it is asked for.
+`<mount(leg)> ::= ...` is a template. Each reference `<mount(leg_1)>` instantiates it as a separate stage; the
+template itself is no stage. `on failure of <grasp>: <back_off> <grasp>` adds that alternative to every
+reference to `<grasp>`.
 
 Read before: `nodes.py`.
 """
@@ -20,17 +20,17 @@ from visup.tasks.grammar.conditions import Name
 from visup.tasks.grammar.nodes import Invariant, Stage
 
 WAYS_OUT = 3
-"""How often in a row a failure may be recovered from."""
+"""Maximum number of recoveries in a row."""
 _CALL = re.compile(r"(\w+)\s*\(([^()]*)\)")
 
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """`on failure of <grasp>: <back_off> <grasp>`: another way to do a stage once it went wrong.
+    """`on failure of <grasp>: <back_off> <grasp>`: an alternative after the failure of a stage.
 
     Attributes:
-        stage: Which stage.
-        course: What is done instead, from where it failed.
+        stage: The stage.
+        course: The course that follows the failure.
     """
 
     stage: Reference
@@ -42,7 +42,7 @@ class Recovery:
 
 
 def called(name: str) -> tuple[str, tuple[str, ...]]:
-    """The name of a stage without its actors, and these.
+    """The name of a stage without its actors, and the actors.
 
     >>> called("mount(leg_1, top)")
     ('mount', ('leg_1', 'top'))
@@ -54,16 +54,16 @@ def called(name: str) -> tuple[str, tuple[str, ...]]:
 
 
 def canonical(name: str) -> str:
-    """The name of a stage as it is told, whatever blanks are in it."""
+    """The name of a stage with normalised spaces."""
     plain, words = called(name.strip())
     return f"{plain}({', '.join(words)})" if words else plain
 
 
 def recovered(stages: Iterable[Stage], recoveries: Iterable[Recovery]) -> tuple[Stage, ...]:
-    """The stages with every way out of a failure beside what it is for."""
+    """The stages with every recovery added as an alternative."""
     found = tuple(stages)
     for recovery in recoveries:
-        way = _way_out(recovery, WAYS_OUT)
+        way = _recovery_course(recovery, WAYS_OUT)
         found = tuple(
             s
             if s.name == recovery.stage.stage
@@ -73,10 +73,10 @@ def recovered(stages: Iterable[Stage], recoveries: Iterable[Recovery]) -> tuple[
     return found
 
 
-def _way_out(recovery: Recovery, times: int) -> Course:
+def _recovery_course(recovery: Recovery, times: int) -> Course:
     if times == 0:
         return recovery.stage
-    again = _replaced(recovery.course, recovery.stage, _way_out(recovery, times - 1))
+    again = _replaced(recovery.course, recovery.stage, _recovery_course(recovery, times - 1))
     return Choice((recovery.stage, cast("Course", again)), recovery.span)
 
 
@@ -87,10 +87,10 @@ def _replaced(node: Any, old: Reference, new: Course) -> Any:
 def instantiated(
     stages: Iterable[Stage], invariants: Iterable[Invariant] = ()
 ) -> tuple[Stage, ...]:
-    """The stages with one for each way in which a pattern is asked for, in the place of the pattern.
+    """The stages with each template replaced by its instances.
 
-    A stage that is asked for by the very name that it has is no pattern, whatever its name; a pattern
-    that nobody asks for stays, so that it is told as any stage that is never reached.
+    A stage referred to by exactly its own name is no template; an unused template remains, so that it is
+    reported as an unreachable stage.
     """
     known = {s.name: s for s in reversed(tuple(stages))}
     patterns = {_shape(s.name): s for s in reversed(tuple(stages)) if called(s.name)[1]}
@@ -118,13 +118,13 @@ def instantiated(
 
 
 def _shape(name: str) -> tuple[str, int]:
-    """By what a pattern is found: the plain name, and how many actors it takes."""
+    """The key of a template: its plain name and its number of actors."""
     plain, words = called(name)
     return plain, len(words)
 
 
 def bound(node: Any, names: Mapping[str, str]) -> Any:
-    """The same tree with other actors in the place of some."""
+    """The tree with actors substituted."""
 
     def changed(n: Any) -> Any:
         if isinstance(n, Name) and n in names:
@@ -139,7 +139,7 @@ def bound(node: Any, names: Mapping[str, str]) -> Any:
 
 
 def names_in(node: Any) -> frozenset[str]:
-    """The actors, zones and signals that a tree names, also those that it asks stages for."""
+    """The actors, zones and signals in a tree, including the arguments of stages."""
     found: set[str] = set()
 
     def note(n: Any) -> None:
@@ -172,7 +172,7 @@ def _asked(node: Any) -> list[str]:
 
 
 def _mapped(node: Any, change: Callable[[Any], Any]) -> Any:
-    """A tree with some of its nodes changed; None from `change` leaves one and looks into it."""
+    """A tree with nodes replaced by `change`; for None the node is kept and its children are visited."""
     new = change(node)
     if new is not None:
         return new

@@ -1,4 +1,4 @@
-"""Units of amounts in tasks: those of rules, and real sizes."""
+"""Units of amounts in tasks: those of rules, and physical sizes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MEASURES: Mapping[Dimension, str] = MappingProxyType(
         of_rules.REAL_LENGTH: SIZE,
     }
 )
-"""Dimension of a quantity of rules -> what tasks call it."""
+"""Dimension of a quantity in rules -> its name in tasks."""
 
 UNITS = MappingProxyType(
     {
@@ -38,20 +38,20 @@ UNITS = MappingProxyType(
         if unit != Unit.NONE and measured in MEASURES
     }
 )
-"""Unit -> (what it measures, how many of the base unit one of it is)."""
+"""Unit -> (dimension, factor to the base unit)."""
 
 
 def value(amount: Number) -> float:
-    """An amount in the base unit of what it measures; an unknown unit counts as the base unit."""
+    """An amount in its base unit; an unknown unit counts as the base unit."""
     return amount.value * UNITS.get(amount.unit, ("", 1.0))[1]
 
 
 def dimension(amount: Number) -> str:
-    """What an amount measures; empty when its unit is unknown."""
+    """The dimension of an amount; empty if its unit is unknown."""
     return UNITS.get(amount.unit, ("", 1.0))[0]
 
 
 def units_of(measured: str) -> str:
-    """The units of what is measured, as one says them: "`ms`, `s`, `min` or `h`"."""
+    """The units of a dimension as a phrase: "`ms`, `s`, `min` or `h`"."""
     known = [f"`{u}`" for u, (d, _) in UNITS.items() if d == measured]
     return known[0] if len(known) == 1 else f"{', '.join(known[:-1])} or {known[-1]}"

@@ -18,13 +18,13 @@ from visup.tasks.verification.reported import ReportedRelations, joined, with_re
 from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
 
-WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
+WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is reported last
 
 BEFORE_S = 0.5
-"""What began so shortly before its turn began in it: relations are judged with delays of that order."""
+"""Tolerance for a beginning before its turn, seconds: relations are evaluated with delays of this order."""
 
 Observe = Callable[[TaskStep], ActionObservation]
-"""What is seen now of a step."""
+"""The present observation of a step."""
 
 Supported = Sequence[tuple[OpenTransition, Support]]
 
@@ -34,10 +34,10 @@ class Advance:
     """Advances hypotheses by one time step.
 
     Attributes:
-        steps: What is read off the monitors of steps.
-        observe: What is seen now of a step.
+        steps: Interprets the monitors of steps.
+        observe: Gives the present observation of a step.
         now: Seconds.
-        dt: Seconds since the last time.
+        dt: Seconds since the last step.
     """
 
     steps: StepModel
@@ -48,9 +48,9 @@ class Advance:
     def outcomes(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
     ) -> Iterator[tuple[TaskHypothesis, float]]:
-        """A hypothesis and those that come out of it by leaving a step, with their probabilities.
+        """A hypothesis and its successors by completing a step, with their probabilities.
 
-        What is paused is not left.
+        Paused steps are not completed.
         """
         if all(self.observe(x.step).paused for x in leaves(hypothesis.state)):
             yield hypothesis, 1.0
@@ -65,7 +65,7 @@ class Advance:
         ways = len({t.entered for t in transitions if not t.ends})
         found = ((t, self._support(hypothesis, t, ways)) for t in transitions if not t.ends)
         supported = [(t, support) for t, support in found if support]
-        # Where the steps are over by themselves, nothing is left to stay for but the end.
+        # If all steps are over by themselves, only the end of the course justifies staying.
         forced = not ends and any(s >= Support.OVER and self._all_over(t) for t, s in supported)
         gone = 0.0
         for transition, chance in self._chances(hypothesis, supported, ends, forced):
@@ -78,11 +78,11 @@ class Advance:
             yield replace(hypothesis, considered=considered), max(0.0, 1.0 - gone)
 
     def _awaits(self, transition: OpenTransition) -> bool:
-        """Whether a transition begins a round of a loop with something new that is not there."""
+        """Whether a transition begins a round of a loop whose new actor is not present."""
         return any(self.observe(s).absent for s in transition.entered)
 
     def _is_paused(self, transition: OpenTransition) -> bool:
-        """Whether work is paused on any step that a transition leaves."""
+        """Whether any step that a transition completes is paused."""
         return any(self.observe(x.step).paused for x in transition.left)
 
     def _chances(
@@ -100,14 +100,14 @@ class Advance:
         return all(self.steps.over(x) for x in transition.left)
 
     def _goes_on(self, transition: OpenTransition) -> bool:
-        """Whether what a transition leaves has lasted for as long as it must, and still holds."""
+        """Whether the steps that a transition completes have lasted as long as required and still hold."""
         return any(
             x.step.hold_s is not None and self.observe(x.step).holds is Truth.TRUE
             for x in transition.left
         )
 
     def _goes_round(self, transition: OpenTransition) -> bool:
-        """Whether what would begin is seen only since one goes round the other, near which it is to stay."""
+        """Whether the observed beginning is only an effect of moving around an object to stay near."""
         return self._goes_on(transition) and any(self.observe(s).round for s in transition.entered)
 
     def _support(
@@ -120,14 +120,14 @@ class Advance:
         if not finished and all(_goes_on(s, transition.left) for s in transition.entered):
             return Support.NONE
         opens = transition.entered and self._opens(hypothesis, transition)
-        # Where the course may also go on otherwise, an entry speaks for neither way: who touches may
-        # couple, or back off. What holds does.
+        # With several alternatives an entry supports none of them: touching may precede coupling or backing
+        # off. A holding action does.
         holds = (self.observe(s).holds is Truth.TRUE for s in transition.entered)
         if opens and (ways == 1 or all(holds)):
             return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._goes_on(transition):
             return Support.OVER
-        # What fails is not left behind unseen.
+        # A failing step is not passed unseen.
         fails = any(x.payload.status in BAD for x in transition.left)
         nearer = ways == 1 and not fails and all(self._nearer(s) for s in transition.entered)
         return Support.NEARER if nearer else Support.NONE
@@ -138,7 +138,7 @@ class Advance:
         """Probability that a supported transition is taken now."""
         hmm, skipped = self.steps.hmm, self._skipped(transition)
         if support <= dict(hypothesis.considered).get(transition.entered, Support.NONE):
-            # What was weighed already counts once; but what was seen to begin may begin later on.
+            # Evidence counts once; but an observed entry may become a beginning later.
             late = -math.expm1(-hmm.leave * self.dt)
             return skipped * late if support >= Support.EARLY else 0.0
         if support >= Support.EARLY:
@@ -148,7 +148,7 @@ class Advance:
         return skipped * hmm.unseen
 
     def _opens(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
-        """Whether all that a transition enters was seen to begin."""
+        """Whether the beginnings of all steps that a transition enters were observed."""
         met = dict(hypothesis.met).get(transition.entered, -math.inf)
         passed = (self.observe(s).elapsed(s, met, self.now) for s in transition.entered)
         return all(p <= self.steps.settings.contact_s for p in passed)
@@ -156,7 +156,7 @@ class Advance:
     def _met(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
     ) -> tuple[tuple[tuple[TaskStep, ...], float], ...]:
-        """When the entry to each transition was last seen, with what is seen now."""
+        """When the entry to each transition was last observed, including now."""
         met = dict(hypothesis.met)
         for transition in transitions:
             if self._goes_round(transition):
@@ -174,15 +174,15 @@ class Advance:
         return lasted >= self.steps.settings.enter_s - 1e-9
 
     def _nearer(self, step: TaskStep) -> bool:
-        """Whether a step comes nearer; one whose course says when it begins only begins."""
+        """Whether a step is approaching; one with its own begin condition does not."""
         return step.condition("begins") is None and self._lasted(step, self.observe(step).helps)
 
     def _skipped(self, transition: OpenTransition) -> float:
-        """Probability of leaving the steps of a transition in their current state."""
+        """Probability of completing the steps of a transition in their current state."""
         return math.prod(self._passed_over(x) for x in transition.left)
 
     def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
-        # What held, and must not for any time, is over as soon as the next thing is seen.
+        # An action that held, without a required duration, is over as soon as the next is observed.
         lasts, held = self.steps.actions[leaf.step.action].lasts, leaf.payload.held
         if leaf.payload.fulfilled or (held and not lasts and leaf.step.hold_s is None):
             return 1.0
@@ -219,23 +219,23 @@ class Advance:
         )
 
     def _early(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
-        """Whether all that begins by a transition has been so since before what it leaves began.
+        """Whether all steps that a transition enters have held since before the steps it completes began.
 
-        What goes on until something else begins (`converging`) may have begun before its turn, and so
-        may what is measured; and what was asked for already between the same actors goes on.
+        Actions that last until something else begins (`converging`) may begin before their turn, and so may
+        measurements; an action required before of the same actors continues.
         """
         if not transition.entered or any(s.already or s.is_told for s in transition.entered):
             return False
         begun = [x.payload.begun for x in transition.left]
         if any(b is None for b in begun):
-            return False  # whether it came before what was never seen, nobody knows
+            return False  # not known if the completed steps were never observed
         turn = min(b for b in begun if b is not None)
         asked = {frozenset(x.step.actors) for x in transition.left}
         asked |= {frozenset(b.step.actors) for b in behind(hypothesis.backpointer)}
         return all(self._before(s, turn, asked) for s in transition.entered)
 
     def _before(self, step: TaskStep, turn: float, asked: set[frozenset[str]]) -> bool:
-        """Whether a step was done well before a time, and not because the course required it."""
+        """Whether a step held well before a time without being required by the course."""
         meaning, seen = self.steps.actions[step.action], self.observe(step)
         held_by = seen.held_by
         if meaning.lasts or meaning.measures or held_by is None:
@@ -245,7 +245,7 @@ class Advance:
         return frozenset(step.actors) not in asked
 
     def _in_turn(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
-        """A step that begins, with the time from which its evidence counts and is reported."""
+        """A beginning step with the time from which its evidence counts and is reported."""
         left = transition.left
         same = any(leaf.step.same_as(x.step) for x in left)
         begun = (x.payload.begun for x in left)
@@ -254,7 +254,7 @@ class Advance:
         return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told))
 
     def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
-        """The reports once a step is left: about it, and about what preceded it."""
+        """The reports after a step is completed: about it and its predecessors."""
         step, monitor = left.step, left.payload
         if self._ending(left, followed := self._followed(transition)).status is not Status.DONE:
             return monitor.told
@@ -264,20 +264,20 @@ class Advance:
         return with_reported(monitor.told, step.actors, meaning.name, until)
 
     def _after(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
-        """A step that begins, with when what comes before it was over; its delay counts from then."""
+        """A beginning step with the end of its predecessor, from which its delay counts."""
         if leaf.step.delay is None:
             return leaf
         over = max((self._over_at(x) for x in transition.left), default=self.now)
         return replace(leaf, payload=replace(leaf.payload, after=over))
 
     def _over_at(self, left: Leaf[StepMonitor]) -> float:
-        """When a step was over; one that lasts until the next begins, when it was last seen."""
+        """When a step ended; for one that lasts until the next begins, when it was last observed."""
         by_itself = self.steps.over(left)
         at = left.payload.fulfilled_at if by_itself else left.payload.helped_at
         return self.now if at is None else at
 
     def _begun(self, leaf: Leaf[StepMonitor], opened: bool) -> Leaf[StepMonitor]:
-        """A step that begins now, with what is seen of it at once."""
+        """A step that begins now, with its first observation."""
         if opened:
             leaf = replace(leaf, payload=replace(leaf.payload, opened=True))
         return self.steps.looked_at(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
@@ -285,7 +285,7 @@ class Advance:
     def _past(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, under_way: set[str]
     ) -> tuple[StageBelief, ...]:
-        """The latest word on the stages that lie behind, once a transition is taken."""
+        """The latest beliefs about completed stages after a transition."""
         found = {p.stage: p for p in hypothesis.past}
         followed = self._followed(transition)
         left = (self._ending(x, followed) for x in transition.left)
@@ -294,25 +294,25 @@ class Advance:
             failed = ending.status is Status.FAILED
             before = found.get(ending.stage)
             if before is not None and before.status is Status.FAILED:
-                continue  # there is no way back from that
+                continue  # failure is final
             if ending.stage not in under_way or failed:
                 found[ending.stage] = ending
         return tuple(found.values())
 
     def _followed(self, transition: OpenTransition) -> tuple[float, ...]:
-        """Since when what a transition enters is seen, of all that is."""
+        """Since when each observed step that a transition enters has been observed."""
         seen = (self.observe(s) for s in transition.entered)
         return tuple(r.since for o in seen if (r := o.helps or o.entry) is not None)
 
     def _ending(self, leaf: Leaf[StepMonitor], followed: Sequence[float]) -> StageBelief:
-        """How the stage of a step ends when it ends with this step."""
+        """The belief about a stage that ends with this step."""
         meaning = self.steps.actions[leaf.step.action]
         denied = self._denied(leaf.step)
         status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed, denied)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
     def _denied(self, step: TaskStep) -> float | None:
-        """Since when something is seen that says that a step's action does not hold, or None."""
+        """Since when a step's action has been contradicted, or None."""
         contrary = self.observe(step).contrary
         return None if contrary is None else contrary.since
 
@@ -322,5 +322,5 @@ def _may_end(transition: OpenTransition) -> bool:
 
 
 def _goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
-    """Whether a step requires what already holds: it can begin only once that has ceased."""
+    """Whether a step requires an action that already holds: it can begin only after that has ended."""
     return any(step.same_as(x.step) and not x.payload.ceased for x in left)

@@ -1,4 +1,4 @@
-"""Which stages have begun: a stage whose turn has come waits until some evidence of it is seen."""
+"""Which stages have begun: a stage waits in its turn until there is evidence of it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def with_begun(
     """Update whether each stage has begun.
 
     Args:
-        before: The stages as they were believed last, in the same order.
-        stages: As they are believed now.
-        stirs: Whether one who plays in what is under way sets out: with that a task begins.
+        before: The previous beliefs, in the same order.
+        stages: The present beliefs.
+        stirs: Whether an actor of an active step starts to move, which begins a task.
     """
     stirs = stirs and is_first(before)
     pairs = zip(before, stages, strict=True)
@@ -40,11 +40,12 @@ def _begun(before: StageBelief, now: StageBelief, stirs: bool) -> bool:
 
 
 CAME_LATER_S = 0.3
-"""Who comes into view so long after others has come, or begun to move: either is a beginning."""
+"""An object that appears this long after others, seconds, has arrived or started to move: both count as a
+beginning."""
 
 
 def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
-    """Whether an actor of the most likely current steps sets out, or has just appeared."""
+    """Whether an actor of the most likely active steps starts to move, or has just appeared."""
     if posterior is None or posterior.likeliest.finished is not None:
         return False
     actors = {a for leaf in leaves(posterior.likeliest.state) for a in leaf.step.actors}

@@ -1,7 +1,7 @@
-"""From hypotheses to belief: stages, what is under way, what is expected, the verdict.
+"""Derives the belief about a task from its hypotheses: stages, expectations, verdict.
 
-What is told are marginals: how a stage stands, and whether the task has succeeded, is as likely as
-all hypotheses together by which it is so. The words are those of the likeliest of them.
+Probabilities are marginals: that of a status or verdict is the sum over all hypotheses with it. The wording
+is that of the most likely of these.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ from visup.tasks.supervision.task_inference import TaskActivity
 from visup.tasks.verification.pauses import Pause
 from visup.tasks.verification.step_monitor import BAD
 
-NEAR = 0.01  # hypotheses that are so likely against the best have a say in what is expected
-DIGITS = 9  # probabilities that differ by less are the same
-# Of two stages that may come next alike neither is told to have begun: a stage that is waited for is
-# told only where that is likelier than that it is pending, by so many digits.
+NEAR = 0.01  # hypotheses at least this likely relative to the best contribute to the expectations
+DIGITS = 9  # probabilities that differ by less are equal
+# Of two equally likely next stages neither is reported to have begun: a waiting stage is reported only if
+# that is more likely than pending after rounding to this many digits.
 WAITING_DIGITS = 2
 
-LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # there is no way back from these
+LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # final
 
 
 def task_belief(
@@ -52,16 +52,16 @@ def task_belief(
     posterior: TaskHypotheses | None,
     interrupted: str,
 ) -> TaskBelief:
-    """What is believed of a task.
+    """The belief about a task.
 
     Args:
         model: The task with its filter.
-        snapshot: What is seen now.
+        snapshot: The present observation.
         posterior: The hypotheses; None while the task has not begun.
         interrupted: Why it is interrupted, or empty.
 
     Returns:
-        The belief; `unexplained` is left to the caller.
+        The belief; `unexplained` is set by the caller.
     """
     name = model.task.name
     if posterior is None:
@@ -96,18 +96,18 @@ def task_belief(
 
 
 def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) -> TaskBelief:
-    """A belief about a task that has failed by what must never be: the stage under way then has failed.
+    """The belief about a task that failed by a broken invariant, in which the active stage has failed.
 
     Args:
-        belief: As the hypotheses have it.
-        before: What was believed last.
-        why: What was not to be.
+        belief: The belief from the hypotheses.
+        before: The previous belief.
+        why: The broken invariant.
         now: Seconds.
     """
     if belief.verdict is Verdict.INTERRUPTED:
         return belief
     if before.verdict is Verdict.FAILED:
-        # There is no way back from that, and nothing more to be told of it.
+        # Failure is final, and nothing more is reported.
         stages, current = before.stages, before.current
     else:
         current = belief.current
@@ -134,8 +134,7 @@ def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
 def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
     """The belief about a task that is probably not in progress.
 
-    Who could play its actors is still looked at, and while it is not excluded, what it asks for is
-    still expected.
+    Its casting is still followed, and unless the task is excluded, its requirements are still expected.
     """
     return replace(
         belief,
@@ -150,7 +149,7 @@ def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
 
 
 def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float]]:
-    """For each stage that has begun in some hypothesis, the probability of each of its states."""
+    """Stage that has begun in some hypothesis -> standing -> probability."""
     found: dict[str, dict[Standing, float]] = {}
     for weighted in posterior.hypotheses.values():
         for stage, standing in standings(weighted.value).items():
@@ -162,7 +161,7 @@ def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float
 
 
 def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
-    """The likeliest state of a stage: first whether it is pending, active or past, then its status."""
+    """The most likely standing of a stage: first whether it is pending, active or past, then its status."""
     progress = {p: sum(m for (q, _), m in chances.items() if q is p) for p in Progress}
     place = max(Progress, key=lambda p: round(progress[p], DIGITS))
     standing = max((s for s in chances if s[0] is place), key=lambda s: round(chances[s], DIGITS))
@@ -212,16 +211,16 @@ def _stage_belief(
 
 
 def _pause(hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot) -> Pause | None:
-    """The pause of a stage of which every step under way is paused, or None."""
+    """The pause of a stage whose active steps are all paused, or None."""
     steps = (x.step for x in leaves(hypothesis.state) if x.step.stage == stage)
     pauses = [snapshot.pauses.now(s.pauses) for s in steps]
     return pauses[0] if all(p is not None for p in pauses) else None
 
 
 def _outcome(posterior: TaskHypotheses) -> tuple[Verdict, float, TaskHypothesis]:
-    """The likeliest verdict, its probability, and the likeliest hypothesis with that verdict.
+    """The most likely verdict, its probability, and the most likely hypothesis with it.
 
-    Whether a task that is not over has begun is asked only once it is likely not to be over.
+    Whether an unfinished task has begun is decided only if it is likely to be unfinished.
     """
     chances = posterior.marginals(lambda _, h: (_verdict(h),))
     ended = {v: chances.get(v, 0.0) for v in (Verdict.FAILED, Verdict.SUCCEEDED)}
@@ -262,7 +261,7 @@ def _why(
 
 
 def _under_way(posterior: TaskHypotheses) -> dict[str, float]:
-    """For each stage the probability that it is under way, the likeliest hypothesis first."""
+    """Stage -> probability that it is active, in the order of the most likely hypotheses."""
     return posterior.marginals(lambda _, h: () if h.finished is not None else under_way(h))
 
 
@@ -278,7 +277,7 @@ def _current(posterior: TaskHypotheses) -> str:
 
 
 def _near(posterior: TaskHypotheses) -> TaskHypotheses:
-    """The hypotheses that are not much less likely than the best, as if there were no others."""
+    """The hypotheses that are not much less likely than the best, renormalised."""
     least = NEAR * posterior.hypotheses[posterior.best].mass
     near = {k: w for k, w in posterior.hypotheses.items() if w.mass >= least}
     whole = sum(w.mass for w in near.values())
@@ -289,9 +288,9 @@ def _near(posterior: TaskHypotheses) -> TaskHypotheses:
 def _prospects(
     model: MonitoredPhases, snapshot: TaskSnapshot, near: TaskHypotheses
 ) -> tuple[Prospect, ...]:
-    """What may come next, a stage or the end; what is hardly possible is left out.
+    """The next stages or the end, without unlikely ones.
 
-    Rounds with something new that is not there yet are one prospect.
+    Rounds whose new actor is not present yet are one prospect.
     """
     chances: dict[str, float] = {}
     awaited: dict[str, str] = {}

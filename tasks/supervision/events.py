@@ -34,7 +34,7 @@ KINDS = {
     Status.UNKNOWN: "stage_unknown",
 }
 GOES_ON = (Status.ACTIVE, Status.PROGRESSING, Status.STALLED)
-"""Of a stage that was paused and stands so now it is told that it goes on, and no more."""
+"""Statuses after a pause for which only the resumption is reported."""
 
 
 def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) -> Iterator[Event]:
@@ -53,7 +53,7 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
     changed = [s for s in now.stages if _is_news(was.get(s.stage), s)]
     if not changed and now.verdict is before.verdict:
         return
-    mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
+    mind = replace(mind, tasks=(now,))  # objects are named by their actors in this task
     first, done = is_first(before.stages), done_stages(before)
     for stage in changed:
         for kind in _kinds(was.get(stage.stage), stage):
@@ -89,7 +89,7 @@ def activity_events(
 
 
 def played(belief: TaskBelief, actors: Sequence[str]) -> tuple[int, ...]:
-    """Ids of the objects that play some actors; those not found are left out."""
+    """Ids of the objects of the given actors, without unbound ones."""
     who = {b.actor: b.object_id for b in belief.bindings}
     ids = (who.get(a) for a in actors)
     return tuple(i for i in ids if i is not None)
@@ -100,7 +100,7 @@ def revision_events(
 ) -> Iterator[Event]:
     """Events of stages that were reported done, and are now believed not to have happened."""
     done, still = done_stages(before), done_stages(now)
-    earliest = {r.step.stage: r for r in revisions}  # they come with the last step first
+    earliest = {r.step.stage: r for r in revisions}  # revisions come latest step first
     for stage, revision in earliest.items():
         if stage in done and stage not in still:
             data = {"task": now.task, "stage": stage, "told": revision.reported}
@@ -122,14 +122,14 @@ def done_stages(belief: TaskBelief) -> set[str]:
 
 
 def stage_concerns(belief: TaskBelief, violated: str = "") -> Iterator[AlertCondition]:
-    """A concern for each stage that is failing or has failed.
+    """An alert condition for each stage that is failing or has failed.
 
-    A task that was interrupted is not expected to go on, so its stages are no concern any more.
+    An interrupted task is not expected to continue, so its stages raise none.
 
     Args:
-        belief: Of the task.
-        violated: The broken invariant by which the task has failed, or empty: it is a concern of its own,
-            and its stage none besides.
+        belief: Belief about the task.
+        violated: The broken invariant by which the task has failed, or empty; it has an alert condition of
+            its own, so its stage has none.
     """
     if belief.verdict is Verdict.INTERRUPTED:
         return
@@ -153,7 +153,7 @@ def _is_news(was: StageBelief | None, now: StageBelief) -> bool:
 
 def _kinds(was: StageBelief | None, now: StageBelief) -> Iterator[str]:
     before = Status.PENDING if was is None else was.status
-    # What was told done and fails has not begun anew: it is undone.
+    # A stage reported done that is active again has not begun anew: it is undone.
     again = before is Status.DONE and now.status in (Status.PROGRESSING, Status.STALLED)
     if again or (now.begun and not (was is not None and was.begun)):
         yield "stage_started"
@@ -194,7 +194,7 @@ def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
 
 
 def _own_words(name: str, before: TaskBelief, task: Task) -> str:
-    """What the task file itself says of a stage that begins, and of those that begin with it."""
+    """The task file's own text of a beginning stage, and of stages that begin with it."""
     begun = {s.stage for s in before.stages if s.begun}
     groups = [s for s in task.stages if s.text and s.name != name]
     inside = ((g, stages_inside(task, g.name)) for g in groups)

@@ -1,7 +1,7 @@
-"""Hypotheses: the courses that what was seen may have taken through a task, side by side.
+"""Hypotheses: alternative explanations of the observations as courses through a task.
 
-A hypothesis is one state of the course with the monitors of the steps under way and the stages that
-lie behind it. How likely each is, the task filter keeps.
+A hypothesis is one state of the course with the monitors of its active steps and the beliefs about completed
+stages. Its probability is kept by the task filter.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.automaton.task_filter import TaskPosterior
 from visup.tasks.verification.step_monitor import StepMonitor
 
-# Of several steps of one stage the first of these speaks for the stage.
+# The status of a stage is the first of these among its steps.
 WORST_FIRST = (
     Status.FAILED,
     Status.FAILING,
@@ -28,12 +28,12 @@ WORST_FIRST = (
 
 
 class Support(IntEnum):
-    """How strongly something speaks for a transition; each time it rises, it is taken or not."""
+    """Strength of support for a transition; each time it rises, the transition is taken or not."""
 
     NONE = 0
     NEARER = 1
     OVER = 2
-    EARLY = 3  # it begins, but what it leaves has not been seen through
+    EARLY = 3  # it begins, but the steps it completes were not seen through
     BEGUN = 4
 
 
@@ -46,24 +46,24 @@ class Progress(IntEnum):
 
 
 Standing = tuple[Progress, Status]
-"""Where a stage is in the course, and how it stands there."""
+"""Position of a stage in the course, and its status."""
 
 NOT_BEGUN: Standing = (Progress.PENDING, Status.PENDING)
 
 
 @dataclass(frozen=True)
 class TaskHypothesis:
-    """One course that what was seen may have taken.
+    """One possible course of the task.
 
     Attributes:
-        state: Where it is.
-        node: The number of that state (see `Automaton`).
-        past: Stages that lie behind it, the latest word on each.
-        finished: When the task was done by it, or None.
-        met: Steps that may come next and whose entry was seen, with the time when it last was.
-        considered: Transitions not taken, by the steps they enter, and how strong their support was.
-        backpointer: The steps that lie behind it, and when each was left.
-        gone_on: Whether it has left a step.
+        state: Its state.
+        node: Number of the state (see `Automaton`).
+        past: Completed stages with their latest beliefs.
+        finished: When the task was completed, or None.
+        met: Possible next steps whose entry was observed, with the time of the last observation.
+        considered: Transitions not taken, by the steps they enter, with the strength of their support.
+        backpointer: Completed steps and their times.
+        gone_on: Whether it has completed a step.
     """
 
     state: State[StepMonitor]
@@ -77,12 +77,12 @@ class TaskHypothesis:
 
     @property
     def begun(self) -> bool:
-        """Whether anything of the task was seen by it."""
+        """Whether anything of the task was observed under it."""
         return self.gone_on or any(x.payload.begun is not None for x in leaves(self.state))
 
     @property
     def failed(self) -> bool:
-        """Whether a stage that lies behind it has failed."""
+        """Whether a completed stage has failed."""
         return any(p.status is Status.FAILED for p in self.past)
 
 
@@ -91,7 +91,7 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 
 
 def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
-    """For each active stage the step with the worst status, in the order of the text."""
+    """Active stage -> its step with the worst status, in the order of the text."""
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
         other = found.get(leaf.step.stage)
@@ -101,10 +101,10 @@ def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
 
 
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
-    """Whether of two steps of a stage the first speaks for it.
+    """Whether the first of two steps determines the status of their stage.
 
-    One that comes nearer within the stage shows that it is under way, though another is still waited
-    for; one that was so before shows nothing.
+    A step that approaches within the stage shows that it is active, though another is still waiting; one that
+    held before shows nothing.
     """
     pair = leaf.payload, other.payload
     if {p.status for p in pair} == {Status.ACTIVE, Status.PROGRESSING}:

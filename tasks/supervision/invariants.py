@@ -1,4 +1,4 @@
-"""Invariants: what must never or always hold, during stages or a whole task."""
+"""Invariants: conditions that must never or always hold, during stages or a whole task."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from visup.tasks.supervision.snapshot import TaskSnapshot
 def broken_since(
     model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[float | None, ...]:
-    """Since when each invariant has been broken, or None; what is not seen is not broken."""
+    """Since when each invariant has been broken, or None; an unobserved one counts as kept."""
     before = memory.broken_since
     if not memory.activity.reportable:
-        return (None,) * len(before)  # it does not bind a task that is not going on
+        return (None,) * len(before)  # invariants do not apply while the task is not in progress
     return tuple(
         (since if since is not None else snapshot.mind.time)
         if _breaks(i, snapshot, memory)
@@ -49,9 +49,9 @@ def _under_way(memory: TaskMemory) -> frozenset[str]:
 
 
 def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
-    """Whether an invariant is about two bodies, or a body and a zone, so that breaking it is unsafe.
+    """Whether an invariant is about two objects, or an object and a zone, so that breaking it is unsafe.
 
-    What must never be of one body alone (that the charger moves) is a matter of the work: it fails.
+    An invariant about one object alone (that the charger moves) concerns the work: breaking it is a failure.
     """
     facts = facts_of(invariant.condition)
     zones = {z.name for z in model.task.zones}
@@ -62,13 +62,13 @@ def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
 def violation(
     model: MonitoredPhases, broken: tuple[float | None, ...], now: float, *, safety: bool
 ) -> str:
-    """What an invariant that has been broken for as long as counts says, or empty.
+    """The reason for a violation: an invariant broken for long enough; or empty.
 
     Args:
         model: The task.
         broken: Since when each invariant has been broken.
         now: Seconds.
-        safety: Of those of safety, or of the others.
+        safety: Whether to consider safety invariants, or the others.
     """
     for invariant, since in zip(model.task.invariants, broken, strict=True):
         if since is None or now - since < patience(model, invariant):
@@ -86,20 +86,20 @@ def _told(model: MonitoredPhases, belief: TaskBelief, reason: str) -> str:
     """The sentence for a broken invariant, in the words of the verdict."""
     if reason == belief.evidence and belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
         return verdict_sentence(model.task.name, belief.verdict, reason)
-    if belief.verdict is Verdict.SUCCEEDED:  # which stays so: it came too late for that
+    if belief.verdict is Verdict.SUCCEEDED:  # success is final
         return f"Task `{model.task.name}` has succeeded, but {reason}."
     return f"Task `{model.task.name}`: {reason}."
 
 
 def patience(model: MonitoredPhases, invariant: Invariant) -> float:
-    """For how long an invariant must be broken to count, seconds."""
+    """How long an invariant must be broken to count, seconds."""
     if invariant.lasting is None:
         return model.settings.contrary_s
     return value(model.task.amount(invariant.lasting.duration))
 
 
 def invariant_concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondition]:
-    """A concern for each invariant that has been broken for as long as counts."""
+    """An alert condition for each invariant broken for long enough."""
     for invariant, since in zip(model.task.invariants, memory.broken_since, strict=True):
         if since is not None and memory.time - since >= patience(model, invariant):
             facts = facts_of(invariant.condition)
@@ -113,7 +113,7 @@ def invariant_concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[A
 def invariant_events(
     model: MonitoredPhases, memory: TaskMemory, new: TaskMemory, mind: Mind
 ) -> Iterator[Event]:
-    """An event of each invariant whose break has come to count in this step."""
+    """An event for each invariant whose violation counts from this step on."""
     for i, invariant in enumerate(model.task.invariants):
         must = patience(model, invariant)
         since = new.broken_since[i]

@@ -1,4 +1,4 @@
-"""What supervision remembers of a task from step to step."""
+"""The state of supervision between steps."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from visup.tasks.verification.kept import NOTHING_KEPT, Kept
 
 @dataclass(frozen=True)
 class TaskMemory:
-    """What is remembered of one task from step to step.
+    """The state of one task between steps.
 
     Attributes:
-        time: Seconds of the step in which it was last followed.
-        posterior: The hypotheses about it; None until its first actors are found.
-        belief: What was last believed.
-        interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
-            unexpected object that turns out to be one of the actors.
-        strangers: The objects that interrupted the task by being unexpected.
+        time: Time of the step in which it was last updated, seconds.
+        posterior: The hypotheses; None until its first actors are found.
+        belief: The last belief.
+        interrupted: Why the task was interrupted, or empty; permanent, unless an unexpected object turns out
+            to be one of the actors.
+        strangers: The unexpected objects that interrupted the task.
         strange_since: Since when objects have been unexplained, by id.
         broken_since: Since when each invariant has been broken, or None.
-        rival: A matching that would change who plays whom, by actor; empty when there is none.
-        rival_since: Since when it has been the better one.
-        kept: What is kept of its facts: how long they have been so, and when they paused work.
-        activity: Whether it is going on, where several tasks are given.
-        gain: The evidence that it is, of each second, as it was seen last.
-        inferred: Seconds of the step in which it was last inferred whether it is.
-        looks: What was seen while an actor is looked for, to be gone through again once it is found.
-        akin: Objects that nobody knows and that were there from the start: the rest of a machine of which
-            a part alone is known is not unexpected.
-        violated: What must never be of one body and was, by which the task has failed; or empty.
+        rival: A better casting that would change bindings, by actor; may be empty.
+        rival_since: Since when it has been better.
+        kept: State of its facts: how long they have held, and when they paused work.
+        activity: Whether it is in progress, if several tasks are given.
+        gain: Latest evidence per second that it is in progress.
+        inferred: Time of the last inference of whether it is in progress, seconds.
+        looks: Observations while an actor is missing, to be replayed once it is found.
+        akin: Unknown objects present from the start: the rest of a machine of which only a part is known is
+            not unexpected.
+        violated: The invariant about one object by which the task has failed, or empty.
     """
 
     time: float

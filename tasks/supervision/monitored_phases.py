@@ -1,8 +1,8 @@
-"""The model of supervision: phases are read off what was seen, so that they can be accounted for.
+"""The model of supervision: phases are derived from the observations, so that they can be explained.
 
-It is a model of the task filter as `HiddenPhases` is, with the same states, the same `StageHmm` and
-the same backpointers. The phase of a step is not hidden: a monitor reads it off (`step_monitor.py`).
-So a hypothesis goes on only when something seen speaks for it, not at a rate.
+Like `HiddenPhases` it is a model of the task filter, with the same states, `StageHmm` and backpointers. The
+phase of a step is not hidden but determined by a monitor (`step_monitor.py`). So a hypothesis advances only
+on evidence, not at a rate.
 """
 
 from __future__ import annotations
@@ -33,26 +33,26 @@ from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_model import StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment
 
-LEAST = 1e-13  # a hypothesis with less of the mass is given up
+LEAST = 1e-13  # hypotheses with less mass are dropped
 
 Requirement = tuple[tuple[str, ...], tuple[str, ...]]
-"""Actors, and relations between them that are asked for."""
+"""Actors, and the required relations between them."""
 
 
 SupervisionFilter = TaskFilter[int, TaskHypothesis, Observe]
-"""The task filter as it supervises."""
+"""The task filter with the model of supervision."""
 
 
 @dataclass(frozen=True)
 class MonitoredPhases:
-    """A task whose phases are read off what is seen; see `TaskModel`.
+    """A task whose phases are derived from the observations; see `TaskModel`.
 
     Attributes:
         task: The task.
         actions: Meanings of its actions, with those of comparisons and zones (see `task_vocabulary`).
         settings: Patience.
-        looks: Whether what is no plain relation of the mind holds.
-        rhythms: What is to happen again and again.
+        looks: Evaluates facts that are no plain relations of the mind.
+        rhythms: Periodic actions.
         hmm: The probabilities of the model.
     """
 
@@ -70,22 +70,22 @@ class MonitoredPhases:
 
     @cached_property
     def automaton(self) -> Automaton:
-        """The states of the course, worked out as they are come to."""
+        """The states of the course, computed on demand."""
         return Automaton(self.task)
 
     @cached_property
     def prognosis(self) -> Prognosis:
-        """What the model expects of the rest of the task."""
+        """The model's predictions for the rest of the task."""
         return Prognosis(self.automaton, self.hmm)
 
     @cached_property
     def steps(self) -> StepModel:
-        """What is read off the monitors of steps."""
+        """The interpretation of the monitors of steps."""
         return StepModel(self.actions, self.settings, self.hmm)
 
     @cached_property
     def pauses(self) -> tuple[StageCondition, ...]:
-        """The conditions that pause some of it, each once."""
+        """All pause conditions, each once."""
         return tuple(dict.fromkeys(pause_conditions(self.task)))
 
     @cached_property
@@ -99,7 +99,7 @@ class MonitoredPhases:
 
     @cached_property
     def first_steps(self) -> tuple[TaskStep, ...]:
-        """The steps with which the task may begin, whenever that is."""
+        """The steps with which the task may begin."""
         return tuple(self._open.first_steps())
 
     @cached_property
@@ -109,7 +109,8 @@ class MonitoredPhases:
     def requirements(self, node: int) -> tuple[Requirement, ...]:
         """Requirements at a node of the automaton: actors, and relations between them.
 
-        Of each step under way what it holds and expects, of each that may come next its beginning.
+        For each active step the relations by which it holds and that it expects, for each possible next one
+        those by which it begins.
         """
         if node not in self._requirements:
             self._requirements[node] = tuple(self._required(node))
@@ -146,9 +147,10 @@ class MonitoredPhases:
     def _seen_anew(
         self, posterior: TaskHypotheses, observe: Observe, now: float
     ) -> Iterator[tuple[TaskStep, Relation]]:
-        """Steps that some hypothesis waits for, and that by now have held for a whole look.
+        """Steps awaited by some hypothesis that have now held for a whole look (`look_s`).
 
-        By then a hypothesis that may go on to them has; with one alone there is none to compare it to.
+        By then any hypothesis that can advance to them has; a single hypothesis has nothing to be compared
+        to.
         """
         if len(posterior.hypotheses) == 1:
             return
@@ -163,7 +165,7 @@ class MonitoredPhases:
                 yield step, held_by
 
     def _due(self, node: int) -> tuple[TaskStep, ...]:
-        """The steps under way at a node, and those that may come next."""
+        """The active steps at a node, and the possible next ones."""
         if node not in self._known_due:
             later = (begun_by(self.automaton, t) for t in self.automaton.transitions(node))
             steps = (*self.automaton.steps(node), *(s for steps in later for s in steps))
@@ -177,12 +179,12 @@ class MonitoredPhases:
     def _false_alarms(
         self, hypothesis: TaskHypothesis, seen: Sequence[tuple[TaskStep, Relation]]
     ) -> float:
-        """How likely a hypothesis is for what it must take for false alarms."""
+        """The likelihood of a hypothesis for the observations that it must regard as false alarms."""
         alarms = (r for step, r in seen if not self._explained(hypothesis, step, r))
         return math.prod(self.hmm.false_alarm(r.confidence) for r in alarms)
 
     def _explained(self, hypothesis: TaskHypothesis, step: TaskStep, relation: Relation) -> bool:
-        """Whether a step that is seen is under way by a hypothesis, lies behind it, or helps it."""
+        """Whether an observed step is active, completed or helpful under a hypothesis."""
         for leaf in leaves(hypothesis.state):
             helps = relation.name in self.actions[leaf.step.action].helps
             if step.same_as(leaf.step) or (helps and step.actors == leaf.step.actors):
@@ -198,17 +200,17 @@ class MonitoredPhases:
         return {(x.step.stage, x.payload.status) for x in leaves(hypothesis.state)}
 
     def next_stages(self, key: int, hypothesis: TaskHypothesis) -> Mapping[str, float]:
-        """See `TaskModel`; a course of which a stage has failed for good goes nowhere."""
+        """See `TaskModel`; a course with a finally failed stage has no next stages."""
         return (
             {} if hypothesis.failed else self.prognosis.next_stages(self.hidden_state(hypothesis))
         )
 
     def success(self, key: int, hypothesis: TaskHypothesis) -> float:
-        """See `TaskModel`; a course of which a stage has failed for good has no success."""
+        """See `TaskModel`; a course with a finally failed stage cannot succeed."""
         return 0.0 if hypothesis.failed else self.prognosis.success(self.hidden_state(hypothesis))
 
     def hidden_state(self, hypothesis: TaskHypothesis) -> HiddenState:
-        """Where a hypothesis is by `StageHmm`: its phases are read off its monitors."""
+        """The state of a hypothesis in terms of `StageHmm`, with the phases of its monitors."""
         if hypothesis.finished is not None:
             return HiddenState(END, ())
         return HiddenState(
@@ -218,8 +220,8 @@ class MonitoredPhases:
     def gain(self, hypothesis: TaskHypothesis, observe: Observe) -> float:
         """Evidence per second that a task is in progress, according to a hypothesis.
 
-        The logarithm of how much likelier what is seen is than in a scene where none of it is asked
-        for: there what holds is as seldom as here its contrary.
+        The log-likelihood ratio of the observations to a scene without the task, in which a required action
+        is as rare as its contrary is here.
         """
         if hypothesis.finished is not None:
             return 0.0
@@ -228,7 +230,7 @@ class MonitoredPhases:
     def _aged(
         self, hypothesis: TaskHypothesis, observe: Observe, now: float, dt: float
     ) -> tuple[TaskHypothesis, float]:
-        """A hypothesis after `dt` seconds in which it stays where it is, and how well that fits."""
+        """A hypothesis after `dt` seconds in the same state, and its likelihood."""
         finished = hypothesis.finished
         if finished is not None and self._settled(hypothesis, finished, observe, now):
             return hypothesis, 1.0
@@ -244,7 +246,7 @@ class MonitoredPhases:
     def _settled(
         self, hypothesis: TaskHypothesis, finished: float, observe: Observe, now: float
     ) -> bool:
-        """Whether a task has been done for so long that its success is final."""
+        """Whether a task has been completed for long enough to make its success final."""
         steps = [x.step for x in leaves(hypothesis.state)]
         worked = min(observe(s).elapsed(s, finished, now) for s in steps)
         return worked > self.settings.regret_s

@@ -1,7 +1,7 @@
-"""The transitions that are open to a hypothesis, with what its monitors keep.
+"""The transitions open to a hypothesis, with its monitors.
 
-They are those of the automaton. Where a task says `within`, each entry to a stage has its own time
-at which it runs out, so that the state they lead to is worked out anew each time.
+They are those of the automaton. In a task with `within`, each entry to a stage has its own deadline, so that
+the target state is computed anew each time.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
 from visup.tasks.verification.step_monitor import StepMonitor, entered
 
 FIRST_LOOK_S = 0.5
-"""What has been so from the first look on is known so long after it: relations take a while to be judged."""
+"""Delay after the first frame, seconds, until which relations present from the start are recognised."""
 
 Target = tuple[Transition, tuple[TaskStep, ...], State[int] | None]
-"""A transition, the steps that begin by it, and the state it leads to; None at the end."""
+"""A transition, the steps that it begins, and its target state; None at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,9 @@ class OpenTransition:
 
     Attributes:
         transition: The transition of the automaton.
-        left: The steps that are over by it.
-        entered: The steps that begin by it.
-        state: Where it leads, or None at the end of the course.
+        left: The steps that it completes.
+        entered: The steps that it begins.
+        state: The target state, or None at the end of the course.
     """
 
     transition: Transition
@@ -41,20 +41,20 @@ class OpenTransition:
 
     @property
     def ends(self) -> bool:
-        """Whether it is the end of the course."""
+        """Whether it leads to the end of the course."""
         return self.state is None
 
     @property
     def share(self) -> float:
-        """Its share among the transitions that leave the same steps."""
+        """Its share among the transitions that complete the same steps."""
         return self.transition.share
 
     def taken(self, here: tuple[Leaf[StepMonitor], ...], fresh: StepMonitor) -> State[StepMonitor]:
-        """The state it leads to, which is no end; monitors of steps carried over stay.
+        """The target state, which must exist; carried steps keep their monitors.
 
         Args:
-            here: The steps under way before.
-            fresh: The monitor of each step that begins.
+            here: The active steps before.
+            fresh: The monitor of each beginning step.
         """
         assert self.state is not None
         pairs = zip(leaves(self.state), self.transition.carried, strict=True)
@@ -63,7 +63,7 @@ class OpenTransition:
 
 
 class OpenTransitions:
-    """Where hypotheses about one task begin, and the transitions open to them.
+    """The initial states of one task, and the transitions open to its hypotheses.
 
     Args:
         task: The task.
@@ -80,7 +80,7 @@ class OpenTransitions:
     def begin(self, now: float) -> list[tuple[State[StepMonitor], int]]:
         """The states in which the task may begin now, each with its number.
 
-        What was so as long as anybody has looked does not begin a stage that asks for more.
+        An action that has held since the first frame does not begin a stage that requires more.
         """
         fresh = replace(entered(now), turn=now + FIRST_LOOK_S)
         return [

@@ -1,9 +1,9 @@
-"""Judging back in time: what was seen before an actor was found counts once it is found.
+"""Replays recent observations when an actor is identified late.
 
-While an actor of a task is looked for, the task keeps what was seen, thinned out and for a bounded time.
-When an object is found to play the actor, that time is gone through again with it: the task filter starts
-from what it believed at its beginning and takes each look as it would have, had it known then. So
-nothing is weighed twice, and a stage that has passed by then is judged by what was seen of it.
+While an actor of a task is missing, past looks (observations) are stored, thinned out and for a limited time.
+When an object is found to be the actor, they are replayed with it: the task filter restarts from its belief
+at the beginning of that time and processes each look with the casting known now. So nothing is counted twice,
+and a stage that has passed meanwhile is judged by its observations.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.verification.kept import NOTHING_KEPT, Kept
 
 KEPT_S = 60.0
-"""For how long what was seen is kept."""
+"""How long looks are stored, seconds."""
 
 EVERY_S = 0.4
-"""How far apart the looks are that are kept: as far as those that the task filter weighs."""
+"""Interval of stored looks, seconds: that of the task filter."""
 
 LONGEST_STEP_S = 1.0
-"""A gap in the frames counts as no more than this."""
+"""Longest time step for a gap in the frames, seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class PastLook:
-    """The beliefs at one moment while an actor was being searched for.
+    """The beliefs at one moment while an actor was missing.
 
     Attributes:
-        mind: What was believed of the objects, without what nobody asks for later.
-        posterior: The hypotheses about the task before that look.
-        kept: What was kept of its facts before it.
+        mind: The mind, reduced to what the replay needs.
+        posterior: The hypotheses before that look.
+        kept: The state of the facts before it.
     """
 
     mind: Mind
@@ -52,13 +52,13 @@ def remembered(
     posterior: TaskHypotheses | None,
     kept: Kept,
 ) -> tuple[PastLook, ...]:
-    """The looks with the present one, if it is time for it; the oldest are forgotten.
+    """The looks with the present one if it is due; the oldest are dropped.
 
     Args:
-        looks: What was kept so far.
-        mind: What is believed now.
+        looks: The looks so far.
+        mind: The present mind.
         posterior: The hypotheses before this look.
-        kept: As of `PastLook`.
+        kept: As in `PastLook`.
     """
     if looks and mind.time - looks[-1].mind.time < EVERY_S - 1e-9:
         return looks
@@ -67,7 +67,7 @@ def remembered(
 
 
 def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -> bool:
-    """Whether an actor was found in an object that had been there before."""
+    """Whether an actor was found to be an object that was present before."""
     was = {b.actor: b.object_id for b in before}
     found = [b.object_id for b in now if b.object_id is not None and was.get(b.actor) is None]
     return any(i in mind.objects and mind.objects[i].first_seen < mind.time for i in found)
@@ -76,15 +76,15 @@ def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -
 def replayed(
     model: MonitoredPhases, looks: Sequence[PastLook], bindings: Sequence[Binding]
 ) -> tuple[TaskHypotheses | None, Kept]:
-    """The hypotheses about a task replayed over recent observations, with the casting now known.
+    """Replay stored looks with the casting known now.
 
     Args:
         model: The task with its filter.
-        looks: What was kept, oldest first.
-        bindings: Who plays whom, as it is known now.
+        looks: The looks, oldest first.
+        bindings: The present casting.
 
     Returns:
-        The hypotheses, and what is kept of the facts.
+        The hypotheses, and the state of the facts.
     """
     if not looks:
         return None, NOTHING_KEPT
@@ -100,7 +100,7 @@ def replayed(
 def followed(
     model: MonitoredPhases, posterior: TaskHypotheses | None, snapshot: TaskSnapshot
 ) -> TaskHypotheses | None:
-    """The hypotheses after one look; the task begins once all actors of one of its first steps are found."""
+    """The hypotheses after one look; the task begins once all actors of a first step are found."""
     now = snapshot.mind.time
     if posterior is None:
         found = any(snapshot.found(step.actors) for step in model.first_steps)
@@ -111,13 +111,13 @@ def followed(
 
 
 def _as_of(binding: Binding, mind: Mind) -> Binding:
-    """A binding as it would have been: unbound until its object appears."""
+    """A binding at an earlier time: unbound until its object appears."""
     there = binding.object_id in mind.objects
     return binding if there else replace(binding, object_id=None, strength=0.0)
 
 
 def _stripped(mind: Mind) -> Mind:
-    """A mind reduced to what a task requires, so that older minds are not kept alive."""
+    """A mind reduced to what a task requires, so that older minds can be freed."""
     kept = RelationMemory(measured=mind.recall(RELATIONS).measured)
     memory = {RELATIONS.name: kept, ZONES.name: mind.recall(ZONES)}
     return replace(

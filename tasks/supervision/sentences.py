@@ -1,4 +1,4 @@
-"""What supervision says: evidence of a stage, sentences of its events."""
+"""The sentences of supervision: evidence for stages, texts of events."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from visup.tasks.verification.reported import since_reported
 from visup.tasks.verification.step_monitor import StepMonitor
 
 SHORT_S = 0.6
-"""Shorter intervals are reported with their beginning, seconds."""
+"""Intervals shorter than this, seconds, are reported by their beginning only."""
 
 
 def names(words: Sequence[str]) -> str:
@@ -35,9 +35,9 @@ def evidence(
     Args:
         step: The step.
         meaning: Its action.
-        monitor: What is kept about it.
+        monitor: Its monitor.
         now: Seconds.
-        actions: All actions, for their words.
+        actions: All actions, for their wording.
     """
     who, alone = names(step.actors), len(step.actors) < 2
     have, them = ("has", "it") if alone else ("have", "them")
@@ -80,20 +80,20 @@ def outcome(
     followed: Sequence[float] = (),
     denied: float | None = None,
 ) -> tuple[Status, str]:
-    """How a step that has been left ended, and why.
+    """The status in which a step ended, and why.
 
     Args:
         step: The step.
         meaning: Its action.
-        monitor: What is kept about it.
+        monitor: Its monitor.
         now: Seconds.
-        followed: Since when each thing that comes next has been seen: what goes on until then is not told to
-            have gone on for longer.
-        denied: Since when something is seen that says that the action does not hold, or None.
+        followed: Since when each next step has been observed, which limits the reported interval of an action
+            that lasts until then.
+        denied: Since when the action has been contradicted, or None.
 
     Returns:
-        DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
-        it was seen not to hold; UNKNOWN when it could not be seen, or may have been before.
+        DONE; FAILED if it ended before its `for` was satisfied, after its deadline, or while contradicted;
+        UNKNOWN if it could not be observed, or may have held before.
     """
     who, was = names(step.actors), "was" if len(step.actors) < 2 else "were"
     if monitor.late:
@@ -125,7 +125,7 @@ def _held(
     followed: Sequence[float],
     denied: float | None,
 ) -> str:
-    """From or until when a step that is done was what it should be."""
+    """From or until when a completed step held."""
     was, have = ("was", "has") if len(step.actors) == 1 else ("were", "have")
     since, until = lasted(step, meaning, monitor, now, followed, denied)
     if until is None:
@@ -139,7 +139,7 @@ def _held(
 
 
 def in_retrospect(why: str, at: float) -> str:
-    """Evidence at the time when a stage was left, in the past perfect, since it may no longer hold.
+    """Evidence at the end of a stage, in the past perfect, since it may no longer hold.
 
     >>> in_retrospect("the arm and the part have been coupled since 3.9 s", 4.9)
     'at 4.9 s the arm and the part had been coupled since 3.9 s'
@@ -159,18 +159,18 @@ def lasted(
     followed: Sequence[float] = (),
     denied: float | None = None,
 ) -> tuple[float, float | None]:
-    """The interval reported for a step that is done, seconds.
+    """The interval reported for a completed step, seconds.
 
     The arguments are those of `outcome`.
 
     Returns:
-        Since when, and until when: None where it still is.
+        Begin and end; the end is None if it still holds.
     """
     latest = monitor.helped_since or 0.0
     if meaning.lasts or monitor.held_s == 0.0:
         since, until = _first_known(monitor), last_held(meaning, monitor, now, followed)
         told = since_reported(monitor.told, step.actors, meaning.name, since)
-        # Where something else was told in between it began anew.
+        # If something else was reported in between, it began anew.
         return (since if told == since else max(told, latest)), until
     known = max(0.0, now - monitor.held_s, latest)
     since = since_reported(monitor.told, step.actors, meaning.name, known)
@@ -178,7 +178,7 @@ def lasted(
 
 
 def _first_known(monitor: StepMonitor) -> float:
-    """When a step first held, which is before that was noticed (`begun`)."""
+    """When a step first held, before that was recognised (`begun`)."""
     known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
     return min(known, default=-math.inf)
 
@@ -186,11 +186,11 @@ def _first_known(monitor: StepMonitor) -> float:
 def last_held(
     meaning: ActionDefinition, monitor: StepMonitor, now: float, followed: Sequence[float]
 ) -> float:
-    """The end of the interval reported for a step that has been left, seconds.
+    """The end of the interval reported for a completed step, seconds.
 
     Args:
         meaning: Its action.
-        monitor: What is kept about it.
+        monitor: Its monitor.
         now: Seconds.
         followed: See `outcome`.
     """
@@ -199,12 +199,12 @@ def last_held(
         over = monitor.broken_since
     start = _first_known(monitor)
     if monitor.status is Status.PROGRESSING:
-        start = max(start, monitor.since)  # it was told to go on then
+        start = max(start, monitor.since)  # it was reported to go on then
     return min((over, *(since for since in followed if since > start)))
 
 
 def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -> str:
-    """What came before its turn, or before its delay was over."""
+    """Why a step was too early: before its turn, or before the end of its delay."""
     if step.delay is not None and monitor.hasty_s is not None:
         return (
             f"it began {max(0.0, monitor.hasty_s):.1f} s after the stage before it, "
@@ -218,7 +218,7 @@ def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -
 
 
 def paused_by(pause: Pause, task: Task, actions: Words) -> str:
-    """What pauses work, and since when: one clause."""
+    """The reason for a pause and its beginning: one clause."""
     condition = pause.condition.condition
     key, actors = (
         fact_key(task, condition) if isinstance(condition, Action | Comparison) else ("", ())
@@ -249,7 +249,7 @@ def stage_sentence(kind: str, stage: str, task: str, why: str, undone: bool = Fa
 
 def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
     """The sentence of a verdict."""
-    # What interrupts is an alert's own sentence.
+    # The reason for an interruption is the sentence of an alert.
     why = f"o{why[1:]}" if why.startswith("Object ") else why
     return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
 
@@ -286,7 +286,7 @@ def _say(relation: str, actions: Words) -> str:
 
 
 def prospects_text(belief: TaskBelief) -> str:
-    """What may come next and how likely the task still ends well, in one line."""
+    """The next stages and the probability of success, in one line."""
     if belief.success is None:
         return "next: unknown"
     if belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):

@@ -18,10 +18,10 @@ class TaskSnapshot:
     """One task at one moment: the objects that play its actors, and the observations of its actions.
 
     Args:
-        mind: What is believed.
-        bindings: Who plays which actor.
+        mind: The mind.
+        bindings: The casting.
         model: The task with the meanings of its actions.
-        before: What was kept of the facts of the step before.
+        before: The state of the facts after the previous step.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class TaskSnapshot:
         )
 
     def observe(self, step: TaskStep) -> ActionObservation:
-        """What is seen now of a step."""
+        """The present observation of a step."""
         if not step.conditions:
             return self._look(step.action, step.actors)
         if step not in self._judged:
@@ -58,20 +58,20 @@ class TaskSnapshot:
         return self._judged[step]
 
     def _judge(self, step: TaskStep) -> ActionObservation:
-        """What is seen of a step of which its course says more than its action."""
+        """The observation of a step that has conditions of its own."""
         if self.pauses.now(step.pauses) is not None:
             return ActionObservation(paused=True, pauses=self.pauses)
         seen = replace(self._look(step.action, step.actors), pauses=self.pauses)
         return self._conditions.apply(step, seen)
 
     def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
-        """Whether a condition holds, and has for as long as it must."""
+        """Whether a condition holds, and has for the required time."""
         return self._conditions.relation(condition, lasting).truth
 
     @property
     def kept(self) -> Kept:
-        """The state of the facts to keep for the next step."""
-        # Nobody asks for what is paused: it is so after the pause since it was so before.
+        """The state of the facts for the next step."""
+        # Facts are not evaluated during a pause: they keep their state.
         return self._relations.kept(self.pauses, self.pauses.now(self._pausing) is not None)
 
     def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
@@ -89,10 +89,10 @@ class TaskSnapshot:
         return self._look(action, actors).holds
 
     def found(self, actors: tuple[str, ...]) -> bool:
-        """Whether each of some actors is played by an object."""
+        """Whether all the given actors are bound to objects."""
         return all(self._objects.get(a) is not None for a in actors)
 
     def objects(self, actors: tuple[str, ...]) -> tuple[int, ...]:
-        """Ids of the objects that play some actors; those not found are left out."""
+        """Ids of the objects of the given actors, without unbound ones."""
         ids = (self._objects.get(a) for a in actors)
         return tuple(i for i in ids if i is not None)

@@ -1,8 +1,7 @@
 """Supervision of tasks: the reasoner of the cycle's match phase (paper, sections 6 and 7.4).
 
-In each step the actors of every task are matched to objects, what is seen of them is taken into
-the hypotheses of the task, and the best hypothesis says which stage is under way, how it stands, what
-should be seen next and what the verdict is.
+In each step the actors of every task are matched to objects, the hypotheses of the task are updated with the
+observations, and the belief about stages, expectations and verdict is derived from them.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ from visup.tasks.verification.step_monitor import BAD
 MEMORY: MemoryKey[tuple[TaskMemory, ...]] = MemoryKey("tasks", ())
 OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
-UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often than this
+UNREPORTED_S = 0.2  # interval of updates of a task that is not reported
 
 
 def task_reasoner(
@@ -80,18 +79,18 @@ def task_reasoner(
     """The reasoner that supervises some tasks.
 
     Args:
-        tasks: Tasks, checked (see `parse_task`). One is taken to be going on; of several it is
-            inferred which are (see `task_inference.py`), and the others are not told about.
+        tasks: Checked tasks (see `parse_task`). A single one is assumed to be in progress; of several it is
+            inferred which are (see `task_inference.py`), and the others are not reported.
         settings: Patience and thresholds.
-        actions: Meanings of actions; None for all that are known, with those of plug-ins.
+        actions: Meanings of actions; None for all known ones, including those of plug-ins.
 
     Returns:
-        A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
-        in order, keeps its memory under `MEMORY`, and gives events 'stage_started',
+        A pure function of mind and observation. It updates `Mind.tasks`, one belief per task in order, stores
+        its memory under `MEMORY`, and gives events 'stage_started',
         'stage_progressing', 'stage_paused', 'stage_resumed',
         'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
         'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
-        'verdict', and concerns 'stage_failing' and 'invariant_broken'.
+        'verdict', and alert conditions 'stage_failing' and 'invariant_broken'.
     """
     known = actions or known_actions()
     return TaskReasoner(tuple(_model(t, known, settings) for t in tasks))
@@ -102,7 +101,7 @@ class TaskReasoner:
     """Supervises tasks; see `task_reasoner`.
 
     Attributes:
-        models: The tasks, made ready.
+        models: The prepared tasks.
     """
 
     models: tuple[MonitoredPhases, ...]
@@ -113,7 +112,7 @@ class TaskReasoner:
         return tuple(m.task for m in self.models)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Process one step; see `Reasoner`."""
         before = _recall(mind, self.models)
         each = zip(self.models, before, strict=True)
         seen = tuple(_follow(f, m, mind) if _due(m, mind.time) else m for f, m in each)
@@ -125,14 +124,13 @@ class TaskReasoner:
 
 
 def finish(belief: TaskBelief) -> Verdict:
-    """The verdict on a task once nothing more will be seen of it.
+    """The final verdict on a task at the end of a run.
 
     Args:
         belief: The last belief about the task.
 
     Returns:
-        The verdict as it stands, with a task that was failing at the end failed, and one of which
-        nothing was seen unknown.
+        The verdict; FAILED for a task that was failing at the end, UNKNOWN for one that was never observed.
     """
     if belief.verdict is Verdict.IN_PROGRESS and any(s.status in BAD for s in belief.stages):
         return Verdict.FAILED
@@ -144,7 +142,7 @@ def _model(
 ) -> MonitoredPhases:
     words = task_vocabulary(task, actions)
     model = MonitoredPhases(task, words.meanings, settings, words.looks, words.rhythms)
-    model.filter.success(model.filter.start())  # so that no step has to work out the whole course
+    model.filter.success(model.filter.start())  # explores the course now rather than in a step
     return model
 
 
@@ -164,10 +162,10 @@ def _blank(model: MonitoredPhases, now: float, activity: TaskActivity) -> TaskMe
 
 
 def _due(memory: TaskMemory, now: float) -> bool:
-    """Whether a task is followed in this step.
+    """Whether a task is updated in this step.
 
-    One that is told about is, in each step. Those that are not are looked at together, so that none
-    of some rivals has a lead, at their own pace: it costs that one of them is told so much later.
+    A reported task is, in each step. The others are updated together, so that no rival has an advantage, at a
+    lower rate, which delays their reports accordingly.
     """
     return memory.activity.reportable or not 0.0 < now - memory.time < UNREPORTED_S - 1e-9
 
@@ -175,7 +173,7 @@ def _due(memory: TaskMemory, now: float) -> bool:
 def _inferred(
     before: tuple[TaskMemory, ...], seen: tuple[TaskMemory, ...], now: float
 ) -> tuple[TaskMemory, ...]:
-    """The memory of tasks after inference of which are in progress."""
+    """The memories of tasks after inferring which are in progress."""
     if len(seen) == 1:
         return seen
     dt = now - before[0].inferred
@@ -201,10 +199,10 @@ def _ends(before: TaskMemory, now: TaskMemory) -> bool:
 def _with_activity(
     told: TaskBelief, memory: TaskMemory, activity: TaskActivity, now: float
 ) -> TaskMemory:
-    """A memory with its activity; for a task that is not in progress, nothing else is believed.
+    """A memory with its activity; the belief about a task that is not in progress is suppressed.
 
-    What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
-    what interrupts it, which is no matter of the task.
+    A reported failure or end of a task remains whatever follows. So does an interruption, which does not
+    depend on the task.
     """
     if memory.belief is told and memory.activity == activity:
         return replace(memory, inferred=now)
@@ -214,16 +212,16 @@ def _with_activity(
         return replace(memory, activity=activity, belief=belief, inferred=now)
     posterior = memory.posterior
     if memory.activity.begun and not activity.begun:
-        posterior = None  # a rival has ended; what follows is another matter
+        posterior = None  # a rival has ended; later observations do not belong to it
     if posterior and any(x.payload.status in BAD for x in leaves(posterior.likeliest.state)):
-        posterior = None  # if it begins yet, it begins from its beginning
+        posterior = None  # if it begins later, it begins from its beginning
     memory = memory if posterior is memory.posterior else replace(memory, looks=())
     belief = suppressed(belief, activity)
     return replace(memory, activity=activity, belief=belief, posterior=posterior, inferred=now)
 
 
 def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemory:
-    """One step of one task: bind its actors, follow its hypotheses, judge."""
+    """One step of one task: bind its actors, update its hypotheses, derive the belief."""
     settings, now = model.settings, mind.time
     bindings, rival, rival_since = _bind(model, memory, mind)
     start, kept = memory.posterior, memory.kept
@@ -275,7 +273,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
 
 
 def _awaited(model: MonitoredPhases, bindings: Sequence[Binding]) -> bool:
-    """Whether an actor that the task depends on is still being searched for."""
+    """Whether an actor that the task depends on is still missing."""
     unbound = (b.actor for b in bindings if b.object_id is None)
     return any(not model.task.actor(a).optional for a in unbound)
 
@@ -286,7 +284,7 @@ def _events(
     """The events of one task after a step."""
     yield from activity_events(memory.activity, new.activity, new.belief, mind)
     if not new.activity.reportable and memory.activity.reportable:
-        return  # that it is not going on says all
+        return  # the end of its activity is the only event
     yield from stage_events(memory.belief, new.belief, mind, model.task)
     yield from revision_events(memory.belief, new.belief, _revised(memory, new), mind)
     yield from invariant_events(model, memory, new, mind)
@@ -298,7 +296,7 @@ def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondi
 
 
 def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
-    """Steps of stages that were reported done and are not any more."""
+    """Steps of stages that were reported done and are no longer."""
     before, after = memory.posterior, new.posterior
     undone = done_stages(memory.belief) - done_stages(new.belief)
     if before is None or after is None or not undone:
@@ -313,9 +311,9 @@ def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
 def _bind(
     model: MonitoredPhases, memory: TaskMemory, mind: Mind
 ) -> tuple[tuple[Binding, ...], tuple[int | None, ...], float]:
-    """The bindings now, and the rival matching with the time since when it has been better.
+    """The present bindings, and the rival casting with the time since when it has been better.
 
-    A matching that takes an actor from an object that is still there must last to be believed.
+    A casting that takes an actor from an object that is still present must persist to be accepted.
     """
     before = memory.belief.bindings
     found = match(model.task, mind, before, _current_actors(memory), model.settings)
@@ -337,7 +335,7 @@ def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
 
 
 def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, int]) -> Binding:
-    """The same binding with the strength that it has now."""
+    """The same binding with its present strength."""
     belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
     if belief is None:
         return replace(binding, object_id=None, strength=0.0)
@@ -350,7 +348,7 @@ def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, i
 def _strange(
     model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[tuple[int, float], ...]:
-    """Objects that are unexplained now, each with the time since when."""
+    """Objects that are unexplained now, each with its start time."""
     before = dict(memory.strange_since)
     optional = {a.name for a in model.task.actors if a.optional}
     now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional, model.task)
@@ -366,7 +364,7 @@ def _interrupted(
 ) -> tuple[str, tuple[int, ...]]:
     """Why the task is interrupted by something unsafe, or empty; and by which unexpected objects.
 
-    A task that is over is not interrupted, nor is any by bystanders.
+    A task that has ended is not interrupted, and bystanders interrupt none.
     """
     if memory.belief.verdict in OVER:
         return "", ()

@@ -1,14 +1,14 @@
 """Which of several tasks are in progress, inferred from how well each explains the observations.
 
-Each task gathers evidence: the logarithm of how likely what is seen of its actions is if it is going on,
-against a scene in which it is not (`Follower.gain`). Evidence fades, so that a task that was done long
-ago makes room. Tasks that share an object are rivals: at most one of them is going on, or none. That none
-is stays a rival until one has been believed; after that a task that goes badly is one that fails, not
-one that never was, unless a rival explains better what is seen.
+The evidence for a task is the log-likelihood ratio of the observations of its actions, in progress against
+not in progress (`MonitoredPhases.gain`). It fades, so that a task completed long ago does not block others.
+Tasks that share an object are rivals: at most one of them is in progress. That none is in progress is an
+alternative until one has been believed; after that a task that goes badly is failing rather than never begun,
+unless a rival explains the observations better.
 
-The approximation: evidence is taken along the likeliest hypothesis of each task, not summed over all of
-them, and that a hypothesis passed over a step is not held against its task; tasks that share no object are
-taken to be independent. So a task whose end alone is seen may be taken to be going on.
+Approximations: evidence is taken along the most likely hypothesis of each task, not summed over all, and
+passing over a step is not counted against a task; tasks that share no object are treated as independent. So a
+task of which only the end is seen may be considered in progress.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 FADES_S = 20.0
-"""Evidence is forgotten with this time constant, seconds."""
+"""Time constant with which evidence fades, seconds."""
 
 MOST = 12.0
-"""Evidence for or against a task is never stronger than this, natural logarithm."""
+"""Limit of the evidence for or against a task, natural logarithm."""
 
 IDLE = 3.0
-"""How much likelier it is beforehand that none of some rivals is going on than that one of them is."""
+"""Prior log-odds that none of some rivals is in progress against one of them."""
 
 SURE = 0.9
-"""Once some task is so likely to be going on, that none is is out of the question."""
+"""Probability of a task from which on the alternative that none is in progress is excluded."""
 
 REPORTABLE = 0.3
-"""A task less likely than this to be going on is not told about."""
+"""A task less likely than this is not reported."""
 
 EXCLUDED = 0.05
-"""What a task less likely than this asks for is not expected."""
+"""The requirements of a task less likely than this are not expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +41,10 @@ class TaskActivity:
     """The belief about whether a task is in progress.
 
     Attributes:
-        evidence: Logarithm of how much likelier what was seen is if it is.
-        chance: How likely it is going on, 0 to 1.
+        evidence: Log-likelihood ratio that it is.
+        chance: Probability that it is, 0 to 1.
         begun: Whether it or a rival was once believed to be.
-        ended: Whether it was, and is over.
+        ended: Whether it was, and has ended.
     """
 
     evidence: float = 0.0
@@ -64,10 +64,10 @@ class TaskActivity:
 
 
 ALONE = TaskActivity(MOST, 1.0, True)
-"""A task that is the only one given is taken to be going on."""
+"""The activity of a single task, which is assumed to be in progress."""
 
 ENDED = TaskActivity(MOST, 1.0, True, True)
-"""A task that was going on, and is over."""
+"""The activity of a task that has ended."""
 
 
 def updated_activities(
@@ -80,15 +80,15 @@ def updated_activities(
     """The probability that each of several tasks is in progress.
 
     Args:
-        before: What was believed of each.
+        before: The previous activities.
         gains: The evidence of the last `dt` seconds for each.
-        cast: The objects that play the actors of each.
+        cast: The objects of the actors of each.
         dt: Seconds.
-        over: Which of them have ended, well or badly; none by default. What was seen is explained by
-            them, so that their rivals begin anew.
+        over: Which of them have ended, with or without success; none by default. They explain the past
+            observations, so that their rivals begin anew.
 
     Returns:
-        One for each, in order.
+        The activities, in order.
     """
     if len(before) == 1:
         return (ALONE,)
@@ -114,7 +114,9 @@ def _rivalling(
     fade = math.exp(-dt / FADES_S)
     counted = zip(before, _counted(gains, begun), strict=True)
     evidence = [fade * a.evidence + gain for a, gain in counted]
-    most = max(0.0, max(evidence) - MOST)  # what is beyond tells rivals apart all the same
+    most = max(
+        0.0, max(evidence) - MOST
+    )  # shift all by the excess, which preserves their differences
     evidence = [max(-MOST, e - most) for e in evidence]
     chances = shares(evidence, none=not begun)
     begun = begun or sum(chances) >= SURE
@@ -123,7 +125,7 @@ def _rivalling(
 
 
 def _counted(gains: Sequence[float], begun: bool) -> Sequence[float]:
-    """Losses count against a task that was believed only while a rival gains."""
+    """Negative evidence counts against a believed task only while a rival gains."""
     if not begun or max(gains) > 0.0:
         return gains
     return [0.0] * len(gains)

@@ -63,7 +63,7 @@ def formatted(text: str) -> str:
         The same statements and comments; `formatted(formatted(text)) == formatted(text)`.
 
     Raises:
-        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+        lark.exceptions.UnexpectedInput: At a syntax error.
     """
     words = list(_words(text))
     statements = list(_statements(words))
