@@ -18,7 +18,7 @@ from visup.agent.storage.journal import Journal
 from visup.evaluation.serving.account import Ledger
 from visup.evaluation.serving.night import Kill, Killer, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
-from visup.evaluation.serving.rehearsal import evaluate_serving, failed
+from visup.evaluation.serving.rehearsal import evaluate_serving, failed, prepare_store
 from visup.evaluation.serving.scene import CROSSING, SIZE, jpegs, scene
 from visup.evaluation.serving.streams import TroubledStream
 from visup.percepts.video import open_source
@@ -127,7 +127,22 @@ def test_who_was_killed_is_back_with_the_next_frame(tmp_path: Path) -> None:
     assert kill.back_s is not None
 
 
-def test_a_store_that_holds_something_is_left_alone(tmp_path: Path) -> None:
+def test_a_store_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("")
-    with pytest.raises(SettingsError, match="empty folder"):
+    with pytest.raises(SettingsError, match="not empty") as refused:
         evaluate_serving(1.0, store=tmp_path)
+    assert refused.value.hint
+    assert [p.name for p in tmp_path.iterdir()] == ["mine"]
+
+
+@pytest.mark.parametrize("below", ["", "runs"])
+def test_a_store_that_is_a_file_or_below_one_is_refused(tmp_path: Path, below: str) -> None:
+    (tmp_path / "mine").write_text("")
+    with pytest.raises(SettingsError, match="is a file"):
+        evaluate_serving(1.0, store=tmp_path / "mine" / below)
+
+
+def test_a_store_that_does_not_exist_is_created(tmp_path: Path) -> None:
+    prepare_store(tmp_path / "disk" / "store")
+    prepare_store(tmp_path / "disk" / "store")
+    assert (tmp_path / "disk" / "store").is_dir()

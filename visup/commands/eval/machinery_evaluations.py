@@ -235,7 +235,7 @@ MACHINERY_EVALUATIONS = (
                 Path | None,
                 None,
                 Option(
-                    "An empty folder; if on a disk of at most 4 GB, the disk is filled from time to time."
+                    "An empty or new folder; a disk of at most 4 GB is filled from time to time."
                 ),
             ),
             Setting(

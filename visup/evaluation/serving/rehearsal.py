@@ -66,7 +66,7 @@ def evaluate_serving(
     Args:
         minutes: How long.
         kill_every: Seconds between two kills.
-        store: An empty folder for its runs; on a small disk (at most 4 GB) that is filled now and then.
+        store: A folder for its runs, empty or new; on a small disk (at most 4 GB) that is filled at times.
         seed: Of all that goes wrong.
         so_far: A file that has the figures so far, written each minute.
         progress: Shows what is being done.
@@ -75,16 +75,49 @@ def evaluate_serving(
         `items` by camera: `alerts`, `lost`, `twice`, `resent`, `unrecorded`, `without_evidence`, `wrong`,
         `kills`, `slowest_s`, `frames`, `dropped`, `restarts`, `cpu` (share of a processor);
         `total`: sums, `median_s` of a return, `memory_growth` (share, from the second quarter to the last),
-        `memory_mb` by the minute, `closing_s`, `exit_code`, what went wrong how often, and `camera_costs`.
+        `memory_mb` by the minute, `closing_s`, `exit_code`, counts of the faults, and `camera_costs`.
+
+    Raises:
+        SettingsError: The store cannot be created or is not empty.
     """
-    if store is not None and (not store.is_dir() or any(store.iterdir())):
-        raise SettingsError("the store is not an empty folder", where=str(store))
+    if store is not None:
+        prepare_store(store)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         stage = Rehearsal(folder, store or folder / "store", seed, stack, so_far)
         told = stage.rehearse(minutes, kill_every, progress)
     progress("what a camera takes")
     return {**told, "total": {**told["total"], **camera_costs(seed)}}
+
+
+def prepare_store(store: Path) -> None:
+    """Create the store, or accept an empty folder.
+
+    Raises:
+        SettingsError: It is a file, is not empty, or cannot be created.
+    """
+    try:
+        store.mkdir(parents=True, exist_ok=True)
+        occupied = any(store.iterdir())
+    except (FileExistsError, NotADirectoryError) as fault:
+        raise SettingsError(
+            "the store, or a folder above it, is a file",
+            where=str(store),
+            expected="a folder, empty or new",
+        ) from fault
+    except OSError as fault:
+        raise SettingsError(
+            f"the store cannot be created or read ({fault.strerror})",
+            where=str(store),
+            hint="choose a folder that you may write to",
+        ) from fault
+    if occupied:
+        raise SettingsError(
+            "the store is not empty",
+            where=str(store),
+            expected="an empty or new folder, since the runs in it are counted",
+            hint="choose another folder, or move its content away",
+        )
 
 
 class Rehearsal:
