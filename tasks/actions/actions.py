@@ -1,8 +1,8 @@
-"""What each action means: when it holds, begins, progresses, is over, and what is its contrary.
+"""The meaning of each action: when it holds, begins, progresses and ends, and its contrary.
 
-The actions of tasks stand in one table, `ACTIONS`; the words in it are names of relations in the
-mind. `known_actions` adds the words and quantities of rules (`vocabulary.py`) and what installed
-packages offer under the entry point group `visup.actions`.
+The table `ACTIONS` defines actions by names of relations in the mind. `known_actions` adds the words and
+quantities of rules (`vocabulary.py`) and those of installed packages in the entry point group
+`visup.actions`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from visup.agent.model.errors import TaskError
 
 GROUP = "visup.actions"
 ALL_PERCEPTS = frozenset({"region", "hypothesis", "depth", "health", "signal"})
-"""Kinds of percept that visup's own behaviours give; signals where somebody tells them."""
+"""Kinds of percept of visup's own behaviours; signals if a source is configured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,18 +28,19 @@ class ActionDefinition:
         name: The action, as in a task file.
         holds: The action holds while one of these relations is true.
         arity: How many actors it takes.
-        lasts: Whether it goes on until something else is seen to begin (`converging`), rather
-            than being over once it has held long enough (`coupled`).
-        hold_s: Seconds for which it must have held to count as done, unless `for` says otherwise.
-        entry: It is seen to begin when one of these is true; `holds` when empty.
-        progress: Further relations that bring it nearer although it does not hold yet.
-        contrary: Relations that say that it fails.
-        expects: Further relations that are no reason for worry while it is asked for.
-        text: "are `converging`": what is said of the actors when it holds.
-        takes: 'object' or 'zone' for each actor; all objects when empty.
-        measures: What a quantity measures ('length', 'time', ...); empty for a relation.
+        lasts: Whether it lasts until something else begins (`converging`), rather than ending once it has
+            held
+            long enough (`coupled`).
+        hold_s: Seconds for which it must hold to count as done, without a `for`.
+        entry: It begins when one of these relations is true; `holds` if empty.
+        progress: Further relations that approach it although it does not hold yet.
+        contrary: Relations that mean that it fails.
+        expects: Further relations that are expected while it is required.
+        text: "are `converging`": predicate of the actors when it holds.
+        takes: 'object' or 'zone' for each actor; all objects if empty.
+        measures: Dimension of a quantity ('length', 'time', ...); empty for a relation.
         needs: Kinds of percept without which it is never observed.
-        about: One clause for people who choose among actions.
+        about: One clause of description for users.
     """
 
     name: str
@@ -59,17 +60,17 @@ class ActionDefinition:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each of its actors is: 'object' or 'zone'."""
+        """The kind of each of its actors: 'object' or 'zone'."""
         return self.takes or ("object",) * self.arity
 
     @property
     def begins(self) -> tuple[str, ...]:
-        """Relations one of which shows that the action has begun."""
+        """Relations any of which shows that the action has begun."""
         return self.entry or self.holds
 
     @property
     def helps(self) -> tuple[str, ...]:
-        """Relations one of which shows that it holds or comes nearer."""
+        """Relations any of which shows that it holds or approaches."""
         return (*self.holds, *self.progress)
 
 
@@ -200,17 +201,17 @@ _TABLE = (
 )
 
 ACTIONS: Mapping[str, ActionDefinition] = MappingProxyType({m.name: m for m in _TABLE})
-"""The actions that visup supervises with a meaning of their own."""
+"""The built-in actions."""
 
 
 @lru_cache(maxsize=1)
 def known_actions() -> Mapping[str, ActionDefinition]:
-    """All that a task may ask for, by name: `ACTIONS`, the words of rules, those of plug-ins.
+    """All available actions by name: `ACTIONS`, the words of rules, those of plug-ins.
 
     Raises:
         TaskError: A plug-in's action cannot be loaded, or its name is taken.
     """
-    from visup.tasks.actions.vocabulary import rule_actions  # rules bring NumPy with them
+    from visup.tasks.actions.vocabulary import rule_actions  # heavy import: rules use NumPy
 
     known: Mapping[str, ActionDefinition] = {**{m.name: m for m in rule_actions()}, **ACTIONS}
     for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
@@ -221,7 +222,7 @@ def known_actions() -> Mapping[str, ActionDefinition]:
 def with_actions(
     known: Mapping[str, ActionDefinition], more: Iterable[ActionDefinition]
 ) -> dict[str, ActionDefinition]:
-    """Some actions and more of them.
+    """Add actions.
 
     Raises:
         TaskError: The name of one is taken.

@@ -1,4 +1,4 @@
-"""Actions in words, for lists and editors."""
+"""Descriptions of actions for lists and editors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ NAMES |= {"signal": ("battery", "battery", "battery"), "word": ("mode", "auto", 
 
 
 def written(meaning: ActionDefinition) -> str:
-    """How an action is written, with letters for its actors: `gap(a, b) < 5 px`."""
+    """The syntax of an action, with letters for its actors: `gap(a, b) < 5 px`."""
     actors = ", ".join(NAMES.get(k, NAMES["object"])[i] for i, k in enumerate(meaning.kinds))
     unit = next((u for u, (d, by) in UNITS.items() if (d, by) == (meaning.measures, 1.0)), "%")
     compared = f" < 5 {unit}" if meaning.measures else ""
@@ -18,7 +18,7 @@ def written(meaning: ActionDefinition) -> str:
 
 
 def described(meaning: ActionDefinition) -> str:
-    """An action in some lines of Markdown: how it is written, when it holds, ends and fails."""
+    """A description of an action in Markdown: its syntax, and when it holds, ends and fails."""
     lines = [f"`{written(meaning)}`", meaning.about or meaning.text]
     if meaning.measures:
         lines.append(f"A quantity; it measures: {meaning.measures.replace('_', ' ')}.")

@@ -24,14 +24,14 @@ from visup.tasks.grammar.units import value
 
 
 def floor_map(ground: Ground | None) -> Floats | None:
-    """(3, 3) homography from the image, pixels, to the floor, metres; None where there is none."""
+    """(3, 3) homography from the image, pixels, to the floor, metres; or None."""
     if ground is None:
         return None
     return homography(ground.image, [(value(x), value(y)) for x, y in ground.floor])
 
 
 def floor_polygon(zone: ZoneDeclaration, ground: Ground | None) -> NDArray[np.float64] | None:
-    """(K, 2) a zone of the floor as it lies in the image, pixels; None where nobody knows."""
+    """(K, 2) a zone of the floor in image coordinates, pixels; None without a ground."""
     h = floor_map(ground)
     if h is None or not zone.floor:
         return None
@@ -43,12 +43,12 @@ def floor_polygon(zone: ZoneDeclaration, ground: Ground | None) -> NDArray[np.fl
 def stands_in(
     belief: ObjectBelief, polygon: NDArray[np.float64], question: str, frame_size: tuple[int, int]
 ) -> Truth:
-    """Whether a body stands in a zone of the floor; unknown while its feet are not in the image.
+    """Whether an object stands in a zone of the floor; unknown while its foot points are outside the image.
 
     Args:
-        belief: The body.
-        polygon: (K, 2) the zone as it lies in the image.
-        question: 'inside' (the middle of its feet), 'reaching' (some of them), 'wholly_inside'.
+        belief: The object.
+        polygon: (K, 2) the zone in image coordinates.
+        question: 'inside' (the middle of its foot points), 'reaching' (any of them), 'wholly_inside'.
         frame_size: (width, height) pixels.
     """
     feet = foot_points(belief.region, frame_size)
@@ -60,7 +60,7 @@ def stands_in(
 
 
 def floor_distance(ground: Ground | None) -> Callable[[Snapshot, tuple[int, ...]], float]:
-    """How far apart two bodies stand, metres; NaN where that is not known."""
+    """The distance of two objects on the floor, metres; NaN if not known."""
     h = floor_map(ground)
 
     def measure(facts: Snapshot, rows: tuple[int, ...]) -> float:

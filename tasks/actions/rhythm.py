@@ -1,10 +1,8 @@
-"""What happens again and again: whether it keeps time.
+"""Periodic actions: whether they keep their period.
 
-A *beat* is a moment in which something begins to be so. It came in time when it came no sooner than the
-shortest period and no later than the longest one after the beat before it; the first one always did. An
-action keeps time while the last beat that came in time is no longer ago than the longest period.
-
-What could not be observed is not held against it: such time makes no period too long.
+A *beat* is a moment in which an action begins to hold. It is in time if it comes between the shortest and the
+longest period after the previous beat; the first always is. An action keeps its period while the last beat in
+time is no longer ago than the longest period. Unobserved time does not count towards a period.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from visup.agent import Truth
 from visup.agent.model.fast_replace import replace
 
 CLOSE_S = 1e-9
-"""Times that differ by less are the same."""
+"""Times that differ by less, seconds, are equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +22,13 @@ class Beats:
 
     Attributes:
         time: That moment.
-        so: Whether it was so when it was last observed.
-        seen_s: For how long it has been observed.
-        last: When the last beat was, or None before the first.
-        last_seen_s: For how long it had been observed then.
-        good_seen_s: The same of the last beat that came in time.
-        since: Since when it has kept time, or not.
-        keeps: Whether it keeps time.
+        so: Whether the action held when last observed.
+        seen_s: Total observed time.
+        last: Time of the last beat, or None before the first.
+        last_seen_s: Observed time at the last beat.
+        good_seen_s: Observed time at the last beat in time.
+        since: Since when it has kept its period, or not.
+        keeps: Whether it keeps its period.
     """
 
     time: float
@@ -44,7 +42,7 @@ class Beats:
 
     @property
     def late(self) -> bool:
-        """Whether there was a beat, and it keeps time no more."""
+        """Whether there was a beat and the period is no longer kept."""
         return self.last is not None and not self.keeps
 
 
@@ -55,15 +53,15 @@ def heard(
     moment: tuple[float, float],
     period: tuple[float, float],
 ) -> Beats:
-    """The beats with what is seen now.
+    """Update the beats with the present observation.
 
     Args:
-        before: The beats so far; None where nobody listened.
-        truth: Whether it is so now.
+        before: The beats so far, or None.
+        truth: Whether the action holds now.
         since: Since when.
-        moment: When a task was last looked at, and now, seconds: where nobody listened in between, that
-            time was not observed.
-        period: The shortest and the longest, seconds.
+        moment: Times of the last update of the task and of now, seconds; without `before` the time between
+            was not observed.
+        period: The shortest and the longest period, seconds.
     """
     looked, now = moment
     beats = Beats(now, since=now) if before is None else before
@@ -79,7 +77,7 @@ def heard(
 
 
 def _with_beat(beats: Beats, at: float, now: float, period: tuple[float, float]) -> Beats:
-    """The beats with one more."""
+    """The beats with a further one."""
     seen_s = beats.seen_s - (now - at)
     good = beats.last is None
     if beats.last is not None:
@@ -91,13 +89,13 @@ def _with_beat(beats: Beats, at: float, now: float, period: tuple[float, float])
 
 @dataclass(frozen=True, slots=True)
 class Rhythm:
-    """An action that is to happen again and again.
+    """A periodic action.
 
     Attributes:
-        key: Its key, by which its beats are kept.
-        holds: Relations by one of which it is so.
-        period: The shortest and the longest, seconds.
-        late: Whether what is meant is that it does not keep time.
+        key: Key of its beats.
+        holds: Relations any of which means that the action holds.
+        period: The shortest and the longest period, seconds.
+        late: Whether the condition is that the period is not kept.
     """
 
     key: str

@@ -1,8 +1,8 @@
-"""The words of rules as actions: the one seam between the task language and the rule language.
+"""Words of the rule language as actions: the interface between the two languages.
 
-Every relation and fact of `rules/` that speaks of objects and zones can be asked for by a stage,
-and every quantity can be compared. A fact of a task file that is not a plain relation of the mind
-(a word of rules, a comparison, a zone) gets a key, and a look that says whether it holds.
+Every relation and predicate of `rules/` about objects and zones can be required by a stage, and every
+quantity can be compared. A fact of a task file that is not a plain relation of the mind (a predicate, a
+comparison, a zone) gets a key and an evaluator.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from visup.tasks.grammar.structure import fact_key, period_of
 from visup.tasks.grammar.units import MEASURES, SIZE, dimension, value
 
 OF_TASKS = frozenset({"unexpected", "expected", "actor", "bystander", "one_machine"})
-"""Words of rules that speak of tasks themselves: a task that asked for them would ask for itself."""
+"""Words of rules about tasks, which would be circular in a task."""
 
 BETWEEN = "between"
 DEPTHS = frozenset({"region", "hypothesis", "depth"})
 
 NEARNESS = frozenset({"gap", "distance"})
-"""Quantities that are small of bodies that are near each other."""
+"""Quantities that are small for objects near each other."""
 
 FactEvaluator = Callable[[Snapshot, tuple[int, ...]], Truth]
-"""Whether something holds between objects, by id, in a mind as rules see it."""
+"""Evaluates a fact for objects, by id, in a snapshot."""
 
 
 Measured = Callable[[Snapshot, tuple[int, ...]], tuple[float, float]]
-"""The interval of a quantity of objects, by their places among the facts, in the base unit."""
+"""Returns the interval of a quantity of objects, by their rows in the snapshot, in the base unit."""
 
 
 def rule_actions() -> Iterator[ActionDefinition]:
-    """Every word and quantity of rules that a task may ask for."""
+    """Every word and quantity of rules that is available in tasks."""
     for name, word in PREDICATES.items():
         if _fits(name, word.takes):
             text = name.replace("_", " ")
@@ -92,12 +92,12 @@ def _fits(name: str, takes: tuple[str, ...]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class TaskVocabulary:
-    """What the facts of one task mean.
+    """The meanings of the facts of one task.
 
     Attributes:
         meanings: Actions by name, and comparisons and actions on zones by key.
-        looks: Key or word -> whether it holds; plain relations of the mind are not among them.
-        rhythms: Keys of what is to happen again and again, and of its failing to.
+        looks: Key or word -> evaluator, except for plain relations of the mind.
+        rhythms: Keys of periodic actions, and of their contraries.
     """
 
     meanings: Mapping[str, ActionDefinition]
@@ -106,10 +106,10 @@ class TaskVocabulary:
 
 
 def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> TaskVocabulary:
-    """What the facts of a task mean.
+    """The vocabulary of a task.
 
     Args:
-        task: A task without mistakes.
+        task: A valid task.
         actions: All actions.
     """
     zones = {z.name for z in task.zones}
@@ -144,7 +144,7 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             meaning, name=key, holds=(key,), arity=len(takes), takes=takes, text=text
         )
         if isinstance(fact, Comparison) and fact.operator == BETWEEN:
-            # To stay within a range goes on until the next thing begins, and fails outside it.
+            # Staying within a range lasts until the next step begins, and fails outside it.
             outside = f"outside {key}"
             looks[outside] = _outside(looks[key])
             meanings[key] = replace(meanings[key], lasts=True, contrary=(outside,))
@@ -154,7 +154,7 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
 
 
 def _compared(fact: Comparison, name: str, amounts: Sequence[Number]) -> str:
-    """How a comparison is told: "at a gap below 20 px"."""
+    """The wording of a comparison: "at a gap below 20 px"."""
     if name in SIGNAL_WORDS:
         return f"as `{fact}` says"
     said = " and ".join(map(str, amounts))
@@ -170,14 +170,14 @@ def _asks_for_nearness(fact: Fact) -> bool:
 
 
 def _draws_near(action: ActionDefinition) -> ActionDefinition:
-    """Whoever shall be near another may draw nearer to it."""
+    """An action that requires nearness also expects approaching."""
     return replace(action, expects=("converging",))
 
 
 def _again(
     key: str, of: ActionDefinition, period: tuple[float, float], said: str
 ) -> tuple[tuple[ActionDefinition, Rhythm], tuple[ActionDefinition, Rhythm]]:
-    """An action that happens again and again, which lasts while it keeps time, and its contrary."""
+    """A periodic action, which lasts while it keeps its period, and its contrary."""
     late = f"out of time {key}"
     expects = tuple(dict.fromkeys((of.name, *of.helps, *of.expects)))
     again = replace(
@@ -198,7 +198,7 @@ def _again(
 
 
 def _facts(task: Task) -> Iterator[Fact]:
-    """The facts of a task; of what happens again and again first what happens."""
+    """The facts of a task; the action of a periodic one precedes it."""
     for fact in _said(task):
         if isinstance(fact, Comparison) and is_periodic(fact):
             yield once(fact)
@@ -221,7 +221,7 @@ def _said(task: Task) -> Iterator[Fact]:
 
 
 def _word(name: str, words: tuple[str, ...] = ()) -> FactEvaluator:
-    """Whether a word of rules holds; `words` are what it is given besides objects."""
+    """The evaluator of a word of rules; `words` are its arguments other than objects."""
 
     def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
@@ -233,7 +233,7 @@ def _word(name: str, words: tuple[str, ...] = ()) -> FactEvaluator:
 
 
 def _rows(facts: Snapshot, ids: tuple[int, ...]) -> tuple[int, ...] | None:
-    """Where objects stand among the facts, or None when one of them is not there."""
+    """The rows of objects in a snapshot, or None if one of them is missing."""
     return tuple(facts.row[i] for i in ids) if facts.row.keys() >= set(ids) else None
 
 
@@ -251,7 +251,7 @@ def _outside(within: FactEvaluator) -> FactEvaluator:
 
 
 def _measure(task: Task, fact: Comparison, amount: Number) -> Measured:
-    """How a quantity is measured: a gap in metres on the floor, all else as rules do."""
+    """The measure of a quantity: on the floor for a gap in metres, else as in rules."""
     name = action_of(fact).name
     words = tuple(map(str, action_of(fact).words)) if name in SIGNAL_WORDS else ()
     if name == "gap" and dimension(amount) == SIZE:
@@ -273,7 +273,7 @@ def _measure(task: Task, fact: Comparison, amount: Number) -> Measured:
 def _comparison(
     name: str, measured: Measured, sign: str, bound: float, most: float = 0.0
 ) -> FactEvaluator:
-    """A quantity against a bound: true or false when all of its interval says so."""
+    """Compare a quantity with a bound: true or false if its whole interval agrees, else unknown."""
 
     def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
@@ -289,14 +289,14 @@ def _comparison(
 
 
 def _within(low: float, high: float, least: float, most: float) -> Truth:
-    """Whether an interval lies between two bounds; unknown where only part of it does."""
+    """Whether an interval is between two bounds; unknown if only part of it is."""
     if least <= low and high <= most:
         return Truth.TRUE
     return Truth.FALSE if high < least or low > most else Truth.UNKNOWN
 
 
 def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
-    """A zone drawn in the task is looked at as it is; one of the settings as rules judge it."""
+    """The evaluator of a zone: one defined in the task directly, one of the settings as in rules."""
     declared = next(z for z in task.zones if z.name == zone)
     corners, floor = declared.corners, floor_polygon(declared, task.ground)
     polygon = np.asarray(corners, dtype=float)

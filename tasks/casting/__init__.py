@@ -1,4 +1,4 @@
-"""Casting: which objects play the actors of a task.
+"""Casting: the assignment of objects to the actors of a task.
 
 Read in this order: `fitness.py` (how well an object fits the description of an actor), `matching.py` (the
 best matching of actors and objects).

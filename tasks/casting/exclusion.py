@@ -1,8 +1,8 @@
-"""Casting by exclusion: a guess, held until the actor is recognised.
+"""Casting by exclusion: a guess until the actor is recognised.
 
-When all but one of the actors are found and rest, and one thing that nobody knows moves, that is the one
-which is missed: an arm in a posture in which it was never shown, a tool seen from behind. A guess gives way
-at once to what is recognised, explains nothing away, and never takes an actor from an object.
+If all actors but one are found and at rest, and a single unknown object moves, it is guessed to be the
+missing actor: an arm in a posture that was never taught, a tool seen from behind. A guess yields to
+recognition at once, explains no unexpected objects, and never takes an actor from an object.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from visup.tasks.grammar.nodes import Task
 from visup.tasks.verification.settings import TaskSettings
 
 MOVES = 0.01
-"""Speed from which on something clearly moves, image diagonals per second."""
+"""Speed from which on an object clearly moves, image diagonals per second."""
 
 SIGMAS = 4.0
-"""How many standard deviations that is, too."""
+"""The speed must also exceed this many standard deviations."""
 
 LARGER = 2.0
-"""So many times as large as any other that moves it must be: beside an arm its shadow moves."""
+"""It must be this many times as large as any other moving object: the shadow of an arm moves, too."""
 
 
 def guessed(
@@ -35,17 +35,17 @@ def guessed(
     before: Sequence[Binding],
     settings: TaskSettings,
 ) -> tuple[Binding, ...]:
-    """Bindings with a guess for the one actor that is missed, where there is reason for one.
+    """Bindings with a guess for the only missing actor, if justified.
 
     Args:
         task: The task.
-        mind: What is believed.
-        bindings: Of the actors, in their order; those whom nobody plays have no object.
-        before: The bindings of the last step: a guess is kept while nothing speaks against it.
-        settings: From which share of its votes an object is taken to be known.
+        mind: The mind.
+        bindings: Bindings of all actors in order; missing ones have no object.
+        before: The bindings of the last step: a guess is kept unless contradicted.
+        settings: Provides the share of votes from which on an object counts as known.
 
     Returns:
-        The same, or with one actor more, played by what moves.
+        The same bindings, or with the moving object as the missing actor.
     """
     missed = [k for k, b in enumerate(bindings) if b.object_id is None and _told_by_looks(task, b)]
     awaited = [b for b in bindings if b.object_id is None and not task.actor(b.actor).spare]
@@ -83,7 +83,7 @@ def _unknown(belief: ObjectBelief, settings: TaskSettings) -> bool:
 def _only_mover(
     unknown: Collection[ObjectBelief], mind: Mind, known: Sequence[ObjectBelief]
 ) -> int | None:
-    """The one that moves, and is much larger than whatever else does."""
+    """The moving object that is much larger than all other moving ones, or None."""
     movers = sorted(_movers(unknown, mind, known), reverse=True)
     if not movers or (len(movers) > 1 and movers[0][0] < LARGER * movers[1][0]):
         return None
@@ -93,7 +93,7 @@ def _only_mover(
 def _movers(
     objects: Collection[ObjectBelief], mind: Mind, known: Sequence[ObjectBelief]
 ) -> Iterator[tuple[float, int]]:
-    """Area and id of those that move."""
+    """Area and id of moving objects."""
     scene = np.mean([o.region.velocity for o in known], axis=0)
     for o in objects:
         if _moves(o.id, mind) or _sets_out(o.region, scene, mind):
@@ -101,14 +101,14 @@ def _movers(
 
 
 def _moves(object_id: int, mind: Mind) -> bool:
-    """Whether something has been seen to move for a while."""
+    """Whether an object has been moving for a while."""
     now = kinematics(mind)
     noise = SIGMAS * now.one("velocity_sigma", object_id)
     return now.one("speed", object_id) > max(MOVES * image_diagonal(mind.frame_size), noise)
 
 
 def _sets_out(region: Region, scene: Floats, mind: Mind) -> bool:
-    """Whether a region moves in the image as what rests does not, however short a time it is known."""
+    """Whether a region moves relative to the resting scene, even if it appeared only recently."""
     if region.velocity_sigma <= 0.0:
         return False
     speed = float(np.hypot(region.velocity[0] - scene[0], region.velocity[1] - scene[1]))

@@ -1,7 +1,7 @@
-"""How well objects fit what a task says of an actor: its models, and the criteria beside them.
+"""The fitness of objects for an actor, by its models and criteria.
 
-What is said of an actor is joined by `and`, so an object fits as well as it fits the worst of it. Orders
-(`the leftmost`) are looked at last, among the objects that fit all else.
+Criteria are a conjunction, so the fitness is the minimum over them. Orders (`the leftmost`) are evaluated
+last, among the objects that fit everything else.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ from visup.tasks.grammar.structure import task_actors
 from visup.tasks.grammar.units import value
 
 COLOURED = (0.2, 0.6)
-"""Shares of an object's pixels at which a colour begins to be its colour, and surely is: what is held,
-its shadow and highlights take part of most outlines."""
+"""Shares of an object's pixels of a colour for fitness 0 and 1: held objects, shadows and highlights are part
+of most outlines."""
 
 PLACED = (0.01, 0.08)
-"""How far from an outline a place may lie to be its place, image diagonals: surely, and at all."""
+"""Distances from an outline to a position for fitness 1 and 0, image diagonals."""
 
 HANGS = (0.006, 0.02)
-"""How far from its machine a part may be to hang together with it, image diagonals: surely, at all."""
+"""Distances of a part from its machine for fitness 1 and 0, image diagonals."""
 
 SIZE_SHARE = 0.1
-"""A size within so much of what it is compared with may be either."""
+"""Relative tolerance of a size comparison."""
 
 CONTENDS = 0.3
-"""What fits all else less than this takes no part in an order."""
+"""Least fitness by the other criteria for an object to be ranked."""
 
 LATE_S = 5.0
-"""An actor that was first by its place is not taken over by what came so much later than its object."""
+"""An actor ranked by position is not taken over by objects that appeared this much later, seconds."""
 
 NOT_FIRST = 0.95
-"""What `another` weighs: the actor without it comes first where there is only one object for both."""
+"""Weight of `another`: the actor without it takes precedence if there is only one object for both."""
 
 REST_S = 1.0
-"""What rests has rested for so long."""
+"""Time without motion after which an object is at rest, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +64,8 @@ class Role:
     Attributes:
         task: The task.
         actor: The actor.
-        mind: What is believed.
-        playing: Actor -> the object that plays it so far: this one's own, those of machines.
+        mind: The mind.
+        playing: Actor -> its object so far, for this actor and for machines.
     """
 
     task: Task
@@ -75,11 +75,11 @@ class Role:
 
 
 def fits(role: Role, models: Sequence[str], objects: Sequence[ObjectBelief]) -> list[float]:
-    """How well each object fits what is said of an actor, 0 to 1.
+    """The fitness of each object for an actor, 0 to 1.
 
     Args:
         role: The actor.
-        models: The models that it may be; empty for one that is told by criteria alone.
+        models: The models that it may be; empty for one identified only by criteria.
         objects: The objects.
     """
     criteria = role.task.actor(role.actor).criteria
@@ -103,7 +103,7 @@ def fits(role: Role, models: Sequence[str], objects: Sequence[ObjectBelief]) -> 
 
 
 def _answered(fit: list[float], role: Role, objects: Sequence[ObjectBelief]) -> list[float]:
-    """What the operator has said goes before: an object that is an actor is that one and no other."""
+    """Apply the operator's answers: an identified object is that actor and no other."""
     answers = role.mind.answers
     if not answers:
         return fit
@@ -116,38 +116,38 @@ def _answered(fit: list[float], role: Role, objects: Sequence[ObjectBelief]) -> 
 
 
 def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
-    """How strongly an object is believed to be one of some models, 0 to 1."""
+    """The strength of the belief that an object is one of some models, 0 to 1."""
     total = 0.0
-    for candidate in belief.candidates:  # plain loops: this is asked many times in each step
+    for candidate in belief.candidates:  # plain loops: called many times per step
         if candidate.name in models:
             total += candidate.share
     return min(1.0, total)
 
 
 def asks_for_traits(task: Task) -> bool:
-    """Whether a task describes some actor by more than its models and its machine."""
+    """Whether a task describes any actor by more than its models and its machine."""
     criteria = (c for a in (*task.actors, *task.bystanders) for c in a.criteria)
     return any(not isinstance(c, PartOf | Another | OtherModels) for c in criteria)
 
 
 def asks_for_colour(task: Task) -> bool:
-    """Whether a task describes some actor by its colour."""
+    """Whether a task describes any actor by its colour."""
     declared = (*task.actors, *task.bystanders)
     return any(isinstance(c, Colours) for a in declared for c in a.criteria)
 
 
 def _meets(criterion: Criterion, role: Role, belief: ObjectBelief, traits: Traits) -> float:
-    """How well an object meets one criterion, 0 to 1; an order is not judged here."""
+    """The fitness of an object for one criterion, 0 to 1; orders are evaluated elsewhere."""
     match criterion:
         case Colours(names=names):
             shares = (colour_share(name, traits.palette) for name in names)
-            return _rise(max(shares), *COLOURED)
+            return _ramp(max(shares), *COLOURED)
         case Extent():
             return _sized(criterion, value(role.task.amount(criterion.amount)), traits)
         case Place(at=at):
             return _placed(traits, at, role.mind)
         case Conduct():
-            # What it did when it was chosen chose it; what it does afterwards is for the stages.
+            # Conduct identifies an actor once; its later conduct is a matter of stages.
             chosen = role.playing.get(role.actor) == belief.id
             return float(chosen or _behaves(criterion, traits, role.mind))
         case PartOf(machine=machine):
@@ -161,9 +161,9 @@ def _meets(criterion: Criterion, role: Role, belief: ObjectBelief, traits: Trait
 
 
 def _sized(criterion: Extent, bound: float, traits: Traits) -> float:
-    if traits.extent != traits.extent:  # NaN: it was never seen whole
+    if traits.extent != traits.extent:  # NaN: it was never completely visible
         return 0.0
-    larger = _rise(traits.extent, bound * (1 - SIZE_SHARE), bound * (1 + SIZE_SHARE))
+    larger = _ramp(traits.extent, bound * (1 - SIZE_SHARE), bound * (1 + SIZE_SHARE))
     return larger if criterion.compared == "larger" else 1.0 - larger
 
 
@@ -193,10 +193,10 @@ def _ranked(
     known: Sequence[Traits],
     held: int | None,
 ) -> list[float]:
-    """What fits, and is first in an order; all else fits no more.
+    """The fitness with an order applied: only the first object keeps it.
 
-    By place objects are ordered as they were first seen, since afterwards they change places; what comes
-    much later than the object that plays the actor already takes no part.
+    Orders by position use the positions when first seen, since objects move later; objects that appeared much
+    later than the present actor are ignored.
     """
     by_size = criterion.rank in ("largest", "smallest")
     until = next((o.first_seen + LATE_S for o in objects if o.id == held and not by_size), None)
@@ -211,14 +211,14 @@ def _ranked(
 
 
 def _first_to_move(fit: Sequence[float], known: Sequence[Traits]) -> list[float]:
-    """Of what fits, only that which moved first."""
+    """The fitness of only the first object to move."""
     moved = (t.moved for f, t in zip(fit, known, strict=True) if f > 0.0 and t.moved is not None)
     first = min(moved, default=None)
     return [f if t.moved == first else 0.0 for f, t in zip(fit, known, strict=True)]
 
 
 def _hangs_together(object_id: int, machine: int | None, mind: Mind) -> float:
-    """How well an object is attached to its machine; unknown until the machine is found."""
+    """The fitness of an object as a part of its machine; unknown until the machine is found."""
     if machine is None or machine == object_id:
         return 0.0
     measured = kinematics(mind)
@@ -230,16 +230,18 @@ def _hangs_together(object_id: int, machine: int | None, mind: Mind) -> float:
 
 
 def _placed(traits: Traits, at: tuple[float, float], mind: Mind) -> float:
-    """How well a place was an object's when it was first seen; of two there, the nearer centre counts."""
+    """The fitness of an object for a position when first seen; of two there, the nearer centre wins."""
     if traits is NOTHING:
         return 0.0
     dx, dy = traits.first_at[0] - at[0], traits.first_at[1] - at[1]
     off_centre = math.hypot(dx, dy) / image_diagonal(mind.frame_size)
-    return _near(_off_box(traits.first_box, at), *PLACED, mind) * (1.0 - min(0.1, off_centre))
+    return _near(_distance_to_box(traits.first_box, at), *PLACED, mind) * (
+        1.0 - min(0.1, off_centre)
+    )
 
 
-def _off_box(box: tuple[int, int, int, int], at: tuple[float, float]) -> float:
-    """Distance of a place to a box, pixels; 0 inside it."""
+def _distance_to_box(box: tuple[int, int, int, int], at: tuple[float, float]) -> float:
+    """Distance of a position to a box, pixels; 0 inside."""
     x, y, w, h = box
     dx = max(x - at[0], at[0] - (x + w - 1), 0.0)
     dy = max(y - at[1], at[1] - (y + h - 1), 0.0)
@@ -248,9 +250,9 @@ def _off_box(box: tuple[int, int, int, int], at: tuple[float, float]) -> float:
 
 def _near(distance: float, surely: float, at_all: float, mind: Mind) -> float:
     diagonal = image_diagonal(mind.frame_size)
-    return 1.0 - _rise(distance, surely * diagonal, at_all * diagonal)
+    return 1.0 - _ramp(distance, surely * diagonal, at_all * diagonal)
 
 
-def _rise(number: float, low: float, high: float) -> float:
-    """0 up to `low`, 1 from `high` on, straight in between."""
+def _ramp(number: float, low: float, high: float) -> float:
+    """0 up to `low`, 1 from `high` on, linear in between."""
     return min(1.0, max(0.0, (number - low) / (high - low))) if high > low else float(number >= low)

@@ -1,9 +1,9 @@
 """Casting: weighted matching of actors and objects (paper, section 6).
 
-Several identities are believed of each object, each with a strength. The weight of a pair is how
-strongly the object is believed to be one of the models that the actor stands for, or how well it fits
-what else the task says of the actor (`fitness.py`); the matching with the greatest total weight is
-taken, each object playing one actor at most. Machines are matched before their parts.
+Each object has several possible identities with strengths. The weight of a pair is the strength of the belief
+that the object is one of the actor's models, or its fitness for the actor's criteria (`fitness.py`); the
+matching with the greatest total weight is chosen, with at most one actor per object. Machines are matched
+before their parts.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import machines_of, stage_actors, stage_names, task_actors
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
 
-CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two actors want one object
+CURRENT_BONUS = 1.1  # actors of the active stage take precedence when two compete for one object
 
 
 def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
-    """Model names that an actor stands for: the user's word, else the task's, else its own name."""
+    """The models of an actor: as bound by the user, else as declared, else its own name."""
     said = mind.actors.get(actor) or mind.actors.get(task.actor(actor).spare)
     return tuple(said or ()) or task.models(actor)
 
@@ -41,14 +41,14 @@ def match(
 
     Args:
         task: The task.
-        mind: What is believed; confirmed objects can play an actor, seen or hidden. One that has
-            left keeps its part until another object takes it.
+        mind: The mind; confirmed objects can be actors, seen or hidden. One that has left stays bound until
+            another object takes over.
         before: The bindings of the last step; they are kept unless another is clearly better.
-        current: Names of actors of the stage under way.
+        current: Names of actors of the active stage.
         settings: Thresholds.
 
     Returns:
-        One binding for each actor, in the order in which the task names them.
+        One binding for each actor, in the order of the task.
     """
     actors = task_actors(task)
     models = {a: models_of(task, a, mind) for a in actors}
@@ -71,18 +71,18 @@ def match(
 
 
 def _machines_first(task: Task, actors: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Actors in groups that are matched one after the other: parts after their machines."""
+    """Actors in groups that are matched in turn: parts after their machines."""
     depth = {a: len(machines_of(task, a)) for a in actors}
     for least in sorted(set(depth.values())):
         yield tuple(a for a in actors if depth[a] == least)
 
 
 def best_matching(weight: Sequence[Sequence[float]]) -> dict[int, int]:
-    """Row -> column of the matching with the greatest total weight; what weighs nothing is left out."""
+    """Row -> column of the matching with the greatest total weight; pairs of weight 0 are left out."""
     wanted = [[j for j, w in enumerate(row) if w > 0.0] for row in weight]
     columns = [j for row in wanted for j in row]
     if len(set(columns)) == len(columns) and all(len(row) <= 1 for row in wanted):
-        # Nobody has a choice and no two want the same, as nearly always.
+        # The usual case: at most one candidate per row and no conflicts.
         return {i: row[0] for i, row in enumerate(wanted) if row}
     rows, chosen = linear_sum_assignment(np.array(weight), maximize=True)
     found = zip(rows.tolist(), chosen.tolist(), strict=True)
@@ -96,14 +96,14 @@ def _weights(
     current: bool,
     settings: TaskSettings,
 ) -> list[float]:
-    """The weight of each object for one actor; 0 where it is too weak to be bound."""
+    """The weight of each object for one actor; 0 if too weak to be bound."""
     bonus = CURRENT_BONUS if current else 1.0
     weight = [s * bonus for s in strengths]
     for j, belief in enumerate(objects):
         if held == belief.id:
             weight[j] = _held_weight(weight[j], belief, settings)
         elif belief.presence is Presence.LEFT:
-            weight[j] = 0.0  # what has left takes up no other part
+            weight[j] = 0.0  # an object that has left gets no new actor
     return [w if w >= settings.bind_at else 0.0 for w in weight]
 
 
@@ -125,7 +125,7 @@ def bystanders(
     bindings: Sequence[Binding],
     settings: TaskSettings = DEFAULT_SETTINGS,
 ) -> tuple[int, ...]:
-    """Objects that the task lets be, by id: they play no actor, and are what it calls bystanders."""
+    """Ids of the task's bystanders: objects that play no actor and fit a bystander declaration."""
     if not task.bystanders:
         return ()
     playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
@@ -140,7 +140,7 @@ def bystanders(
 
 
 def machines(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[int, ...], ...]:
-    """The objects that are one machine with its parts, for each machine of which parts are found."""
+    """The objects of each machine with its parts, for machines with found parts."""
     playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
     groups: dict[str, set[int]] = {}
     for actor, object_id in playing.items():
@@ -157,11 +157,11 @@ def unexplained(
     optional: Collection[str] = (),
     task: Task | None = None,
 ) -> tuple[int, ...]:
-    """Objects in view that no actor explains, by id; `optional` actors are not waited for.
+    """Ids of visible objects that no actor explains; `optional` actors are not waited for.
 
-    With every actor bound that is any further object. With an actor still unbound, an object that
-    is not identified yet may be it, and so may one that could be any of the actors, or whose identity
-    rests on a few seconds only; only one that is clearly something else is unexplained.
+    With all actors bound that is any further object. While an actor is unbound, it may be an unidentified
+    object, one that could be any actor, or one identified for only a few seconds; only an object that is
+    clearly something else is unexplained.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
     bindings = [replace(b, object_id=None) if b.guessed else b for b in bindings]
@@ -169,7 +169,7 @@ def unexplained(
         bound.update(bystanders(task, mind, bindings, settings))
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
     if task is not None and task.bystanders:
-        # Who it is shows after a while only, and till then it may be one of them.
+        # Identification takes a while, and until then it may be one of them.
         others = [o for o in others if mind.time - o.first_seen >= settings.acquainted_s]
     if all(b.object_id is not None for b in bindings if b.actor not in optional):
         return tuple(o.id for o in others)
@@ -193,9 +193,9 @@ def unexplained(
 def scenery(
     mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
 ) -> tuple[int, ...]:
-    """Objects that nobody knows and that were in view from the start, by id: part of the scene.
+    """Ids of unknown objects visible from the start: part of the scene.
 
-    What looks like an actor that is found elsewhere is known no better.
+    An object that looks like an actor found elsewhere counts as unknown.
     """
     bound = {b.object_id for b in bindings}
     taken = {m for b in bindings if b.object_id is not None for m in b.models}
@@ -215,7 +215,7 @@ def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:
 
 
 def rank_stages(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[str, float], ...]:
-    """The stages of a task that may be under way, best matched first; ties as in the task."""
+    """The stages of a task that may be active, best matched first; ties in the order of the task."""
     ranked = [(s, match_strength(stage_actors(task, s), bindings)) for s in stage_names(task)]
     return tuple(sorted(ranked, key=lambda pair: -pair[1]))
 
@@ -223,7 +223,7 @@ def rank_stages(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[str, flo
 def rank_tasks(
     tasks: Sequence[Task], mind: Mind, settings: TaskSettings = DEFAULT_SETTINGS
 ) -> tuple[tuple[str, float], ...]:
-    """The tasks that may be under way, by their best matched stage; ties as given."""
+    """The tasks that may be in progress, by their best matched stage; ties as given."""
     ranked = []
     for task in tasks:
         stages = rank_stages(task, match(task, mind, settings=settings))

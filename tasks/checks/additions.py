@@ -1,4 +1,4 @@
-"""What a file lacks: lines to add to it, each for a name that it uses and does not define."""
+"""Hints that add missing definitions to a file."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from visup.tasks.grammar.statement import NAME
 
 _CALL = re.compile(rf"{NAME}\s*\(\s*({NAME})\s*,\s*({NAME})\s*\)")
 AMOUNTS = ("90 s", "20 px", "20 px/s", "20 deg/s", "20 %", "2 m")
-"""What a parameter may be."""
+"""Example values of a parameter."""
 ZONE = "(100, 50) (300, 50) (300, 200)"
 
 
 def added(text: str, fault: Diagnostic) -> Iterator[str]:
-    """Hints that add the definition of what a fault says is not defined.
+    """Hints that add the definition of an undefined name.
 
     Args:
         text: The file.
@@ -38,7 +38,7 @@ def added(text: str, fault: Diagnostic) -> Iterator[str]:
 
 
 def _action(text: str, name: str) -> str:
-    """The action that the name of a stage speaks of, between actors of the file."""
+    """The action suggested by the name of a stage, between actors of the file."""
     meant = synonym(name, ACTIONS)
     if meant is None or ACTIONS[meant].kinds != ("object", "object"):
         meant = "touching"

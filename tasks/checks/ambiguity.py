@@ -31,7 +31,7 @@ from visup.tasks.grammar.nodes import (
     walk,
 )
 
-DEEPEST = 40  # references within references that are looked into
+DEEPEST = 40  # depth of nested references
 NOTHING = Action("", ())
 
 
@@ -40,8 +40,8 @@ class AmbiguityCheck:
     """Checks whether the stages of a task can be distinguished.
 
     Attributes:
-        task: The task, whole.
-        source: For places.
+        task: The complete task.
+        source: For positions.
         grammar: Its grammar.
     """
 
@@ -50,7 +50,7 @@ class AmbiguityCheck:
     grammar: Grammar
 
     def faults(self) -> Iterator[Diagnostic]:
-        """One fault for each pair of neighbours that look the same."""
+        """One fault for each pair of adjacent courses that look the same."""
         for stage in self.grammar.stages.values():
             if isinstance(stage.body, Actors):
                 continue
@@ -61,7 +61,7 @@ class AmbiguityCheck:
                     yield from self.turns(course)
 
     def options(self, choice: Choice) -> Iterator[Diagnostic]:
-        """Alternatives that ask for the same."""
+        """Alternatives with the same requirements."""
         seen: dict[int, Course] = {}
         for option in choice.options:
             form = self.forms.of(option)
@@ -73,7 +73,7 @@ class AmbiguityCheck:
                 seen[form] = option
 
     def turns(self, sequence: Sequence) -> Iterator[Diagnostic]:
-        """Neighbours that ask for the same, without a `for` or a sign that parts them."""
+        """Adjacent courses with the same requirements and no `for` or condition to separate them."""
         for before, after in zip(sequence.items, sequence.items[1:], strict=False):
             one, other = self.bare(before), self.bare(after)
             if one is not None and one == other:
@@ -82,16 +82,16 @@ class AmbiguityCheck:
                 yield self.fault(what, after.span, hint)
 
     def fault(self, what: str, span: Span, hint: str) -> Diagnostic:
-        """A fault at the place of a course."""
+        """A fault at the position of a course."""
         return self.source.fault("E230", what, span, hint=hint)
 
     def bare(self, course: Course) -> Fact | None:
-        """What a course asks for when that is one action without `for` and signs, or None."""
+        """The only action of a course without `for` and conditions, or None."""
         fact = self.grammar.sole_fact(course)
         return None if fact is None or self.governed(course) else fact
 
     def governed(self, course: Course) -> bool:
-        """Whether a `for` or a sign stands between a course and its only action."""
+        """Whether a course has a `for` or condition around its only action."""
         for _ in range(DEEPEST):
             match course:
                 case Conditioned():
@@ -111,14 +111,14 @@ class AmbiguityCheck:
 
     @cached_property
     def forms(self) -> _Forms:
-        """The forms of all stages."""
+        """The normal forms of all stages."""
         return _Forms(self.grammar)
 
 
 class _Forms:
-    """Numbers for what is seen of courses, stages written out: the same number, the same sight.
+    """Numbers courses by their normal forms with stages expanded: equal numbers look the same.
 
-    Equal parts share a number, so that a stage that is referred to often is looked at once.
+    Equal parts share a number, so that a stage that is referred to often is processed once.
     """
 
     def __init__(self, grammar: Grammar) -> None:
@@ -130,7 +130,7 @@ class _Forms:
             self._stages[name] = self.of(course)
 
     def of(self, course: Course) -> int | None:
-        """The number of a course; None when it comes back to itself."""
+        """The number of a course; None if it is recursive."""
         if isinstance(course, Reference):
             return self._stages.get(course.stage)
         if not children(course):

@@ -1,4 +1,4 @@
-"""What a task file may ask for at most: whatever is accepted can be followed in bounded time and memory."""
+"""Limits of task files, so that any accepted task can be supervised in bounded time and memory."""
 
 from __future__ import annotations
 
@@ -28,23 +28,24 @@ from visup.tasks.grammar.nodes import (
 )
 
 LONGEST_FILE = 600_000
-"""Characters of a task, with all that it includes; the longest that ships has two thousand."""
+"""Maximum characters of a task with its includes; the longest shipped one has two thousand."""
 LONGEST_LINE = 20_000
 MOST_FAULTS = 100
-"""Mistakes of a file that are told; who made more knows enough."""
+"""Maximum number of reported mistakes of a file."""
 MOST_STAGES = 2_000
-"""Stages of a file. With 2,000 a run begins within some seconds; with 10,000 it takes a minute."""
+"""Maximum number of stages of a file. A run with 2,000 starts within seconds; with 10,000 it takes a
+minute."""
 DEEPEST_STAGES = 100
-"""Stages inside one another; each takes some of the depth that Python allows."""
+"""Maximum nesting of stages, limited by Python's recursion depth."""
 MOST_WAYS = 500
-"""Ways in which a course may begin. With 256 a step takes 10 ms, with 4,000 half a second, and each
-alternative beside another doubles them."""
+"""Maximum number of initial states of a course. With 256 a step takes 10 ms, with 4,000 half a second;
+parallel alternatives multiply."""
 MOST_TOGETHER = 12
-"""Things at the same time; each of which may go on by itself."""
+"""Maximum number of parallel courses, each of which may advance by itself."""
 
 
 def text_fault(text: str, source: Source) -> Diagnostic | None:
-    """What is wrong with the size of a text, before anything of it is read."""
+    """A fault of the size of a text, before parsing."""
     if len(text) > LONGEST_FILE:
         what = f"the file has {len(text)} characters"
         return Diagnostic("E137", what, source.place(1, 1), f"at most {LONGEST_FILE}")
@@ -66,15 +67,15 @@ class BoundsCheck:
     """Checks of the size of a task.
 
     Attributes:
-        grammar: Of the task, with at least one rule.
-        source: For places.
+        grammar: Grammar of the task, with at least one rule.
+        source: For positions.
     """
 
     grammar: Grammar
     source: Source
 
     def faults(self) -> Iterator[Diagnostic]:
-        """The first thing that is too much."""
+        """The first exceeded limit."""
         yield from islice(chain(self._sizes(), self._stages()), 1)
 
     def _sizes(self) -> Iterator[Diagnostic]:
@@ -103,7 +104,7 @@ class BoundsCheck:
 
     @cached_property
     def _order(self) -> list[str]:
-        """Stages, each after those that it refers to, as far as there are no circles."""
+        """Stages, each after those that it refers to, apart from cycles."""
         return dependencies_first(self.grammar.mentions)
 
     @cached_property
@@ -121,14 +122,14 @@ class BoundsCheck:
             body = self.grammar.stages[name].body
             ways[name] = 1
             if not isinstance(body, Actors):
-                # Also what is come to later: a course inside may branch more than the whole does at first.
+                # Also later states: an inner course may branch more than the beginning.
                 inside = (c for c in walk(body) if isinstance(c, Together))
                 most = max((self._begins(c, ways) for c in inside), default=1)
                 ways[name] = min(max(most, self._begins(body, ways)), MOST_WAYS**2)
         return ways
 
     def _begins(self, course: Course, ways: dict[str, int]) -> int:
-        """In how many ways a course may begin, at most; being left out is one."""
+        """Upper bound of the number of initial states of a course, counting being skipped as one."""
         match course:
             case Reference(stage=name):
                 return ways.get(name, 1)

@@ -1,4 +1,4 @@
-"""Changes of several words that bring a statement into the grammar, in the words of hints."""
+"""Corrections of several words that make a statement parse, worded as hints."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from visup.tasks.diagnostics.recovery import split
 from visup.tasks.grammar.statement import StatementText
 
 WIDENED, MOST_SAID = 6, 120
-"""How often a change is said with a word more, and how many characters of it are said at most."""
+"""How often a change is widened by a word to be unambiguous, and its maximum length in characters."""
 LONGEST = 1500
-"""Characters of a statement; of a longer one the cause of an error is not looked for in all of it."""
+"""Maximum characters of a statement that is searched completely for the cause of an error."""
 
 
 def corrected(text: str, place: SourceLocation, may_go_on: Callable[[], bool]) -> Iterator[str]:
-    """Hints that bring the statement at a place into the grammar, those of least change first.
+    """Hints that make the statement at a position parse, smallest changes first.
 
     Args:
         text: The whole file.
-        place: Of the fault.
-        may_go_on: Asked before each reading that is followed.
+        place: Position of the fault.
+        may_go_on: Asked before each candidate is explored.
 
     Yields:
-        Hints; those that only leave words out among them.
+        Hints, including those that only delete words.
     """
     cleaned = normalise(text, Source(text, place.file))[0]
     tidy = _tidied(text, cleaned, place)
@@ -49,7 +49,7 @@ def corrected(text: str, place: SourceLocation, may_go_on: Callable[[], bool]) -
 
 
 def _tidied(text: str, cleaned: str, place: SourceLocation) -> Repair | None:
-    """The line of a fault as it was meant, where some characters only look like those of the language."""
+    """The line of a fault with look-alike characters replaced."""
     begin = _offset(text, place.line, 1)
     code = place.text.split("#")[0].rstrip()
     odd = [n for n, char in enumerate(code) if char != cleaned[begin + n]]
@@ -64,7 +64,7 @@ def _tidied(text: str, cleaned: str, place: SourceLocation) -> Repair | None:
 
 
 def _statement(text: str, place: SourceLocation) -> StatementText | None:
-    """The statement that holds a place."""
+    """The statement at a position."""
     before = [c for c in split(text) if (c.line, c.column) <= (place.line, place.column)]
     return before[-1] if before else None
 
@@ -74,7 +74,7 @@ def _offset(text: str, line: int, column: int) -> int:
 
 
 def said(text: str, place: SourceLocation, repair: Repair) -> str | None:
-    """A change as a hint that says just that; with some words around it where it could mean another place."""
+    """A change as a hint; with surrounding words if it would be ambiguous."""
     wanted = repair.applied(text).split()
     for _ in range(WIDENED):
         old, new = " ".join(text[repair.begin : repair.end].split()), repair.new.strip()
@@ -90,7 +90,7 @@ def said(text: str, place: SourceLocation, repair: Repair) -> str | None:
 
 
 def _wider(text: str, repair: Repair) -> Repair | None:
-    """The same change with the word before it, at the beginning of a line with the word behind it."""
+    """The same change with the preceding word, or at the beginning of a line with the following one."""
     line = text.rfind("\n", 0, repair.begin) + 1
     before = list(TOKEN.finditer(text, line, repair.begin))
     if before:

@@ -1,4 +1,4 @@
-"""What the courses of a task must satisfy: they end, and their clauses and invariants agree."""
+"""Checks of courses: termination, and consistency of clauses and invariants."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class CourseCheck:
 
     Attributes:
         task: The task, with at least one rule.
-        source: For places.
-        actions: The actions that it may ask for.
-        whole: Whether every stage that it mentions is there.
+        source: For positions.
+        actions: The known actions.
+        whole: Whether all referenced stages are defined.
         grammar: The grammar of the task.
     """
 
@@ -73,7 +73,7 @@ class CourseCheck:
         yield from self.repetitions()
 
     def endless(self) -> Iterator[Diagnostic]:
-        """Stages that never begin or never end."""
+        """Stages that cannot begin or terminate."""
         begins = self.grammar.left_recursive()
         for stage in begins:
             what = f"stage `<{stage.name}>` begins with itself and so never begins"
@@ -91,7 +91,7 @@ class CourseCheck:
             )
 
     def clauses(self) -> Iterator[Diagnostic]:
-        """Clauses said twice, that contradict each other, or that hold nothing."""
+        """Clauses that are duplicate, contradictory or ineffective."""
         for course in self.courses:
             if not isinstance(course, Timed):
                 continue
@@ -157,14 +157,14 @@ class CourseCheck:
                     break
 
     def meant(self, during: tuple[Reference, ...]) -> AnySet[str]:
-        """The stages for which an invariant is meant, with those inside them."""
+        """The stages to which an invariant applies, with those inside them."""
         if not during:
             return self.grammar.stages.keys()
         known = [r.stage for r in during if r.stage in self.grammar.stages]
         return reachable(self.grammar.mentions, known)
 
     def breaks(self, invariant: Invariant, fact: Fact) -> bool:
-        """Whether a stage that asks for something breaks an invariant."""
+        """Whether a requirement of a stage breaks an invariant."""
         said = invariant.condition
         if not isinstance(said, Action) or not isinstance(fact, Action):
             return invariant.when == "never" and str(said) == str(fact)
@@ -173,7 +173,7 @@ class CourseCheck:
         return self.contradict(said, fact)
 
     def conditions(self) -> Iterator[Diagnostic]:
-        """Signs said twice, or that hold for nothing in particular."""
+        """Stage conditions that are duplicate or ineffective."""
         for course in self.courses:
             if not isinstance(course, Conditioned):
                 continue
@@ -196,7 +196,7 @@ class CourseCheck:
                     yield self.source.fault("E232", what, sign.span, expected, hint)
 
     def counts(self) -> Iterator[Diagnostic]:
-        """Numbers of times that contradict each other, and orders that are too many."""
+        """Contradictory counts, and `any order` with too many items."""
         for course in self.courses:
             if isinstance(course, Counted) and course.most is not None:
                 if course.most == 0:
@@ -222,7 +222,7 @@ class CourseCheck:
                 yield self.source.fault("E234", what, course.span, expected, hint)
 
     def rounds(self, loop: AnyOrder) -> Iterator[Diagnostic]:
-        """A loop with something new each time that has no rounds, or in which nothing is new."""
+        """A loop with a new actor in each round that has no rounds, or does not use the actor."""
         least, most = loop.least or 0, loop.count
         if most is not None and most < max(1, least):
             what = f"at least {least} and at most {most} rounds are never"
@@ -238,7 +238,7 @@ class CourseCheck:
             yield self.source.fault("E225", what, loop.span, f"`{loop.new}` among the actors", hint)
 
     def repetitions(self) -> Iterator[Diagnostic]:
-        """Repetitions of what may be left out."""
+        """Repetitions of optional courses."""
         for course in self.courses:
             mark = "at least" if isinstance(course, Counted) else getattr(course, "mark", "?")
             if not isinstance(course, Repeated | Counted) or mark == "?":

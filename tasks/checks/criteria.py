@@ -1,4 +1,4 @@
-"""What the declaration of an actor must satisfy: criteria that one object can meet, machines with parts."""
+"""Checks of actor declarations: satisfiable criteria, and machines without cycles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OPPOSITES = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest", "lo
 
 
 def criteria_faults(task: Task, source: Source) -> Iterator[Diagnostic]:
-    """One fault for each actor whose criteria no object can meet, or whose machine is its own part."""
+    """One fault for each actor with unsatisfiable criteria, or that is a part of itself."""
     for actor in (*task.actors, *task.bystanders):
         why = _impossible(task, actor)
         if why:

@@ -1,4 +1,4 @@
-"""All mistakes of a task file at once: of its characters, of its syntax, of its meaning."""
+"""Diagnoses a task file: all mistakes of characters, syntax and semantics at once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import parse
 from visup.tasks.grammar.nodes import Task
 
-FOREIGN = ("E121", "E127")  # what is not this language at all need not be spelt well
+FOREIGN = ("E121", "E127")  # text in another language is not checked for characters
 
 
 def diagnose(
@@ -27,18 +27,18 @@ def diagnose(
     percepts: AnySet[str] = ALL_PERCEPTS,
     read: Read | None = None,
 ) -> tuple[Task, list[Diagnostic]]:
-    """The tree of a text and all its mistakes.
+    """Parse and check a text.
 
     Args:
         text: A task file.
-        file: Its name, for messages; what it includes is looked for beside it.
-        actions: The actions that it may ask for; None for all that are known.
-        percepts: The kinds of percept that will be at hand.
-        read: How included files are read; unless told, from the folder of this file, and none outside it.
+        file: Its name, for messages; includes are relative to it.
+        actions: The available actions; None for all known ones.
+        percepts: The available kinds of percept.
+        read: Reads included files; by default from the folder of this file and not outside it.
 
     Returns:
-        What could be read, with what it includes, and the faults in the order of the text, those of
-        included files last, the first hundred; the tree may be used only when there are none.
+        The parsed tree with includes, and the first hundred faults in the order of the text, those of
+        included files last; the tree is valid only without faults.
     """
     task, faults = _ordered(text, file, actions, percepts, read)
     if not faults:
@@ -57,7 +57,7 @@ def _ordered(
     percepts: AnySet[str],
     read: Read | None,
 ) -> tuple[Task, list[Diagnostic]]:
-    """The tree and its mistakes in their order, each with the hint of whoever found it."""
+    """The tree and its ordered faults with the hints of their checks."""
     source = Source(text, file)
     if (fault := text_fault(text, source)) is not None:
         return Task(()), [fault]

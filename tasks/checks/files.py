@@ -1,4 +1,4 @@
-"""Where task files are: paths, and the tasks that ship with visup, by name."""
+"""Locates and reads task files: by path, or shipped tasks by name."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ ROOT = "VISUP_TASK_ROOT"
 
 
 def include_root(file: str) -> Path:
-    """The folder that included files must be in: the one that the user gives, else that of the first file.
+    """The folder in which included files must be: the one given by the user, else that of the first file.
 
     Args:
-        file: The task file that is read first.
+        file: The including task file.
     """
     given = os.environ.get(ROOT)
     return Path(given) if given else Path(file).parent
@@ -29,7 +29,7 @@ def read_text(path_or_name: str | Path) -> str:
     """The text of a task file, or of the shipped task of that name.
 
     Raises:
-        TaskError: When there is no such file or task, or it is not text.
+        TaskError: There is no such file or task, or it is not text.
     """
     path = Path(path_or_name)
     if str(path_or_name) in shipped_tasks() and not path.exists():
@@ -52,15 +52,16 @@ def read_beside(path: str, including: str, root: Path | None = None) -> tuple[st
     """An included file: its name for messages, and its text.
 
     Args:
-        path: As `include` says it: a path from the folder of the including file, or the name of a shipped
-            task.
+        path: The path in the `include`, relative to the including file, or the name of a shipped task.
         including: The file that includes it.
         root: The folder in which it must be; None for anywhere.
 
     Raises:
-        TaskError: When there is no such file or task, it is not text, or outside of the folder.
+        TaskError: There is no such file or task, it is not text, or it is outside the folder.
     """
-    beside = Path(normpath(Path(including).parent / path))  # so that a file has one name
+    beside = Path(
+        normpath(Path(including).parent / path)
+    )  # normalised, so that a file has one name
     if path in shipped_tasks() and not beside.exists():
         return path, read_text(path)
     if root is not None and not _is_within(beside, root):
@@ -77,7 +78,7 @@ LONGEST_NAME = 200
 
 
 def _is_within(path: Path, root: Path) -> bool:
-    """Whether a file is in a folder or below, also once links are followed; none that cannot be named."""
+    """Whether a file is inside a folder after resolving links; False for invalid paths."""
     try:
         return path.resolve().is_relative_to(root.resolve())
     except (OSError, ValueError, RuntimeError):

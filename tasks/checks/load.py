@@ -1,4 +1,4 @@
-"""Task files: from text, from a path, or by the name of a task that ships with visup."""
+"""Loads tasks from text, from a path, or by the name of a shipped task."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ __all__ = ["load_task", "load_tasks", "parse_task", "read_text", "shipped_tasks"
 def parse_task(
     text: str, file: str = "<text>", actions: Mapping[str, ActionDefinition] | None = None
 ) -> Task:
-    """The task that a text describes.
+    """Parse and check a task.
 
     Args:
         text: A task file.
-        file: Its name, for messages; what it includes is looked for beside it.
-        actions: The actions that it may ask for; None for all that are known.
+        file: Its name, for messages; includes are relative to it.
+        actions: The available actions; None for all known ones.
 
     Returns:
-        The tree, free of mistakes. Of a file with several tasks it is the whole file, whose `name` is that
-        of the first (see `structure.tasks_of`).
+        The valid tree; for a file with several tasks the whole file, with the `name` of the first (see
+        `structure.tasks_of`).
 
     Raises:
-        TaskError: When it has one mistake.
-        ErrorGroup: When it has several; all are told at once, in the order of the text.
+        TaskError: It has one mistake.
+        ErrorGroup: It has several mistakes, in the order of the text.
     """
     task, faults = diagnose(text, file, actions)
     raise_all(faults, TaskError)
@@ -45,15 +45,15 @@ def load_task(
     """The task in a file, or the shipped task of that name.
 
     Args:
-        path_or_name: A path, or a name such as `dock`; `file.task:NAME` takes one task of several.
-        actions: The actions that it may ask for; None for all that are known.
+        path_or_name: A path, or a name such as `dock`; `file.task:NAME` selects one of several tasks.
+        actions: The available actions; None for all known ones.
 
     Returns:
-        The tree, free of mistakes.
+        The valid tree.
 
     Raises:
-        TaskError: When there is no such file or task, it has one mistake, or it holds several tasks.
-        ErrorGroup: When it has several mistakes.
+        TaskError: There is no such file or task, it has one mistake, or it has several tasks.
+        ErrorGroup: It has several mistakes.
     """
     tasks = load_tasks(path_or_name, actions)
     if len(tasks) > 1:

@@ -1,4 +1,4 @@
-"""What the words of a task must satisfy: actors, zones, parameters and amounts of the right kind."""
+"""Checks of names and amounts: actors, zones, parameters and units of the right kind."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ from visup.tasks.grammar.units import LENGTH, SIZE, TIME, UNITS, dimension, unit
 
 Declared = Actor | ZoneDeclaration | Parameter
 Asked = tuple[str, tuple[Name, ...], Span]
-"""An action that a file names, its actors, and where."""
+"""An action of a file, its actors, and its position."""
 
 
 @dataclass(frozen=True)
 class NameCheck:
-    """Checks of the words of a task.
+    """Checks the names and amounts of a task.
 
     Attributes:
-        parsed: The tree, and what is known of the statements that did not parse.
-        source: For places.
-        actions: The actions that it may ask for.
-        percepts: The kinds of percept that will be at hand.
-        asked: Every action that the file names.
+        parsed: The tree, and information about statements that did not parse.
+        source: For positions.
+        actions: The available actions.
+        percepts: The available kinds of percept.
+        asked: Every action of the file.
     """
 
     parsed: ParsedFile
@@ -70,7 +70,7 @@ class NameCheck:
 
     @cached_property
     def task(self) -> Task:
-        """What could be read."""
+        """The parsed tree."""
         return self.parsed.task
 
     @cached_property
@@ -93,7 +93,7 @@ class NameCheck:
         return [s.condition for s in signs] + [i.condition for i in self.task.invariants]
 
     def faults(self) -> Iterator[Diagnostic]:
-        """All faults of the words."""
+        """All faults of names and amounts."""
         yield from self.amounts()
         yield from self.compared()
         yield from self.ranges()
@@ -105,7 +105,7 @@ class NameCheck:
         yield from self.astray()
 
     def used(self) -> Iterator[tuple[Amount, str]]:
-        """Every amount that is used, with what it should measure; empty if unknown."""
+        """Every used amount with its expected dimension; empty if unknown."""
         for course in self.courses:
             if isinstance(course, Timed):
                 yield from ((a, TIME) for c in course.clauses for a in _durations(c))
@@ -122,15 +122,15 @@ class NameCheck:
             for amount in bounds_of(comparison):
                 on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
                 of_signal = wanted != TIME and action_of(comparison).name in SIGNAL_WORDS
-                # A signal has the unit of whoever tells it, or none.
+                # The unit of a signal depends on its source.
                 yield amount, SIZE if on_floor else ANY if of_signal else wanted
 
     def measured(self, amount: Amount) -> str:
-        """What an amount, or its parameter, measures."""
+        """The dimension of an amount, or of its parameter."""
         return dimension(self.task.amount(amount))
 
     def amounts(self) -> Iterator[Diagnostic]:
-        """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
+        """Amounts that are zero, of a wrong dimension, in unknown units, or of unknown parameters."""
         for parameter in self.task.parameters:
             if isinstance(parameter.amount, ParameterRef):
                 what = f"parameter `{parameter.name}` is not given a number"
@@ -152,7 +152,7 @@ class NameCheck:
                 yield from self.of_kind(self.task.amount(amount), wanted, amount)
 
     def amount(self, amount: Number, wanted: str) -> Iterator[Diagnostic]:
-        """What is wrong with one amount that is not a parameter."""
+        """Faults of one amount that is not a parameter."""
         if wanted == ANY and amount.unit == Unit.NONE:
             return
         if amount.unit not in UNITS:
@@ -175,7 +175,7 @@ class NameCheck:
             yield from self.of_kind(amount, wanted, amount)
 
     def of_kind(self, amount: Number, wanted: str, used: Amount) -> Iterator[Diagnostic]:
-        """A fault when an amount does not measure what is wanted where it is used."""
+        """A fault if an amount has a wrong dimension for its use."""
         measured = dimension(amount)
         if wanted in _MEASURED and measured and measured != wanted:
             what = f"`{used}` is not {_a(WORDS.get(wanted, wanted))}"
@@ -185,7 +185,7 @@ class NameCheck:
             yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
 
     def compared(self) -> Iterator[Diagnostic]:
-        """Quantities that are not compared, comparisons of what is none."""
+        """Quantities without comparison, comparisons without quantity."""
         compared = {id(action_of(c).span) for c in self.comparisons if not is_periodic(c)}
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
@@ -200,7 +200,7 @@ class NameCheck:
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
     def ranges(self) -> Iterator[Diagnostic]:
-        """Ranges in which nothing lies."""
+        """Empty ranges."""
         for comparison in self.comparisons:
             ends = [self.task.amount(a) for a in bounds_of(comparison)]
             alike = len({dimension(e) for e in ends} - {""}) == 1
@@ -210,7 +210,7 @@ class NameCheck:
                 yield self.source.fault("E238", what, comparison.span, expected)
 
     def kinds(self) -> Iterator[Diagnostic]:
-        """Zones where actors belong, and the other way round."""
+        """Zones in place of actors, and vice versa."""
         zones = {z.name for z in self.task.zones}
         for name, actors, _ in self.asked:
             meaning = self.actions.get(name)
@@ -231,7 +231,7 @@ class NameCheck:
         """A ground defined twice, or by points that do not determine it."""
         floors = [*(z.floor for z in self.task.zones), *(g.floor for g in self.task.grounds)]
         for side in (side for floor in floors for point in floor for side in point):
-            known = side.unit in UNITS  # a place may well be 0 m
+            known = side.unit in UNITS  # a position may be 0 m
             yield from self.of_kind(side, SIZE, side) if known else self.amount(side, SIZE)
         for ground in self.task.grounds[1:]:
             hint = "several tasks of one file share it"
@@ -264,7 +264,7 @@ class NameCheck:
                 first.setdefault(one.name, kind)
 
     def unused(self) -> Iterator[Diagnostic]:
-        """Zones and parameters that nothing uses; included files may offer more than is used."""
+        """Unused zones and parameters, except those of included files."""
         if self.parsed.faults:
             return
         named = {str(a) for _, actors, _ in self.asked for a in actors}
@@ -276,7 +276,7 @@ class NameCheck:
                     yield self.source.fault("E225", what, one.span)
 
     def unobserved(self) -> Iterator[Diagnostic]:
-        """Actions that need percepts that will not be available, each reported once."""
+        """Actions whose percepts are not available, each reported once."""
         told = set()
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
@@ -289,7 +289,7 @@ class NameCheck:
                 yield self.source.fault("E231", what, span, hint=hint)
 
     def astray(self) -> Iterator[Diagnostic]:
-        """Names of what is another one in each round of a loop, outside of that loop."""
+        """New actors of a loop used outside of it."""
         for kind in spare_kinds(self.task):
             outside = ((n, actors, a) for n, actors, _ in self.asked for a in actors if a == kind)
             for name, actors, actor in islice(outside, 1):
@@ -301,7 +301,7 @@ class NameCheck:
 
 
 ANY = "any"
-MANY = 500  # so many names are not compared with one another
+MANY = 500  # limit for pairwise comparison of names
 WORDS = {
     "angular_speed": "speed of turning",
     "size": "real size",

@@ -1,7 +1,7 @@
-"""Hints that have been tried: for each mistake of a task file the change that makes it go away.
+"""Tested hints: for each mistake of a task file a change that removes it.
 
-What a mistake usually means is in one table, by its code; a change is offered only when the file has
-fewer mistakes after it.
+A table maps the codes of mistakes to their usual meanings; a change is offered only if the file has fewer
+mistakes after it.
 """
 
 from __future__ import annotations
@@ -24,65 +24,67 @@ from visup.tasks.grammar.statement import RESERVED_WORDS
 from visup.tasks.grammar.units import UNITS
 
 CHARACTERS_TRIED = 60_000
-"""Of changes of one file: of a long file with many mistakes only the first have a tried hint."""
+"""Budget for the changes of one file: in a long file with many mistakes only the first have tested hints."""
 MOST_HINTS = 12
 MOST_CORRECTIONS, MOST_READINGS = 12, 3000
-"""Of one statement: changes of several words that are tried, and readings followed to find them."""
+"""Per statement: corrections of several words that are tested, and parser states explored to find them."""
 READING_COST = 1
-"""To follow a reading of a statement takes as long as to check so many characters of a file."""
+"""Cost of exploring a parser state, in checked characters."""
 
 Check = Callable[[str], Sequence[Diagnostic]]
 
 WORDS = (*RESERVED_WORDS, *ACTIONS, *KEYWORDS, "leftmost", "rightmost", "ignored")
 LONE_WORD = re.compile(rf"(?<![<\w.]){NAME}(?![\w>(])")
-"""A word that is neither an action nor a stage."""
+"""Matches a word that is neither an action nor a stage."""
 PHRASES = ("at least", "at most", "any order", "for each", "on failure of", "ends when", "fails when",
            "begins when", "pauses when", "progresses when", "each of", "each new")  # fmt: skip
 MEANT_WORDS = (*KEYWORDS, *PHRASES, "during", "leftmost", "rightmost", "largest", "smallest", "highest",
                "lowest", "left", "right", "top", "bottom")  # fmt: skip
 OTHER_WORDS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
                "topmost": "highest", "uppermost": "highest", "bottommost": "lowest"}  # fmt: skip
-"""What people say in place of a word of the language, though it is spelt otherwise."""
+"""Synonyms of words of the language."""
 
 
 def with_tried_hints(
     text: str, faults: Sequence[Diagnostic], check: Check
 ) -> tuple[Diagnostic, ...]:
-    """The faults, each with a change that has been tried, where one is known.
+    """The faults, with a tested change as their hint if one is found.
 
     Args:
         text: The file.
         faults: Its faults.
-        check: The faults of a text.
+        check: Returns the faults of a text.
     """
     trial, found = _HintTrial(text, faults, check), []
     for number, fault in enumerate(faults):
         hint = None
         if number < MOST_HINTS and trial.left > 0 and not trial.helps(fault):
             hint = trial.mend(fault)
-        said = None if fix_of(text, fault.place, fault.hint) else fault.hint  # what helps nothing
+        said = (
+            None if fix_of(text, fault.place, fault.hint) else fault.hint
+        )  # drop hints that do not help
         found.append(fault if hint is None else replace(fault, hint=_joined(said, hint)))
     return tuple(found)
 
 
 FAULT_COST = 100
-"""A fault takes as long to explain as so many characters take to read, or longer."""
+"""Least cost of explaining a fault, in checked characters."""
 LONGEST_HINT = 400
-"""Characters of a hint: what is longer, nobody reads."""
+"""Maximum characters of a hint; longer ones are not read."""
 NOTHING, ONE_STEP, IN_PART, WHOLLY = range(4)
-"""How much a change helps: not; so that the next fault lies further on; by what could not be read only; or
-by a fault and to no new one."""
+"""How much a change helps: not at all; it moves the next fault further on; it removes only syntax errors; or
+it removes a fault and causes no new one."""
 
 
 @dataclass
 class _HintTrial:
-    """Changes of a text, tried while there is patience.
+    """Tests changes of a text within a budget.
 
     Attributes:
         text: The file.
         faults: Its faults.
-        check: The faults of a text.
-        left: Characters that may still be read.
+        check: Returns the faults of a text.
+        left: Remaining characters of the budget.
     """
 
     text: str
@@ -91,11 +93,11 @@ class _HintTrial:
     left: int = CHARACTERS_TRIED
 
     def mend(self, fault: Diagnostic) -> str | None:
-        """A hint that helps: what is usually meant before small edits, one step before none."""
+        """A hint that helps: usual meanings before small edits, partial help before none."""
         found: list[tuple[str | None, int]] = []
         for hints in (_hints(self.text, fault), self.corrected(fault), self.edited(fault)):
             keep = fault.code < "E2" and bool(found) and found[0][1] > ONE_STEP
-            # What is usually meant, and helps in part, goes before leaving words out.
+            # A usual meaning that helps partly is preferred to deleting words.
             hint, helps = self.best(
                 fault, (h for h in hints if not (keep and h.startswith("leave")))
             )
@@ -106,12 +108,12 @@ class _HintTrial:
         return edit[0] if usual[1] <= ONE_STEP < edit[1] else usual[0]
 
     def edited(self, fault: Diagnostic) -> Iterator[str]:
-        """Small edits; of what cannot be read first, since what else is wrong may follow from it."""
+        """Small edits; for syntax errors first, since other faults may follow from them."""
         if fault.code < "E2" or all(f.code >= "E2" for f in self.faults):
             yield from _edits(fault)
 
     def corrected(self, fault: Diagnostic) -> Iterator[str]:
-        """Changes of several words of a statement that cannot be read."""
+        """Corrections of several words of a statement with a syntax error."""
         readings = MOST_READINGS
 
         def may_go_on() -> bool:
@@ -124,7 +126,7 @@ class _HintTrial:
             yield from islice(corrected(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
 
     def best(self, fault: Diagnostic, hints: Iterable[str]) -> tuple[str | None, int]:
-        """The first hint that helps wholly, else the first that helps most; and how much."""
+        """The first hint that helps completely, else the first that helps most; and how much."""
         partly: str | None = None
         most = NOTHING
         for hint in hints:
@@ -141,7 +143,7 @@ class _HintTrial:
         return partly, most
 
     def helps(self, fault: Diagnostic) -> int:
-        """How much the change helps that a hint speaks of."""
+        """How much the change of a hint helps."""
         fix = fix_of(self.text, fault.place, fault.hint)
         if fix is None:
             return NOTHING
@@ -149,7 +151,7 @@ class _HintTrial:
         known = told(self.faults)
         if len(after) < len(self.faults) and all((f.code, f.message) in known for f in after):
             return WHOLLY
-        # What could not be read hid what comes to light now.
+        # Removing a syntax error may reveal hidden faults.
         unread = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
         if fault.code >= "E2":
             return self.left_over(fault, after)
@@ -160,7 +162,7 @@ class _HintTrial:
         return ONE_STEP if further and (fault.code, fault.message) not in told(after) else NOTHING
 
     def left_over(self, fault: Diagnostic, after: Sequence[Diagnostic]) -> int:
-        """How much a change helps after which only something stands there that nobody uses any more."""
+        """How much a change helps that only leaves an unused definition behind."""
         known = told(self.faults)
         new = {f.code for f in after if (f.code, f.message) not in known}
         gone = (fault.code, fault.message) not in told(after)
@@ -168,7 +170,7 @@ class _HintTrial:
 
 
 UNUSED = ("E204", "E213", "E225")
-"""Codes of what is defined and takes no part, which can always be left out."""
+"""Codes of unused definitions, which can always be deleted."""
 
 
 def told(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
@@ -192,7 +194,7 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
         if fault.code not in usual.codes:
             continue
         matches = list(usual.pattern.finditer(line))
-        for match in sorted(matches, key=lambda m: _away(m, fault.place.column - 1)):
+        for match in sorted(matches, key=lambda m: _distance(m, fault.place.column - 1)):
             new = match.expand(usual.new) if isinstance(usual.new, str) else usual.new(match)
             if new != match[0]:
                 yield _placed(text, fault, match, new)
@@ -201,7 +203,7 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
 
 
 def _placed(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str:
-    """A change as a hint; with words around it where without them it would mean another place."""
+    """A change as a hint; with surrounding words if it would be ambiguous."""
     line = fault.place.text
     plain = _hint(line, match, new, fault.place.column - 1)
     fix = fix_of(text, fault.place, plain)
@@ -217,8 +219,8 @@ def _placed(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str
 
 
 def _misspelt(line: str, at: int) -> Iterator[str]:
-    """Words of the language in the place of words that are spelt nearly so, nearest to the caret first."""
-    for match in sorted(LONE_WORD.finditer(line), key=lambda m: _away(m, at)):
+    """Replacements of misspelt words of the language, nearest to the caret first."""
+    for match in sorted(LONE_WORD.finditer(line), key=lambda m: _distance(m, at)):
         if match[0] in OTHER_WORDS:
             yield _hint(line, match, OTHER_WORDS[match[0]], at)
         elif match[0] not in MEANT_WORDS:
@@ -227,7 +229,7 @@ def _misspelt(line: str, at: int) -> Iterator[str]:
 
 
 def _as_expected(fault: Diagnostic) -> Iterator[str]:
-    """What is expected, where that is the same in other signs, or another unit."""
+    """The expected text, if it is the same in other characters or another unit."""
     at = fault.place.column - 1
     said = fault.place.text[at : at + fault.place.length].strip()
     shown = re.findall(r"`([^`]+)`", fault.expected or "")
@@ -243,7 +245,7 @@ def _as_expected(fault: Diagnostic) -> Iterator[str]:
 
 
 def _edits(fault: Diagnostic) -> Iterator[str]:
-    """Where nothing usual is meant: small edits next to the fault."""
+    """Small edits next to the fault, if there is no usual meaning."""
     place = fault.place
     unread = fault.code < "E2"
     for repair in edits(place.text, place.column - 1, place.length, WORDS, unread=unread):
@@ -252,8 +254,8 @@ def _edits(fault: Diagnostic) -> Iterator[str]:
             yield hint
 
 
-def _away(match: re.Match[str], at: int) -> int:
-    """How far a match lies from the caret; 0 when it holds it."""
+def _distance(match: re.Match[str], at: int) -> int:
+    """Distance of a match from the caret; 0 if it contains it."""
     return (
         0
         if match.start() <= at <= match.end()
@@ -262,7 +264,7 @@ def _away(match: re.Match[str], at: int) -> int:
 
 
 def _hint(line: str, match: re.Match[str], new: str, at: int) -> str:
-    """The change in words that `fix_of` understands, from the caret on or with the place named."""
+    """A change as a hint that `fix_of` parses, at the caret or with a named position."""
     old = match[0]
     if not old.strip():
         before = re.search(r"\S+\s*$", line[: match.start()])

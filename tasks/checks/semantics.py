@@ -1,7 +1,7 @@
-"""What a tree must satisfy beyond its syntax: known names, the right actors, stages that are reached.
+"""Semantic checks: known names, correct actors, reachable stages.
 
-Courses and their clauses are checked in `courses.py`. Each check tells a fault where it
-stands and none that merely follows from another.
+Courses and their clauses are checked in `courses.py`. Each check reports a fault at its position, and none
+that merely follows from another.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from visup.tasks.grammar.nodes import (
 from visup.tasks.grammar.statement import RESERVED_WORDS
 from visup.tasks.grammar.structure import machines_of
 
-MANY = 500  # so many names are not compared with one another
-ALIKE = 0.85  # two names that are so alike are taken to be meant as one
+MANY = 500  # limit for pairwise comparison of names
+ALIKE = 0.85  # similarity from which two names are considered the same
 
 
 def check_semantics(
@@ -49,13 +49,13 @@ def check_semantics(
     actions: Mapping[str, ActionDefinition],
     percepts: AnySet[str],
 ) -> list[Diagnostic]:
-    """All mistakes of meaning in what could be read of a file.
+    """All semantic mistakes in the parsed part of a file.
 
     Args:
-        parsed: The tree, and what is known of the statements that did not parse.
-        source: For places.
-        actions: The actions that a task may ask for.
-        percepts: The kinds of percept that will be at hand.
+        parsed: The tree, and information about statements that did not parse.
+        source: For positions.
+        actions: The available actions.
+        percepts: The available kinds of percept.
 
     Returns:
         Faults in no particular order.
@@ -85,7 +85,7 @@ class _Semantics:
 
     @cached_property
     def asked(self) -> list[tuple[str, tuple[Name, ...], Span]]:
-        """Every action that the file names, with its actors: (action, actors, place)."""
+        """Every action of the file: (action, actors, span)."""
         task = self.parsed.task
         facts = [c for _, c in self.courses if isinstance(c, Action | Comparison)]
         signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
@@ -101,7 +101,7 @@ class _Semantics:
 
     @cached_property
     def heads(self) -> set[int]:
-        """Identities of the places of heads."""
+        """Identities of the spans of heads."""
         return {id(s.span) for s in self.parsed.task.stages}
 
     def faults(self) -> Iterator[Diagnostic]:
@@ -130,7 +130,7 @@ class _Semantics:
             yield from AmbiguityCheck(self.parsed.task, self.source, self.grammar).faults()
 
     def misread(self, stage: Stage) -> str:
-        """What a plain list of names was meant to be when it is no action, or empty."""
+        """The intended meaning of a plain list of names that is no action, or empty."""
         if not isinstance(stage.body, Actors) or stage.name in self.actions:
             return ""
         names = [str(n) for n in stage.body.names]
@@ -237,7 +237,7 @@ class _Semantics:
             yield self.source.fault("E202", what, reference.span, expected, hint)
 
     def headless(self) -> dict[str, Reference]:
-        """Undefined stages at the beginning of a line, where a rule without `::=` would stand."""
+        """Undefined stages at the beginning of a line, which may be rules without `::=`."""
         found: dict[str, Reference] = {}
         for _, c in self.courses:
             if isinstance(c, Reference) and c.stage in self.undefined:
@@ -283,7 +283,7 @@ class _Semantics:
                 yield self.source.fault("E204", what, stage.span, hint=hint)
 
     def slips(self) -> Iterator[Diagnostic]:
-        """Actors that are named once and look like another that is declared or named more often."""
+        """Probable misspellings: actors named once that resemble another one declared or named more often."""
         task = self.parsed.task
         machines = [a.machine for a in task.actors if a.machine is not None]
         counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
@@ -297,7 +297,7 @@ class _Semantics:
                 name = str(actor)
                 if name in declared or counts[name] > 1:
                     continue
-                meant = next((o for o in sure if _slip(name, o)), None)
+                meant = next((o for o in sure if _is_misspelling(name, o)), None)
                 if meant is not None:
                     what = f"actor `{name}` is named only here"
                     yield self.source.fault(
@@ -309,8 +309,8 @@ class _Semantics:
         named |= {m for a in named for m in machines_of(self.parsed.task, a)}
         for actor in self.parsed.task.actors:
             if actor.span.file or actor.name in named:
-                continue  # an included file may offer more than is used
-            if not any(_slip(n, actor.name) for n in named):
+                continue  # an included file may define more than is used
+            if not any(_is_misspelling(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
                 hint = did_you_mean(actor.name, named, "`{}`")
                 yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
@@ -320,8 +320,8 @@ def _line(span: Span) -> str:
     return f"line {span.line}{' of ' + span.file if span.file else ''}"
 
 
-def _slip(name: str, other: str) -> bool:
-    """Whether one name looks like a slip of the pen for another; `arm1` is none for `arm2`."""
+def _is_misspelling(name: str, other: str) -> bool:
+    """Whether one name is probably a misspelling of another; `arm1` is none of `arm2`."""
     if name == other or name.rstrip("0123456789_") == other.rstrip("0123456789_"):
         return False
     return SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE

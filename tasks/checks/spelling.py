@@ -1,4 +1,4 @@
-"""How words of task files are put in, left out and taken for others, to bring one into the grammar."""
+"""The costs of inserting, deleting and replacing words of task files, for error correction."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from visup.tasks.grammar.parser import parser
 from visup.tasks.grammar.statement import NAME
 
 SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
-"""What it costs to take a word for another: written so but for its case; said so; spelt nearly so."""
+"""Cost of replacing a word: by one that differs in case; by a synonym; by one of similar spelling."""
 NOISE, PLAIN, KNOWN = 0.2, 0.7, 2.5
-"""What it costs to leave out a word that says nothing, one that is not known, and one that is."""
+"""Cost of deleting a filler word, an unknown word, and a known one."""
 LONGEST_NAME = 4
-"""Words that may have been meant as one name."""
+"""Maximum number of words that may be meant as one name."""
 ANY_NAME = ("NAME", "UNIT", "MODEL")
-"""Terminals that any word may be."""
+"""Terminals that match any word."""
 _PUT_IN = {
     ")": 1.0, "(": 1.0, ",": 1.0, ":": 1.0, "&": 1.6, "=": 1.2, "when": 0.8, "order": 0.5, "of": 0.6,
     "each": 0.8, "to": 0.9, "least": 0.8, "most": 0.8, "times": 0.5, "than": 0.5, "first": 0.5, "from": 0.5,
@@ -38,7 +38,7 @@ _PUT_IN = {
     "actor": 1.3, "during": 1.5, '"dock"': 2.0, "larger": 1.4, "enters": 1.4, "moves": 1.4, "part": 1.2,
     "zone": 1.3, "parameter": 1.3, "never": 1.5,
 }  # fmt: skip
-"""What it costs to put in a word."""
+"""Cost of inserting a word."""
 _BRACKETS = {"[": "(", "]": ")", "{": "(", "}": ")"}
 _BEGINNINGS = {
     "actor": "object|entity|robot|agent|player|model|item|thing|body|actors",
@@ -62,10 +62,10 @@ _CALLS = re.compile(rf"({NAME})\s*\(([^()<>]*)\)")
 
 
 def speller(text: str) -> Speller:
-    """How the words of a task file are spelt.
+    """The speller for a task file.
 
     Args:
-        text: The whole file, for the names in it.
+        text: The whole file, for its names.
     """
     calls = [(m[1], re.findall(NAME, m[2])) for m in _CALLS.finditer(text)]
     actors = tuple(dict.fromkeys(a for _, names in calls for a in names if a not in KEYWORDS))
@@ -88,7 +88,7 @@ def _terminals() -> Terminals:
 
 @lru_cache(maxsize=512)
 def _terminals_of(word: str) -> tuple[str, ...]:
-    """The terminals that a word of the language may be, whatever follows."""
+    """The terminals that a word of the language may be, regardless of what follows."""
     return tuple(t.name for t in _terminals() if t.name not in ANY_NAME and t.alone.fullmatch(word))
 
 
@@ -122,7 +122,7 @@ def _drops(names: set[str]) -> Callable[[Word], float]:
 
 
 class _Things:
-    """What may be the name of a thing: any word that is none of the language and no relation."""
+    """Possible names of things: all words that are neither of the language nor relations."""
 
     def __contains__(self, word: object) -> bool:
         return (
@@ -135,7 +135,7 @@ class _Things:
 
 
 def plain_call(said: str) -> str:
-    """What is said in plain words as an action; the same words where they say none."""
+    """A phrase in plain words as an action; unchanged if it is none."""
     words = said.split()
     while words and words[0].casefold() in FILLERS:
         words = words[1:]
@@ -144,7 +144,7 @@ def plain_call(said: str) -> str:
 
 
 def _verb(word: str, things: int) -> str | None:
-    """The action of so many actors that is meant by a word."""
+    """The action with this number of actors meant by a word, or None."""
     known = _of_arity(things)
     return word if word in known else synonym(word, known)
 
@@ -159,7 +159,7 @@ def _of_arity(things: int) -> tuple[str, ...]:
 
 
 def _head_of(said: Sequence[str]) -> tuple[int, str] | None:
-    """How many words begin a rule in another manner, and the name of its stage."""
+    """Number of words that begin a rule in a nonstandard form, and the name of its stage."""
     line, ends = "", []
     for word in said:
         line += f" {word}"
@@ -171,7 +171,7 @@ def _head_of(said: Sequence[str]) -> tuple[int, str] | None:
 
 
 def _stage_name(said: str) -> str:
-    """A name of a stage for words that are none."""
+    """A valid stage name made from words."""
     name = re.sub(r"\W+", "_", said.strip()).strip("_")
     return name if name[:1].isalpha() else f"stage_{name}"
 
@@ -185,10 +185,10 @@ _HEAD = re.compile(
 
 
 class _Meanings:
-    """What words of a file may mean where they stand.
+    """Possible meanings of words by position.
 
     Args:
-        stages: That the file defines.
+        stages: Stages defined in the file.
     """
 
     def __init__(self, stages: frozenset[str]) -> None:
@@ -217,7 +217,7 @@ class _Meanings:
         return found
 
     def of(self, said: Sequence[str], first: bool) -> Iterator[tuple[int, str, float]]:
-        """How many of some words mean what, and how far-fetched that is."""
+        """(Number of words, meaning, cost) of the first words."""
         word, called = said[0], len(said) > 1 and said[1] == "("
         low = word.casefold()
         for length, meant in meant_by(said):
@@ -240,7 +240,7 @@ class _Meanings:
             yield from self.of_name(said, called)
 
     def of_name(self, said: Sequence[str], called: bool) -> Iterator[tuple[int, str, float]]:
-        """What is meant by a word of letters."""
+        """The meanings of a word of letters."""
         word = said[0]
         for length in range(2, len(said) + 1):
             joined = "_".join(said[:length]).replace("_-_", "_")
@@ -264,7 +264,7 @@ class _Meanings:
 
 _IN_COURSES = {"and": ("&",), "or": ("|",), "/": ("|",), "||": ("|",), "&&": ("&",), "if": ("when",),
                "while": ("when", "&"), "until": ("ends",)}  # fmt: skip
-"""Words of conditions and of other languages, as signs of courses."""
+"""Words of conditions and of other languages -> operators of courses."""
 
 
 def _kinds(meant: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What mistakes of task files usually mean: one table, by their codes."""
+"""The usual meanings of mistakes in task files: a table by codes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ New = str | Callable[[re.Match[str]], str]
 
 @dataclass(frozen=True, slots=True)
 class UsualMeaning:
-    """What a mistake usually means.
+    """A usual meaning of a mistake.
 
     Attributes:
-        codes: Of the mistakes.
-        pattern: What it looks like, looked for on its line, at the caret first.
-        new: What is meant.
+        codes: Codes of the mistakes.
+        pattern: Its pattern, searched in its line, at the caret first.
+        new: The replacement.
     """
 
     codes: tuple[str, ...]
@@ -37,7 +37,7 @@ def _usual(codes: str, pattern: str, new: New) -> UsualMeaning:
 
 STAGES_MEANT = {"near": "converging", "hold": "coupled", "holding": "coupled", "present": "present",
                 "wait": "present", "come": "converging"}  # fmt: skip
-"""What everyday words mean as a stage, where they mean something else as a condition."""
+"""Meanings of everyday words as stages, where they differ from those as conditions."""
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
              "converging": "diverging", "diverging": "converging", "gone": "present"}  # fmt: skip
 KEYWORD = (
@@ -56,12 +56,12 @@ PREFIXES = ("already", "task", "never", "always")
 
 
 def _listed(word: str, stages: str) -> str:
-    """Stages in a list behind a word: `any order (<a>, <b>)`."""
+    """Stages in a list after a word: `any order (<a>, <b>)`."""
     return f"{word} ({', '.join(stages.split())})"
 
 
 def _action_meant(name: str) -> str:
-    """The action that everyday speech means; else the name."""
+    """The action meant by an everyday word; else the name itself."""
     return STAGES_MEANT.get(name) or synonym(name, ACTIONS) or name
 
 
@@ -261,4 +261,4 @@ USUAL = (
     _usual("E113", rf"<\s*({CALL})\s*>", r"\1"),
     _usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
 )  # fmt: skip
-"""In the order in which they are tried."""
+"""In order of trial."""

@@ -1,7 +1,7 @@
-"""Diagnostics of task files: each error has a stable code, a place, and advice.
+"""Diagnostics of task files: each error has a stable code, a position, and a hint.
 
 Read in this order: `codes.py` (every code), `normalise.py` (characters), `recovery.py`
-(statement by statement, where a file does not parse), `error_patterns.py` and
-`course_error_patterns.py` (common errors), `includes.py` (files within files),
-`explain.py` with `explanations.txt` (each code at length).
+(statement by statement if a file does not parse), `error_patterns.py` and
+`course_error_patterns.py` (common errors), `includes.py` (included files),
+`explain.py` with `explanations.txt` (explanations of codes).
 """

@@ -19,14 +19,14 @@ _BLANK = re.compile(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|and\b|size\b)([\w.\-]+)")
 
 
 def criteria(text: str) -> RecognisedError | None:
-    """What is wrong with the criteria of an actor, by the words that begin them."""
+    """Errors in the criteria of an actor, by their first words."""
     if _ACTOR.match(text) is None:
         return None
     return _order(text) or _conduct(text) or _extent(text) or _place(text) or _part(text)
 
 
 def bystanders(text: str) -> RecognisedError | None:
-    """What is wrong with the statement that lets all be."""
+    """Errors in the `bystanders` statement."""
     m = re.match(r"\s*(bystanders)\b(?!\s+ignored\b)", text)
     if m is None:
         return None
@@ -36,7 +36,7 @@ def bystanders(text: str) -> RecognisedError | None:
 
 
 def actor(text: str) -> RecognisedError | None:
-    """What is wrong with the declaration of an actor as a whole."""
+    """Errors in the declaration of an actor as a whole."""
     m = _ACTOR.match(text)
     if m is None:
         return None

@@ -81,4 +81,4 @@ CODES = {
     "E239": "more stages, or ways to go on, than can be followed",
     "E240": "a name that is another thing in each round of a loop, outside of that loop",
 }
-"""Every code with what it stands for; a code never changes its meaning."""
+"""Code -> title; a code never changes its meaning."""

@@ -1,4 +1,4 @@
-"""Errors that people often make inside a course; `error_patterns.py` says in which order they are tried."""
+"""Common errors inside a course; `error_patterns.py` defines the order of trial."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def operators(text: str) -> RecognisedError | None:
 
 
 def empty_part(text: str) -> RecognisedError | None:
-    """Nothing beside `|` or `&`."""
+    """A missing operand of `|` or `&`."""
     m = re.search(r"(?:::=|[(|&])\s*([|&])|([|&])\s*(?:\)|[|&]|$)|\(\s*\)(?<![\w]\))", text)
     if m is None:
         return None
@@ -87,7 +87,7 @@ def empty_part(text: str) -> RecognisedError | None:
 
 
 def no_brackets(text: str) -> RecognisedError | None:
-    """An action whose actors stand behind it without brackets."""
+    """An action whose actors follow it without brackets."""
     m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME})[ ]+({NAME})", text)
     if m is not None and m[2] in ACTIONS:
         what = f"`{m[2]}` is written between its actors"
@@ -101,7 +101,7 @@ def no_brackets(text: str) -> RecognisedError | None:
 
 
 def no_actors(text: str) -> RecognisedError | None:
-    """Brackets with nothing in them."""
+    """Empty brackets."""
     m = re.search(rf"({NAME})[ ]*\(\s*\)", text)
     if m is not None:
         what = f"action `{m[1]}` has no actors"
@@ -140,7 +140,7 @@ def clause(text: str) -> RecognisedError | None:
 
 
 def commas(text: str) -> RecognisedError | None:
-    """Commas missing between actors, or standing where none belongs."""
+    """Missing or misplaced commas."""
     m = re.search(rf"{NAME}[ ]*\([^()]*?({NAME})[ ]+({NAME})[^()]*\)", text)
     if m is not None:
         what = f"actors `{m[1]}` and `{m[2]}` are not separated by a comma"
@@ -162,7 +162,7 @@ AGAIN = "such as `touching(wiper, glass) every 2 s to 4 s`"
 
 
 def periodic(text: str) -> RecognisedError | None:
-    """What happens again and again, said otherwise, or of more than one action."""
+    """A periodic action in another form, or of more than one action."""
     m = re.search(r"\b(periodic|periodically|repeating|cyclic)\b", text)
     if m is not None:
         what = f"`{m[1]}` is not part of the language"
@@ -187,11 +187,11 @@ SIGNS_MEANT = {
     "suspended": "pauses", "interrupted": "pauses", "interrupts": "pauses", "waits": "pauses",
     "halts": "pauses",
 }  # fmt: skip
-"""What people write in place of the word of a stage condition."""
+"""Synonyms of the words of stage conditions."""
 
 
 def signs(text: str) -> RecognisedError | None:
-    """`begins when` and the like without a condition, or without `when`."""
+    """A stage condition (`begins when`, ...) without a condition or without `when`."""
     m = re.search(
         rf"[>)?*+smh]\s+((?:begins|ends|progresses|fails|pauses|{'|'.join(SIGNS_MEANT)})\b)"
         r"(?!\s+when\b)",
@@ -216,7 +216,7 @@ def signs(text: str) -> RecognisedError | None:
 
 
 def times(text: str) -> RecognisedError | None:
-    """A number of times that is not complete, or written otherwise."""
+    """A count that is incomplete or in another form."""
     m = re.search(r"\b(for|within)\s+(at\s+(?:least|most))\b", text)
     if m is not None:
         what = f"`{m[1]}` already says that, without `{m[2]}`"
@@ -272,7 +272,7 @@ def joining_word(text: str) -> RecognisedError | None:
 
 
 def full_stop(text: str) -> RecognisedError | None:
-    """A rule that ends in `.` or `;`."""
+    """A rule ending in `.` or `;`."""
     m = re.search(r"([.;])\s*$", text)
     if m is None:
         return None
@@ -283,7 +283,7 @@ def full_stop(text: str) -> RecognisedError | None:
 
 
 def repeat_in_front(text: str) -> RecognisedError | None:
-    """A repetition mark that stands behind nothing, or twice."""
+    """A repetition mark without operand, or doubled."""
     m = re.search(r"(?:::=|[|&(])\s*([?*+])|([?*+])\s*([?*+])|\s([?*+])[ ]*(?=[<(\w])", text)
     if m is None:
         return None
@@ -295,7 +295,7 @@ def repeat_in_front(text: str) -> RecognisedError | None:
 
 
 def mixed_names(text: str) -> RecognisedError | None:
-    """A name that stands alone among actions and stages."""
+    """A bare name among actions and stages."""
     m = re.search(rf"(?<![<\w(,])[ ]+({NAME})(?=\s+(?:<|\(|{NAME}\s*[(<])|\s*[|&?*+])", text)
     if m is None or m[1] in RESERVED_WORDS:
         return None

@@ -1,7 +1,7 @@
-"""Errors that people often make in a statement, each recognised by a pattern of the text.
+"""Common errors in statements, each recognised by a pattern of the text.
 
-The first pattern that matches names the error, so the surest ones stand first. Those of a statement
-as a whole stand here, those inside a course in `course_error_patterns.py`.
+The first matching pattern determines the error, so the most reliable ones come first. Patterns of whole
+statements are here, those inside a course in `course_error_patterns.py`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from visup.tasks.grammar.statement import (
 
 
 def recognise_error(chunk: StatementText, source: Source) -> Diagnostic | None:
-    """The fault of a statement when it is one that people make, or None."""
+    """The fault of a statement if it is a common one, or None."""
     for recognise in PATTERNS:
         m = recognise(chunk.text)
         if m is not None:

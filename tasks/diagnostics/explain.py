@@ -1,4 +1,4 @@
-"""What a code means, with a wrong and a right example: `visup task explain CODE`."""
+"""Explains an error code with a wrong and a right example: `visup task explain CODE`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from visup.tasks.diagnostics.codes import CODES
 
 @dataclass(frozen=True, slots=True)
 class CodeExplanation:
-    """A code in words.
+    """The explanation of a code.
 
     Attributes:
         code: `E102`.
-        title: What it stands for, one clause.
+        title: Its meaning, one clause.
         why: Some sentences.
-        wrong: A file with this mistake; empty when none can be shown.
-        right: The same file without it; empty when none can be shown.
+        wrong: A file with this mistake, or empty.
+        right: The corrected file, or empty.
     """
 
     code: str

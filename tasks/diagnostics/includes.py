@@ -1,4 +1,4 @@
-"""`include`: the statements of other files, as if they stood in the file that includes them."""
+"""`include`: inserts the statements of other files."""
 
 from __future__ import annotations
 
@@ -15,27 +15,26 @@ from visup.tasks.grammar.conditions import Name
 from visup.tasks.grammar.nodes import Include, Task
 
 Read = Callable[[str, str], tuple[str, str]]
-"""(path, the file that includes it) -> (name of the file, its text); raises TaskError."""
+"""(path, including file) -> (name of the file, its text); raises TaskError."""
 
 
 def join_included(parsed: ParsedFile, source: Source, read: Read) -> ParsedFile:
-    """A file with the statements of the files that it includes behind its own.
+    """A file with the statements of its includes appended.
 
     Args:
         parsed: The file.
-        source: For places; gets to know the included files.
-        read: How files are read.
+        source: For positions; included files are added to it.
+        read: Reads files.
 
     Returns:
-        The file without includes; each file is taken once, however often it is included. The tasks of
-        an included file are stages here.
+        The file without includes; each file is included once. The tasks of an included file become stages.
     """
     if not parsed.task.includes:
         return parsed
     return _Joiner(source, read).join(parsed, (source.file,))
 
 
-DEEPEST = 30  # files that include one another in a row
+DEEPEST = 30  # nesting of includes
 MOST_FILES = 100
 MOST_CHARACTERS = 600_000
 
@@ -106,7 +105,7 @@ def _joined(one: ParsedFile, other: ParsedFile) -> ParsedFile:
 
 
 def _relocated(task: Task, file: str) -> Task:
-    """The same tree with every place said to be in an included file."""
+    """The same tree with every span in an included file."""
     return cast("Task", _moved(task, file))
 
 

@@ -1,4 +1,4 @@
-"""Characters: look-alikes of the language's own are reported, and read as intended."""
+"""Normalises characters: look-alikes are reported and replaced by the intended ones."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ UNUSUAL = re.compile(r"[#\x00-\x0c\x0e-\x1f\x7f\"'`]")
 
 
 def normalise(text: str, source: Source) -> tuple[str, list[Diagnostic]]:
-    """The text without what only looks wrong, so that it hides nothing else.
+    """Normalise a text, so that odd characters do not hide other mistakes.
 
     Args:
-        text: As the user wrote it.
-        source: For places.
+        text: The original text.
+        source: For positions.
 
     Returns:
-        Text of the same length, in which tabs, quotes and typographic characters are what was
-        meant and comments are blank; and one fault for each run of them.
+        Text of the same length with tabs, quotes and typographic characters replaced and comments blanked;
+        and one fault for each run of odd characters.
     """
     faults: list[Diagnostic] = []
     lines = text.split("\n")
@@ -48,7 +48,7 @@ def normalise(text: str, source: Source) -> tuple[str, list[Diagnostic]]:
 def _clean_line(
     line: str, before: str, number: int, source: Source, faults: list[Diagnostic]
 ) -> str:
-    """The line as it was meant; of each kind of odd character the line is told once."""
+    """The normalised line; each kind of odd character is reported once per line."""
     text = _text_in(line, before)
     if text is None:
         code = COMMENT.sub(lambda m: " " * len(m[0]), line)
@@ -65,7 +65,7 @@ def _clean_line(
 
 
 def _text_in(line: str, before: str) -> re.Match[str] | None:
-    """The text in quotes of a line, where one may stand: behind `::=` and `include`."""
+    """The quoted text of a line where one is allowed: after `::=` and `include`."""
     found = TEXT.search(line) or (OWN_LINE.match(line) if before.endswith("::=") else None)
     return None if found is None or "#" in line[: found.start(1)] else found
 
@@ -85,7 +85,7 @@ def _clean_code(
 
 
 def _quoted(line: str, start: int) -> int:
-    """How many characters stand from one quote to the next, both with them."""
+    """Number of characters from one quote to the next, inclusive."""
     ends = (i for i in range(start + 1, len(line)) if line[i] in QUOTES)
     return next(ends, start) - start + 1
 
@@ -120,7 +120,7 @@ def _odd_fault(code: str, char: str, place: SourceLocation) -> Diagnostic:
 
 
 def _one_for_tabs(faults: list[Diagnostic]) -> list[Diagnostic]:
-    """All tabs of a file are one habit, told once."""
+    """Report all tabs of a file once."""
     tabs = [f for f in faults if f.code == "E106"]
     if len(tabs) < 2:
         return faults

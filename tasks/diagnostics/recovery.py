@@ -1,4 +1,4 @@
-"""Mistakes of syntax: splitting at statements, and naming what went wrong in each."""
+"""Error recovery: splits a text at statements and finds the syntax error of each."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from visup.tasks.grammar.statement import RESERVED_WORDS, StatementText, blank_s
 NAME = r"[^\W\d]\w*"
 ACTORS = r"(?:\([\w ,]*\)[ ]*)?"
 HEAD = re.compile(rf"<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
-OPENS = re.compile(  # a line that begins a statement, well written or not
+OPENS = re.compile(  # a line that begins a statement, valid or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
     r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage"
     r"|bystanders?|ground(?=[ ]+is\b))\b(?![ ]*\())"
@@ -32,18 +32,18 @@ UNFINISHED = re.compile(
     r"(?:::=|[|&(,]|\b(?:for|within|after|every|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
-LONGEST = 4000  # characters of a statement that mistakes are looked for in
+LONGEST = 4000  # characters of a statement that are searched for mistakes
 
 
 @dataclass(frozen=True, slots=True)
 class ParsedFile:
-    """What could be read of a text.
+    """The parsed part of a text.
 
     Attributes:
-        task: All statements that are well written.
-        faults: What is wrong with the others.
+        task: All valid statements.
+        faults: The faults of the others.
         defined: Stages that the others seem to define.
-        used: Stages that the others mention.
+        used: Stages that the others refer to.
     """
 
     task: Task
@@ -53,19 +53,19 @@ class ParsedFile:
 
     @property
     def lacking(self) -> bool:
-        """Whether a file that it includes could not be read, so that names may be missing."""
+        """Whether an included file could not be read, so that names may be missing."""
         return any(f.code in ("E130", "E221", "E222") for f in self.faults)
 
 
 def parse(text: str, source: Source) -> ParsedFile:
-    """Read a cleaned text; where it is not in the grammar, statement by statement.
+    """Parse a normalised text; if that fails, statement by statement.
 
     Args:
-        text: See `clean`.
-        source: For places.
+        text: See `normalise`.
+        source: For positions.
 
     Returns:
-        The tree of all well written statements, one fault for each other one.
+        The tree of all valid statements, and one fault for each other one.
     """
     deep = _too_deep(blank_strings(text), source)
     if deep:
@@ -89,19 +89,19 @@ def _parse_in_parts(text: str, source: Source) -> ParsedFile:
             first = DECLARES.match(chunk.text)
             defined |= {first[1]} if first else set()
             used |= set(re.findall(NAME, chunk.text))
-    if not faults:  # each part reads well, but not all of them together
+    if not faults:  # each part is valid, but not the whole
         faults = [_whole(text, source)]
     task = collect(statements, source.file)
     return ParsedFile(task, tuple(faults), frozenset(defined), frozenset(used))
 
 
 def _in_place(chunk: StatementText) -> str:
-    """The statement with so much blank before it that its places are those in its file."""
+    """The statement padded with blanks, so that its positions are those in the file."""
     return "\n" * (chunk.line - 1) + " " * (chunk.column - 1) + chunk.raw
 
 
 def _near(chunk: StatementText, error: UnexpectedInput) -> StatementText:
-    """A statement, cut around the error when it is so long that looking at all of it takes long."""
+    """A statement, cut around the error if it is very long."""
     if len(chunk.text) <= LONGEST:
         return chunk
     starts = [0, *(m.end() for m in re.finditer("\n", chunk.text))]
@@ -114,10 +114,10 @@ def _near(chunk: StatementText, error: UnexpectedInput) -> StatementText:
 
 
 def split(text: str) -> Iterator[StatementText]:
-    """A cleaned text, cut where statements begin, as far as that can be told.
+    """Split a normalised text at the probable beginnings of statements.
 
-    Statements begin at `<name> ::=` anywhere, at lines that look like the beginning of one,
-    and at unindented lines that begin with a name that is not defined elsewhere.
+    Statements begin at `<name> ::=` anywhere, at lines that look like the beginning of one, and at unindented
+    lines that begin with a name that is not defined elsewhere.
     """
     code = blank_strings(text)
     heads = {m[0].split(">")[0].strip("< ") for m in HEAD.finditer(code)}
@@ -225,7 +225,7 @@ KEYWORDS = (
 
 
 def _unexpected(error: UnexpectedInput, chunk: StatementText, source: Source) -> Diagnostic:
-    """The fault when no particular mistake was recognised: what stands there, what could."""
+    """The general fault if no mistake was recognised: found and expected tokens."""
     if isinstance(error, UnexpectedToken):
         token, allowed = error.token, error.accepts or error.expected
         found = str(token).strip()
@@ -240,12 +240,12 @@ def _unexpected(error: UnexpectedInput, chunk: StatementText, source: Source) ->
         what,
         source.place(line, column, max(1, len(found))),
         expected=_said(allowed or set()),
-        hint=did_you_mean(found, KEYWORDS, "`{}`") if _slipped(found) else None,
+        hint=did_you_mean(found, KEYWORDS, "`{}`") if _is_misspelt(found) else None,
     )
 
 
-def _slipped(found: str) -> bool:
-    """Whether a word may be a slip of the pen for a word of the language."""
+def _is_misspelt(found: str) -> bool:
+    """Whether a word may be a misspelt word of the language."""
     return found.isidentifier() and found not in KEYWORDS
 
 

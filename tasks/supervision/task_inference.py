@@ -24,7 +24,7 @@ MOST = 12.0
 """Limit of the evidence for or against a task, natural logarithm."""
 
 IDLE = 3.0
-"""Prior log-odds that none of some rivals is in progress against one of them."""
+"""Prior odds that none of some rivals is in progress, per rival."""
 
 SURE = 0.9
 """Probability of a task from which on the alternative that none is in progress is excluded."""

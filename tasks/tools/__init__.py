@@ -1,5 +1,5 @@
-"""Tools around task files: none of them takes part in supervision.
+"""Tools for task files, not used in supervision.
 
-`formatter.py` lays a file out, `diagram.py` and `outline.py` draw a task, `simulate.py` lists the runs
-that it allows, `editing.py` answers an editor (hover, definition, completion).
+`formatter.py` formats a file, `diagram.py` and `outline.py` draw a task, `simulate.py` enumerates its
+courses, `editing.py` supports editors (hover, definition, completion).
 """

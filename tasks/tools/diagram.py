@@ -1,4 +1,4 @@
-"""The flow of a task as a picture, in the languages of Mermaid and Graphviz."""
+"""Flow charts of a task for Mermaid and Graphviz."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from visup.tasks.grammar.nodes import (
     Together,
 )
 
-BEGIN, END = "start", "finish"  # `end` is a word of Mermaid
+BEGIN, END = "start", "finish"  # `end` is a keyword of Mermaid
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A box of the picture: its lines, and the stage that it belongs to (empty for none)."""
+    """A box: its lines, and its stage (empty for none)."""
 
     lines: tuple[str, ...]
     stage: str = ""
@@ -37,24 +37,24 @@ class Node:
 
 @dataclass
 class Flow:
-    """What follows what.
+    """A flow chart.
 
     Attributes:
-        nodes: Boxes by number, in the order of the text.
-        edges: (from, to) -> what is written at the arrow.
+        nodes: Number -> box, in the order of the text.
+        edges: (from, to) -> label of the arrow.
     """
 
     nodes: dict[str, Node] = field(default_factory=dict)
     edges: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def add(self, node: Node) -> str:
-        """Its number."""
+        """Add a box; returns its number."""
         number = f"n{len(self.nodes)}"
         self.nodes[number] = node
         return number
 
     def link(self, before: Iterable[str], after: Iterable[str], label: str = "") -> None:
-        """Arrows from each of some boxes to each of others."""
+        """Add arrows from each box of `before` to each of `after`."""
         others = tuple(after)
         for a in before:
             for b in others:
@@ -63,7 +63,7 @@ class Flow:
 
 @dataclass(frozen=True, slots=True)
 class _Fragment:
-    """A part of the picture: where it begins, where it ends, whether it may be left out."""
+    """A part of the chart: its first and last boxes, and whether it is optional."""
 
     first: tuple[str, ...]
     last: tuple[str, ...]
@@ -71,7 +71,7 @@ class _Fragment:
 
 
 def flow_of(task: Task) -> Flow:
-    """The flow of a task; a stage is drawn where it first comes, later only named."""
+    """The flow of a task; a stage is drawn at its first reference, later only named."""
     flow = Flow()
     root = task.stage(task.name)
     if root is not None:
@@ -84,7 +84,7 @@ def flow_of(task: Task) -> Flow:
 
 
 def mermaid(flow: Flow) -> str:
-    """A flow in the language of Mermaid (flowchart)."""
+    """A flow as a Mermaid flowchart."""
     lines = ["flowchart TD", f"    {BEGIN}(( ))", f"    {END}((( )))"]
     lines += [f'    {k}["{_mermaid_text(n.lines)}"]' for k, n in flow.nodes.items()]
     for (a, b), label in flow.edges.items():
@@ -94,7 +94,7 @@ def mermaid(flow: Flow) -> str:
 
 
 def dot(flow: Flow) -> str:
-    """A flow in the language of Graphviz."""
+    """A flow as Graphviz source."""
     lines = ["digraph task {", "    node [shape=box, style=rounded];"]
     lines += [f"    {BEGIN} [shape=point];", f'    {END} [shape=doublecircle, label=""];']
     lines += [f'    {k} [label="{_dot_text(n.lines)}"];' for k, n in flow.nodes.items()]
@@ -132,7 +132,7 @@ class _Drawer:
         return _Fragment((number,), (number,))
 
     def course(self, course: Course, stage: str, said: tuple[str, ...]) -> _Fragment:
-        """A part of the picture; `said` are the clauses around it, written into its boxes."""
+        """A part of the chart; `said` are the surrounding clauses, written into its boxes."""
         match course:
             case Action() | Comparison():
                 return self.box(f"<{stage}>", str(course), *said, stage=stage)

@@ -1,6 +1,6 @@
-"""What editors ask of a task file: what a name means, where it is defined, where it is used.
+"""Editor support for task files: hover, definition, references, completion.
 
-Nothing here knows of the Language Server Protocol; places are lines and columns counted from 1.
+Independent of the Language Server Protocol; positions are lines and columns counted from 1.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class NameUse:
     Attributes:
         name: The name without brackets.
         kind: 'stage', 'action', 'name' (an actor, zone or parameter) or 'include'.
-        span: Where it stands, without brackets.
+        span: Its position, without brackets.
     """
 
     name: str
@@ -79,7 +79,7 @@ class NameUse:
 
 @dataclass(frozen=True, slots=True)
 class Completion:
-    """A word that may be put in, with what it means."""
+    """A completion with its meaning."""
 
     text: str
     kind: str
@@ -93,7 +93,7 @@ PATTERN = re.compile(
 
 
 def names(text: str) -> Iterator[NameUse]:
-    """Every name of a file, also of one with mistakes; comments and texts are passed over."""
+    """Every name of a file, even of one with mistakes; comments and strings are skipped."""
     code, _ = normalise(text, Source(text, ""))
     for number, line in enumerate(code.split("\n"), 1):
         for match in PATTERN.finditer(line):
@@ -104,7 +104,7 @@ def names(text: str) -> Iterator[NameUse]:
 
 
 def name_at(text: str, line: int, column: int) -> NameUse | None:
-    """The name at a place, also just behind it, or None."""
+    """The name at or just before a position, or None."""
     for word in names(text):
         if word.span.line == line and word.span.column <= column <= word.span.end_column:
             return word
@@ -112,7 +112,7 @@ def name_at(text: str, line: int, column: int) -> NameUse | None:
 
 
 def hover(text: str, file: str, word: NameUse) -> str | None:
-    """What a name means, in Markdown, or None."""
+    """The meaning of a name in Markdown, or None."""
     task, _ = diagnose(text, file)
     action = known_actions().get(word.name)
     if word.kind == "stage":
@@ -130,22 +130,22 @@ def hover(text: str, file: str, word: NameUse) -> str | None:
 
 
 def definition(text: str, file: str, word: NameUse) -> Span | None:
-    """Where a stage, actor, zone or parameter is defined, or None; `span.file` is the file."""
+    """The definition of a stage, actor, zone or parameter, or None; `span.file` is its file."""
     task, _ = diagnose(text, file)
     if word.kind == "include":
         return None
     if word.kind == "stage":
         return next((s.span for s in task.stages if called(s.name)[0] == word.name), None)
     declared = next((d.span for d in task.declared if d.name == word.name), None)
-    # An actor that is not declared is defined where it first acts.
+    # An undeclared actor is defined by its first use.
     first = next((w.span for w in _actors(text) if w.name == word.name), None)
     return declared or first
 
 
 def references(text: str, word: NameUse) -> list[NameUse]:
-    """All places of this file that mean the same stage, or the same actor, zone or parameter.
+    """All references in this file to the same stage, actor, zone or parameter.
 
-    A stage in the strict form is an action too; both change together, so neither can be renamed.
+    A stage in the strict form is also an action; both would change together, so neither can be renamed.
     """
     if word.kind not in ("stage", "name"):
         return []
@@ -194,7 +194,7 @@ def _named(
 
 
 def _actors(text: str) -> list[NameUse]:
-    """Names that stand in brackets, where actors stand."""
+    """Names in brackets, in the position of actors."""
     code, _ = normalise(text, Source(text, ""))
     rows = code.split("\n")
     inside = (w for w in names(text) if w.kind == "name")

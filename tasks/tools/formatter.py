@@ -1,7 +1,7 @@
-"""One layout for task files: `visup task format`.
+"""The formatter of task files: `visup task format`.
 
-The formatter never touches a word: it takes the tokens of the language and the comments between
-them and only decides about blanks and line ends, so that the meaning is the same by construction.
+It keeps all tokens and comments and changes only spaces and line breaks, so that the meaning is preserved by
+construction.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.parser import tokens
 
 WIDTH = 100
-LONGEST_HEAD = 24  # `::=` stand below each other when no head is longer than this
+LONGEST_HEAD = 24  # `::=` are aligned if no head is longer than this
 STARTERS = frozenset(
     {
         "TASK",
@@ -41,10 +41,10 @@ class _Token:
     """A token, or a comment.
 
     Attributes:
-        text: As it is written.
+        text: Source text.
         kind: Terminal of the grammar; `#` for a comment.
-        own_line: Of a comment: whether it stands on a line of its own.
-        blank_before: Whether a blank line stands before it.
+        own_line: Whether a comment is on a line of its own.
+        blank_before: Whether a blank line precedes it.
     """
 
     text: str
@@ -54,10 +54,10 @@ class _Token:
 
 
 def formatted(text: str) -> str:
-    """A task file in the layout of visup.
+    """Format a task file.
 
     Args:
-        text: A task file that is well written; its names need not make sense.
+        text: A syntactically valid task file; names are not checked.
 
     Returns:
         The same statements and comments; `formatted(formatted(text)) == formatted(text)`.
@@ -121,9 +121,9 @@ def _token_words(token: Token, blank: bool) -> Iterator[_Token]:
 
 
 def _statements(words: list[_Token]) -> Iterator[list[_Token]]:
-    """Statements, and comments between them by themselves.
+    """Statements, and the comments between them as separate items.
 
-    Comments on their own lines before a statement do not belong to the one before it.
+    Comments on their own lines before a statement do not belong to the previous one.
     """
     current: list[_Token] = []
     for i, word in enumerate(words):
@@ -147,7 +147,7 @@ def _is_marked(current: list[_Token]) -> bool:
 
 
 def _no_more(words: list[_Token], i: int) -> bool:
-    """Whether nothing but comments stands between a place and the next statement."""
+    """Whether only comments are between a position and the next statement."""
     rest = (w for w in words[i:] if w.kind != "#")
     following = next(rest, None)
     return following is None or following.kind in STARTERS or following.kind == "HEAD"
@@ -163,7 +163,7 @@ def _head(statement: list[_Token]) -> str:
 
 
 def _laid_out(statement: list[_Token], width: int) -> Iterator[str]:
-    """The lines of one statement: as long as they may be, broken before `|` where they must."""
+    """The lines of one statement, filled to the width, broken before `|` if necessary."""
     indent = 4
     words = statement
     if _has_head(statement) and not any(w.kind == "#" for w in statement[:3]):
@@ -197,7 +197,7 @@ def _laid_out(statement: list[_Token], width: int) -> Iterator[str]:
 
 
 def _unbroken(words: list[_Token], word: _Token) -> int:
-    """How long what must stay on one line with a word is: up to the next blank."""
+    """Length of the text up to the next possible line break."""
     at = next(i for i, w in enumerate(words) if w is word)
     length = len(word.text)
     for before, following in pairwise(words[at:]):
@@ -208,7 +208,7 @@ def _unbroken(words: list[_Token], word: _Token) -> int:
 
 
 def _tight(before: _Token, word: _Token) -> bool:
-    """Whether two words stand together without a blank."""
+    """Whether two tokens are joined without a space."""
     if word.kind in TIGHT_BEFORE or before.kind == "LPAR":
         return True
     return word.kind == "LPAR" and before.kind == "NAME"

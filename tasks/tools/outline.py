@@ -1,4 +1,4 @@
-"""The tree of a task as plain branches, for whoever draws it: the terminal, the report."""
+"""The outline of a task as a tree of branches, for the terminal and the report."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from visup.tasks.grammar.nodes import (
 )
 
 Kind = Literal["task", "stage", "action", "actor", "clause", "way", "words"]
-"""What a branch is: `clause` is a condition on what it holds, `way` how its parts follow."""
+"""Kind of a branch: `clause` is a condition on its content, `way` the order of its parts."""
 
 REPEATS = {"?": "perhaps", "*": "any number of times", "+": "at least once"}
 TITLES = {Choice: "one of", Together: "at the same time", AnyOrder: "each, in any order"}
@@ -36,11 +36,11 @@ class Branch:
     """A node of the tree of a task.
 
     Attributes:
-        text: What is written at it.
-        kind: What it is.
-        stage: The stage that it is, or that asks for it; empty for the task itself.
-        inside: What grows from it.
-        again: Whether it only names a stage that is drawn above.
+        text: Its text.
+        kind: Its kind.
+        stage: Its stage; empty for the task itself.
+        inside: Its branches.
+        again: Whether it only refers to a stage shown above.
     """
 
     text: str
@@ -51,19 +51,19 @@ class Branch:
 
 
 def outline(task: Task) -> Branch:
-    """The tree of a task: its stages with what they ask for.
+    """The outline of a task: its stages with their requirements.
 
     Args:
-        task: A task without mistakes.
+        task: A valid task.
 
     Returns:
-        The task's own branch; each stage is opened where it is first referred to.
+        The root branch; each stage is expanded at its first reference.
     """
     return Branch(task.name, "task", "", tuple(_stage(task, task.name, set())))
 
 
 def _stage(task: Task, name: str, drawn: set[str]) -> Iterator[Branch]:
-    """The requirements of a stage; nothing if it is drawn already."""
+    """The requirements of a stage; empty if it is shown already."""
     stage = task.stage(name)
     if stage is None or name in drawn:
         return

@@ -1,4 +1,4 @@
-"""What editors ask of a rules file: its mistakes, and the words that may stand in it."""
+"""Editor support for rules files: mistakes and completions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _as_diagnostic(error: VisupError) -> Diagnostic:
 
 
 def rule_completions() -> Iterator[Completion]:
-    """Every word of the rule language, with what it means."""
+    """Every word of the rule language with its meaning."""
     for vocabulary in (PREDICATES, QUANTITIES):
         for name, word in vocabulary.items():
             yield Completion(name, "action", f"{', '.join(word.takes)}: {word.meaning}")

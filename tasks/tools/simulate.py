@@ -1,6 +1,6 @@
-"""The legal courses of a task, walked, listed and drawn at random: `visup task simulate`.
+"""Enumerates and samples the legal courses of a task: `visup task simulate`.
 
-A course is told as moments: what is under way, from one change to the next.
+A course is a sequence of moments: the active steps between two changes.
 """
 
 from __future__ import annotations
@@ -22,50 +22,50 @@ from visup.tasks.grammar.copies import in_turn
 from visup.tasks.grammar.nodes import AnyOrder, Task
 from visup.tasks.grammar.structure import key_text
 
-LONGEST = 200  # moments after which a course drawn at random is cut off
-MOST_LOOKED_AT = 50_000  # beginnings of courses that a listing looks at
+LONGEST = 200  # moments after which a random course is cut off
+MOST_LOOKED_AT = 50_000  # prefixes of courses explored by an enumeration
 
 Moment = tuple[str, ...]
-"""What is under way at the same time, as text: `<approach> converging(arm, satellite)`."""
+"""The active steps as text: `<approach> converging(arm, satellite)`."""
 
 Trace = tuple[Moment, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where one is in a task.
+    """A position in a task.
 
     Attributes:
-        state: What is under way and what remains; None at the end.
+        state: The state of the course; None at the end.
     """
 
     state: State[None] | None
 
     @property
     def moment(self) -> Moment:
-        """What is under way; empty at the end."""
+        """The active steps; empty at the end."""
         return _moment(self.state) if self.state is not None else ()
 
 
 def initial_positions(task: Task) -> tuple[Position, ...]:
-    """The places where a task can begin; one at the end when nothing need be seen.
+    """The initial positions of a task; including the end if it may be empty.
 
-    Of things of which each is a new one, here and in what follows the first comes first.
+    Of interchangeable new actors, only the first in order is used, here and in `successors`.
     """
     return _distinct(enter(task, begin(task), None, 0.0))
 
 
 def successors(task: Task, place: Position) -> tuple[Position, ...]:
-    """The places that can come next; none after the end."""
+    """The possible next positions; none after the end."""
     if place.state is None:
         return ()
     return _distinct(m.state for m in derivatives(task, place.state, None, 0.0))
 
 
 def traces(task: Task) -> Iterator[Trace]:
-    """The courses of a task, each once, those of few moments first.
+    """The courses of a task, each once, shortest first.
 
-    It stops by itself when a task has so many that `MOST_LOOKED_AT` beginnings were looked at.
+    Stops after exploring `MOST_LOOKED_AT` prefixes.
     """
     told: set[Trace] = set()
     looked_at: set[object] = set()
@@ -82,13 +82,13 @@ def traces(task: Task) -> Iterator[Trace]:
             now = (*before, place.moment)
             for following in successors(task, place):
                 key = (now, None if following.state is None else structural_key(following.state))
-                if key not in looked_at:  # several ways may have led there
+                if key not in looked_at:  # several paths may lead there
                     looked_at.add(key)
                     todo.append((now, following))
 
 
 def sample(task: Task, rng: Random) -> tuple[Trace, bool]:
-    """A course drawn at random, and whether it came to its end within `LONGEST` moments."""
+    """A random course, and whether it ended within `LONGEST` moments."""
     place = rng.choice(initial_positions(task))
     course: list[Moment] = []
     while place.state is not None and len(course) < LONGEST:
@@ -106,7 +106,7 @@ def _distinct(states: Iterator[State[None] | None]) -> tuple[Position, ...]:
 
 
 def _in_turn(state: State[None]) -> bool:
-    """Whether what is another one each time round came in its order so far."""
+    """Whether the new actors of loops have come in order so far."""
     if isinstance(state, SequenceState):
         loop = state.rest.course
         return (not isinstance(loop, AnyOrder) or in_turn(loop)) and _in_turn(state.head)

@@ -1,6 +1,6 @@
 """Syntax files for editors without a language server: Vim, Emacs, and highlight.js for web pages.
 
-The words are those of the two grammars themselves, so that no file lacks one that the languages have.
+The words are extracted from the two grammars, so that the files are complete.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _NOTE = "made by `visup task syntax {editor} --language {language}`"
 
 @dataclass(frozen=True)
 class Syntax:
-    """What an editor needs to know of a language.
+    """The syntax of a language for editors.
 
     Attributes:
-        name: 'task' or 'rules'; the ending of its files, too.
+        name: 'task' or 'rules'; also the suffix of its files.
         grammar: Its grammar.
         constants: Words that are values.
         units: Its units.
@@ -42,18 +42,18 @@ class Syntax:
 
     @cached_property
     def keywords(self) -> tuple[str, ...]:
-        """The words of the language that are neither values nor units, in alphabetical order."""
+        """The keywords that are neither values nor units, in alphabetical order."""
         found = set(keywords_of(self.grammar)) - {*self.constants, *self.units}
         return tuple(sorted(found))
 
     @cached_property
     def unit_pattern(self) -> str:
-        """A unit; the longer ones first, since `px/s` begins with `px`."""
+        """A pattern of units; longer ones first, since `px/s` begins with `px`."""
         return "|".join(sorted(self.units, key=lambda u: (-len(u), u)))
 
 
 def keywords_of(grammar: str) -> set[str]:
-    r"""The words that stand in a grammar: quoted ones, and those of terminals that list words.
+    r"""The words of a grammar: quoted ones, and those of terminals that list words.
 
     >>> sorted(keywords_of('a: "size" B\nB.1: /(begins|ends)(?=\\s+when\\b)/\nNAME: /[a-z]\\w*/'))
     ['begins', 'ends', 'size', 'when']
@@ -161,7 +161,7 @@ def highlightjs(syntax: Syntax) -> str:
 EDITORS: Mapping[str, Callable[[Syntax], str]] = MappingProxyType(
     {"vim": vim, "emacs": emacs, "highlightjs": highlightjs}
 )
-"""For which editors there are syntax files, and who writes them."""
+"""Editor -> function that writes its syntax file."""
 
 
 def _note(editor: str, syntax: Syntax) -> str:
