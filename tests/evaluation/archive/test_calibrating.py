@@ -159,7 +159,7 @@ def test_the_command(
     squares = (1 - objects[1]["confidence"]) ** 2 + objects[2]["confidence"] ** 2
     assert by_kind["identity"]["brier"] == pytest.approx(squares / 2)
     assert by_kind["verdict"]["right"] == 1.0
-    assert "identity: 2 statements, 50%" in visup(*words).out
+    assert "Statements about identity: 2, of which 50% right" in visup(*words).out
     page, fit = tmp_path / "page.html", tmp_path / "fit.toml"
     told = visup(*words, "--page", page, "--fit", fit)
     assert "2 objects are labelled; fitting the weight of votes takes at least 10" in told.out

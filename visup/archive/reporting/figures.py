@@ -39,9 +39,9 @@ def verdict_figure(found: LakeStatistics) -> Figure | None:
         }
         for verdict in sorted({verdict for _, verdict, _ in dated})
     ]
-    caption = f"{len(weeks)} weeks, from that of {weeks[0]} to that of {weeks[-1]}."
+    caption = f"Weeks from {weeks[0]} to {weeks[-1]}."
     layout = {**_layout("runs"), "barmode": "stack"}
-    return Figure("verdicts", "Runs of each week, by how they ended", caption, traces, layout)
+    return Figure("verdicts", "Runs per week, by verdict", caption, traces, layout)
 
 
 def duration_figures(found: LakeStatistics) -> list[Figure]:
@@ -58,7 +58,7 @@ def _duration_figure(number: int, stage: StageDuration, weeks: list[StageDuratio
     bounds = [rounded(w.high) for w in weeks], [rounded(w.low) for w in reversed(weeks)]
     band = {
         "type": "scatter",
-        "name": "8 of 10 runs",
+        "name": "middle 80 % of runs",
         "x": [*x, *reversed(x)],
         "y": [*bounds[0], *bounds[1]],
         "fill": "toself",
@@ -77,7 +77,7 @@ def _duration_figure(number: int, stage: StageDuration, weeks: list[StageDuratio
         "hovertemplate": "%{y:.1f} s, %{customdata} runs<extra></extra>",
     }
     caption = (
-        f"Median {stage.mid:.1f} s of {stage.runs} runs; 8 of 10 took {stage.low:.1f} to"
+        f"Median {stage.mid:.1f} s over {stage.runs} runs; the middle 80 % took {stage.low:.1f} to"
         f" {stage.high:.1f} s, the longest {stage.longest:.1f} s."
     )
     title = f"Stage '{stage.stage}' of task '{stage.task}'"

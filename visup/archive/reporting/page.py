@@ -14,7 +14,7 @@ from visup.report.page.sections import figures
 from visup.report.page.shell import filled_page, write_page
 from visup.wording import printable
 
-DURATION_HEAD = ("task", "stage", "runs", "a tenth under", "median", "a tenth over", "longest")
+DURATION_HEAD = ("task", "stage", "runs", "10th percentile", "median", "90th percentile", "longest")
 
 
 def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
@@ -36,10 +36,10 @@ def lake_page(found: LakeStatistics, lake: Path) -> str:
     text = {
         "title": escape(lake.absolute().name),
         "tiles": _tiles(found),
-        "verdicts": figures([verdict_figure(found)], "No run says when it was taken."),
+        "verdicts": figures([verdict_figure(found)], "No run has a date."),
         "durations": _duration_table(found.durations, ""),
-        "weeks": figures(duration_figures(found), "No stage is of a week that is known."),
-        "actors": _duration_table(found.by_actor, "who played, or label"),
+        "weeks": figures(duration_figures(found), "No stage belongs to a run with a date."),
+        "actors": _duration_table(found.by_actor, "actor = model, or label"),
         "drifts": _drifts(found),
         "failures": _failures(found),
     }
@@ -89,7 +89,7 @@ def _duration_table(of: Sequence[StageDuration], group: str) -> str:
         for d in of
     ]
     head = (*((group,) if group else ()), *DURATION_HEAD)
-    return html_table(head, rows, "No stage was followed.")
+    return html_table(head, rows, "No run has a stage.")
 
 
 def _drifts(found: LakeStatistics) -> str:
@@ -105,8 +105,8 @@ def _drifts(found: LakeStatistics) -> str:
         )
         for d in found.drifts
     ]
-    head = ("task", "stage", "first quarter", "last quarter", "change", "runs", "by chance")
-    return html_table(head, rows, "No stage has become slower or faster, as far as can be told.")
+    head = ("task", "stage", "first quarter", "last quarter", "change", "runs", "p")
+    return html_table(head, rows, "No stage has become significantly slower or faster.")
 
 
 def _failures(found: LakeStatistics) -> str:
@@ -115,7 +115,7 @@ def _failures(found: LakeStatistics) -> str:
          f"{f.clip} ({f.run[:8]})")
         for f in found.failures
     ]  # fmt: skip
-    head = ("stage that failed", "gravest alert", "runs", "of those that failed", "such as")
+    head = ("failed stage", "most severe alert", "runs", "share of failures", "example")
     return html_table(head, rows, "No run failed.")
 
 

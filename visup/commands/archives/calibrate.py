@@ -58,6 +58,7 @@ def calibrate(
         return
     console = make_console()
     for one in found:
+        console.print(_summary(one), soft_wrap=True, markup=False)
         console.print(_reliability_table(one))
     for text in (fitted if fit else "", f"Page: {page}" if page else ""):
         if text:
@@ -88,14 +89,17 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
     return f"{how} Fitted: {evidence:.3f}, written to {path}."
 
 
+def _summary(one: Reliability) -> str:
+    return (
+        f"Statements about {one.kind}: {one.count}, of which {one.right:.0%} right;"
+        f" calibration error {one.error:.3f}, Brier score {one.brier:.3f}"
+    )
+
+
 def _reliability_table(one: Reliability) -> Table:
     from visup.terminal.tables import table
 
     shown = table("count", "confidence", "right")
     for b in one.bins:
         shown.add_row(f"{b['count']:.0f}", f"{b['confidence']:.2f}", f"{b['right']:.2f}")
-    shown.title = (
-        f"{one.kind}: {one.count} statements, {one.right:.0%} right,"
-        f" calibration error {one.error:.3f}, Brier {one.brier:.3f}"
-    )
     return shown

@@ -1,4 +1,4 @@
-"""The page of a calibration: reliability diagrams, the same in numbers, and what was fitted."""
+"""The page of a calibration: reliability diagrams, figures, and fitted settings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from visup.evaluation.archive.calibrating import Reliability
 from visup.report.page.figures import Figure, rounded
 from visup.report.page.sections import figures
 
-NUMBERS_HEAD = ("of", "said", "right", "calibration error", "Brier score")
+NUMBERS_HEAD = ("statements about", "count", "right", "calibration error", "Brier score")
 SMALLEST_PX, LARGEST_PX = 6.0, 24.0
 
 
@@ -21,9 +21,9 @@ def calibration_page(found: Sequence[Reliability], lake: Path, fitted: str) -> s
     """The whole page; the same figures always give the same one.
 
     Args:
-        found: How much the confidences of each kind are worth.
+        found: Reliability of each kind of statement.
         lake: The lake, for the title.
-        fitted: What was fitted, a sentence.
+        fitted: A sentence about fitted settings.
 
     Raises:
         ExtraMissingError: Plotly is not installed.
@@ -35,20 +35,22 @@ def calibration_page(found: Sequence[Reliability], lake: Path, fitted: str) -> s
     ]
     text = {
         "title": escape(lake.absolute().name),
-        "diagrams": figures(drawn, "Nothing was said of which the truth is known."),
-        "numbers": html_table(NUMBERS_HEAD, rows, "Nothing was said of which the truth is known."),
+        "diagrams": figures(drawn, "No statement can be compared with the ground truth."),
+        "numbers": html_table(
+            NUMBERS_HEAD, rows, "No statement can be compared with the ground truth."
+        ),
         "fitted": escape(fitted),
     }
-    return archive_page("calibration.html", text, drawn, "confidences")
+    return archive_page("calibration.html", text, drawn, "calibration")
 
 
 def reliability_figure(one: Reliability) -> Figure:
-    """A reliability diagram: which share of what was said so surely is right."""
+    """A reliability diagram: the share of right statements at each level of confidence."""
     most = max(b["count"] for b in one.bins)
     line = {
         "type": "scatter",
         "mode": "lines",
-        "name": "as good as said",
+        "name": "perfect calibration",
         "x": [0, 1],
         "y": [0, 1],
         "line": {"color": BAND, "dash": "dot"},
@@ -63,13 +65,13 @@ def reliability_figure(one: Reliability) -> Figure:
         "customdata": [b["count"] for b in one.bins],
         "marker": {"size": [_size(b["count"] / most) for b in one.bins]},
         "line": {"color": LINE},
-        "hovertemplate": "said %{x:.2f}, right %{y:.2f}, %{customdata:.0f} times<extra></extra>",
+        "hovertemplate": "confidence %{x:.2f}, right %{y:.2f}, count %{customdata:.0f}<extra></extra>",
     }
     caption = (
-        f"{one.count:,} said, {one.right:.0%} right; calibration error {one.error:.3f},"
+        f"Statements: {one.count:,}, of which {one.right:.0%} right; calibration error {one.error:.3f},"
         f" Brier score {one.brier:.3f}."
     )
-    title = f"Confidences of the {one.kind}"
+    title = f"Confidence of {one.kind}"
     return Figure(f"reliability-{one.kind}", title, caption, [line, points], _layout())
 
 
@@ -79,11 +81,11 @@ def _size(share: float) -> float:
 
 
 def _layout() -> dict[str, Any]:
-    axis = {"range": [0, 1], "zeroline": False}
+    axis = {"range": [-0.04, 1.04], "zeroline": False}
     return {
-        "height": 340,
+        "height": 360,
         "margin": {"l": 56, "r": 16, "t": 12, "b": 44},
         "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
         "xaxis": {**axis, "title": {"text": "confidence"}},
-        "yaxis": {**axis, "title": {"text": "share that is right"}},
+        "yaxis": {**axis, "title": {"text": "share right"}},
     }
