@@ -44,7 +44,18 @@ def sentences(
         names: What things are called.
         verb: The relation that a word means.
     """
-    content = [(n, w) for n, w in enumerate(_run(words)) if w in names or w not in _BETWEEN]
+    run = list(enumerate(_run(words)))
+    plain = [(n, w) for n, w in run if w in names or w not in _BETWEEN]
+    # A preposition may be the relation itself: `a is on b`.
+    whole = [(n, w) for n, w in run if w in names or w not in FILLERS]
+    yield from _said(plain, names, verb)
+    yield from _said(whole, names, verb) if whole != plain else ()
+
+
+def _said(
+    content: Sequence[tuple[int, str]], names: Container[str], verb: Verb
+) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """What words say of things, each with its place, those that say nothing left out."""
     said = [w for _, w in content]
     for shape in ((0, 1, 2), (1, 0, 2), (2, 0, 1), (1, 0), (0, 1)):
         if len(said) <= max(shape) or (content[0][0] > 0 and shape[0] > 0):

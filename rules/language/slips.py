@@ -46,7 +46,41 @@ def _some_of(least: int, parts: list[str]) -> str:
 
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
+_NUMBER, _UNIT = r"-?\d+(?:\.\d+)?", r"px/s2|px/s|px|%|ms|min|mm|m/s|m|cm|s|h|deg/s|deg|/s"
+_RANGE = (
+    rf"(?P<low>{_NUMBER})\s*(?P<unit>{_UNIT})?\s*(?:\band\b|\bto\b|&|,|;|-|\.\.)\s*"
+    rf"(?P<high>{_NUMBER}(?:\s*(?:{_UNIT})(?![\w/]))?)"
+)
+_ON = r"(touching(\1, \2) and north_of(\1, \2))"
+_QUANTIFIED = r"\b(exists|forall)\s+"
+
+
+def _in_range(match: re.Match[str]) -> str:
+    """A quantity within a range, or outside it; a number without a unit has that of the other one."""
+    what, high = match["what"], match["high"]
+    unit = match["unit"] or re.sub(rf"^{_NUMBER}\s*", "", high)
+    high = high if re.search(r"[a-z%]", high) else f"{high} {unit}".rstrip()
+    low = f"{match['low']} {unit}".rstrip()
+    within = f"{what} >= {low} and {what} <= {high}"
+    return f"not ({within})" if match["no"] else within
+
+
 SLIPS = (
+    _slip(rf"(?P<what>{_CALL})\s+(?:is\s+|stays\s+|lies\s+)?(?P<no>not\s+)?(?:in\s+)?(?:between|from)\s*"
+          rf"(?P<open>[\[(])?\s*{_RANGE}(?(open)\s*[\])])", _in_range),
+    _slip(rf"(?P<no>\bnot\s+)?\bbetween\(\s*(?P<what>{_CALL})\s*,\s*{_RANGE}\s*\)", _in_range),
+    _slip(rf"{_QUANTIFIED}(\w+)\s*(?:!=|<>|≠|(?:is\s+)?not|other\s+than|(?:different|distinct)\s+from)\s*\w+\s*:",
+          r"\1 \2:"),
+    _slip(rf"{_QUANTIFIED}(\w+)\s*(?:,|and|&)\s*(\w+)\s*:", r"\1 \2: \1 \3:"),
+    _slip(r"\b(exists|forall)\s*\(\s*(\w+)\s*\)\s*:?\s*(?=\w)", r"\1 \2: "),
+    _slip(rf"{_QUANTIFIED}(?:an?|any|some|one|another|objects?|things?|bod(?:y|ies))\s+(\w+)"
+          r"(?=\s*(?::|\bsuch\b|\bwhere\b|\bwith\b))", r"\1 \2"),
+    _slip(r"\b([a-z_]{3,})\s+(?:between|of|from)\s+(\w+)\s+(?:and|to|,)\s*(\w+)(?=\s*[<>=])", r"\1(\2, \3)"),
+    _slip(r"∃\s*(?=\w)", "exists "),
+    _slip(r"∀\s*(?=\w)", "forall "),
+    _slip(r"\bon(?:[ _]?top(?:[ _]of)?)?\(\s*(\w+)\s*,\s*(\w+)\s*\)", _ON),
+    _slip(r"\b(?!(?:and|or|not|when|unless)\b)(\w+)\s+(?:is\s+|sits\s+|lies\s+|rests\s+)?on(?:\s+top\s+of|to)?"
+          r"\s+(\w+)\b(?!\s*\()", _ON),
     _slip(r"\b(?:self|this|math|np|numpy|visup|rules|stl)\.(?=\w+\s*\()", ""),
     _slip(rf"({_CALL})\s*(?:===?|=|>=?)\s*1(?![\d.])", r"\1"),
     _slip(rf"({_CALL})\s*>\s*0(?![\d.])", r"\1"),
@@ -149,7 +183,6 @@ SLIPS = (
     ),
     _slip(r"\bfor\s+(\d+)\s*(?:frames|samples)\b", r"in \1 of \1 samples"),
     _slip(r"\bwithin\s+(\d+)\s*(?:frames|samples)\b", r"in 1 of \1 samples"),
-    _slip(rf"({_CALL})\s+between\s+({_AMOUNT})\s+and\s+({_AMOUNT})", r"\1 >= \2 and \1 <= \3"),
     _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})", r"\1 \2 \3 and \3 \4 \5"),
     _slip(r"\b(?:for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+ago\b", r"within \1 to \1 ago"),
     _slip(r"\b(?:for|within)\s+-\s*(\d)", r"for \1"),

@@ -18,7 +18,7 @@ from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.additions import added
 from visup.tasks.checks.corrections import corrected, said
-from visup.tasks.checks.usual_meanings import NAME, USUAL
+from visup.tasks.checks.usual_meanings import NAME, USUAL, recoveries
 from visup.tasks.diagnostics.recovery import KEYWORDS
 from visup.tasks.grammar.statement import RESERVED_WORDS
 from visup.tasks.grammar.units import UNITS
@@ -189,6 +189,8 @@ def _joined(said: str | None, hint: str) -> str:
 def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
     line = fault.place.text
     if fault.code < "E2":
+        for match, new in recoveries(text, line):
+            yield _placed(text, fault, match, new)
         yield from _misspelt(line, fault.place.column - 1)
     for usual in USUAL:
         if fault.code not in usual.codes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from visup.agent.model.did_you_mean import closest
@@ -85,12 +85,13 @@ USUAL = (
     _usual("E101", rf"<({NAME})>\s*\(([^()]*)\)", r"<\1(\2)>"),
     _usual("E101 E134", r"\b(any\s+\d+\s+of)\s+((?:<[^>]*>\s*){2,})", lambda m: _listed(m[1], m[2])),
     _usual("E101", r"(between\s+[\d.]+\s*\S*?)\s*(?:,|to|-|\.\.)\s*([\d.]+)", r"\1 and \2"),
-    _usual("E101", r"\bon\s+(?:failure|error)\s+(?!of)", "on failure of "),
     _usual("E101 E103 E219", r"\bon\s+(?:fail(?:ing|s|ed)?|errors?)\s+of\b", "on failure of"),
+    _usual("E101 E219", rf"\b({NAME})\s+(?:between|of|from)\s+({NAME})\s+(?:and|to|,)\s*({NAME})(?=\s*[<>])",
+           r"\1(\2, \3)"),
     _usual("E219", rf"\b({NAME})\s+({NAME})\s+(?:with|and|to)\s+({NAME})\b", r"\1(\2, \3)"),
     _usual("E103", r"\b(?:each|all)\s+of\s*(?=\()", ""),
     _usual("E101", r"\b(on\s+failure\s+of\s+<[^>]*>)\s*(?!:)", r"\1: "),
-    _usual("E101", rf"\b(?:exists|forall|some|all)\s+{NAME}\s*:\s*", ""),
+    _usual("E101 E103", rf"\b(?:exists|forall|some|all)\s+{NAME}\s*:\s*", ""),
     _usual("E101", r"\b(?:rising|falling|once|previous)\s*\((.*)\)", r"\1"),
     _usual("E101 E103", rf"({CALL})\s+(for\s+{TIME})(?=\s+(?:and|or)\b)", r"(\1 \2)"),
     _usual("E101", rf"(\s+when\s+.*?)\s+(for\s+{TIME})\s+((?:and|or)\s+[^\n]*)", r"\1 \3 \2"),
@@ -108,9 +109,12 @@ USUAL = (
     _usual("E109", r"::=\s*$", "::= present(x)"),
     _usual("E101", rf"\bbetween\s+(\d[\d.]*)\s*(?:s\s*)?(?:and|to)\s+({TIME})", r"after \1 s within \2"),
     _usual("E101 E119", r"\ball\s+of\s*(?=\()", "any order "),
-    _usual("E101 E103",
+    _usual("E101 E103 E119",
            r"\b(?:from|in|within)\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|\.\.)\s*([\d.]+\s*[a-z%/]+)",
            r"between \1 and \2"),
+    _usual("E101 E103 E119",
+           rf"\bbetween\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|,|\.\.)\s*([\d.]+\s*[a-z%/]+)\s+({CALL})",
+           r"\3 between \1 and \2"),
     _usual("E101 E103", rf"\b(\d+)\s+times\s+({PARTS})", r"(\2) at least \1 times at most \1 times"),
     _usual("E127 E134", rf"\brepeat\s+({PARTS})\s+until\s+({PARTS})", r"\1+ \2"),
     _usual("E101 E103 E134", r"\b(?:maximum|max|up\s+to|no\s+more\s+than)\s+(\d+)\s+times?\b",
@@ -217,6 +221,8 @@ USUAL = (
     _usual("E107", rf"<({NAME})(?![\w>])", r"<\1>"),
     _usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: _action_meant(m[1].lower())),
     _usual("E201", rf"\b{NAME}(?=\s*\(\s*{NAME}\s*\))", "moving"),
+    _usual("E201", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*\)",
+           lambda m: f"{_action_meant(m[1])}({m[2]}) & {_action_meant(m[1])}({m[3]})"),
     _usual("E202", rf"<({NAME})>\s*", ""),
     _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*\)", r"\1(\2, other)"),
     _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),
@@ -262,3 +268,40 @@ USUAL = (
     _usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
 )  # fmt: skip
 """In order of trial."""
+
+_FAILURE = r"(?:failures?|fail(?:s|ed|ing)?|errors?)"
+_TARGET = rf"(?:stage\s+)?({CALL}|<\s*{NAME}\s*>|{NAME})"
+_RECOVERY = re.compile(
+    rf"\bon[ _]?{_FAILURE}\b\s*(?:(?:of|in|at)\b\s*)?(?:{_TARGET}\s*(?::|->|=>|\bdo\b|\bthen\b)|:)?\s*"
+    rf"|\b(?:if|when(?:ever)?|once)\s+{_TARGET}\s+(?:has\s+|is\s+)?{_FAILURE}\b\s*(?::|,|->|\bdo\b|\bthen\b)?\s*"
+)
+_STAGE = re.compile(rf"<\s*({NAME})\s*>\s*::=([^\n]*)")
+
+
+def recoveries(text: str, line: str) -> Iterator[tuple[re.Match[str], str]]:
+    """What a line means that tells, in whatever words, what is done when something has failed.
+
+    What fails is the stage that is named, or that asks for the action that is named, or that stands on the
+    same line, or the first one beside the task.
+
+    Args:
+        text: The whole file.
+        line: A line of it.
+
+    Yields:
+        What stands there, and the beginning of a recovery in its place.
+    """
+    stages = {m[1]: m[2] for m in _STAGE.finditer(text)}
+    here = _STAGE.match(line.lstrip())
+    for match in _RECOVERY.finditer(line):
+        said = match[1] or match[2] or ""
+        bare = said.strip("<> ")
+        asking = (name for name, course in stages.items() if said and _same_call(said, course))
+        meant = [bare] if bare in stages else [*asking]
+        meant += [here[1]] if here else [*stages][1:2]
+        yield from ((match, f"on failure of <{name}>: ") for name in dict.fromkeys(meant))
+
+
+def _same_call(said: str, course: str) -> bool:
+    """Whether a course asks for what is said, blanks aside."""
+    return "".join(said.split()) in "".join(course.split("on failure")[0].split())

@@ -9,9 +9,11 @@ from tests.rules.language.test_mistakes import rule
 from tests.tasks.checks.mistakes import (
     eighth_conditions,
     eighth_tasks,
+    eleventh,
     ninth_conditions,
     ninth_tasks,
     tenth,
+    twelfth,
 )
 from tests.tasks.checks.test_mistakes_counted import mended, of_rules, of_tasks
 
@@ -23,10 +25,10 @@ def in_task(stage: str) -> str:
 
 def mistakes() -> Iterator[tuple[str, Callable[[], bool]]]:
     """Each text with a mistake, and whether its hints mend it."""
-    for table in (eighth_conditions, ninth_conditions, tenth):
+    for table in (eighth_conditions, ninth_conditions, tenth, eleventh, twelfth):
         for text in (*map(rule, table.CONDITIONS), *table.WHOLE_RULES):
             yield text, partial(mended, text, of_rules)
-    for tasks in (eighth_tasks, ninth_tasks, tenth):
+    for tasks in (eighth_tasks, ninth_tasks, tenth, eleventh, twelfth):
         for text in (*map(in_task, tasks.STAGES), *tasks.FILES):
             yield text, partial(mended, text, of_tasks)
 

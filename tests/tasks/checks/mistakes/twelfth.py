@@ -1,7 +1,6 @@
 """Deliberate mistakes of the twelfth sitting: other forms of those of the eleventh."""
 
 # fmt: off
-# ruff: noqa: E501
 CONDITIONS = [
     "exists c | touching(a, c) and seen(b)",
     "exists some c: touching(a, c) and seen(b)",

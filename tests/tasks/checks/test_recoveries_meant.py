@@ -1,0 +1,47 @@
+"""What is done on failure, said in other words, is still done on failure after the hint is taken up."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.tasks.checks.test_mistakes_counted import fixes, of_tasks
+from visup.tasks.checks.load import parse_task
+from visup.tasks.checks.usual_meanings import recoveries
+
+TASK = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
+RECOVERIES = [
+    "on failure of a: <b>",
+    "on failure <a>: <b>",
+    "on failure of touching(x, y): <b>",
+    "on failure coupled(x, y) -> <a>",
+    "on failure: <b>",
+    "on error of <a> do <b>",
+    "if <a> fails: <b>",
+    "whenever <a> has failed, <b>",
+    "on_failure of stage a: <b>",
+]
+
+
+@pytest.mark.parametrize("line", RECOVERIES)
+def test_after_the_hint_it_is_a_recovery(line: str) -> None:
+    text = TASK + line + "\n"
+    fix = next(fixes(text, of_tasks(text)))
+    task = parse_task(fix.applied(text))
+    assert len(task.recovered) == 1
+
+
+def test_what_stands_in_a_stage_is_done_when_that_stage_fails() -> None:
+    line = "<b> ::= coupled(x, y) on failure apart(x, y)"
+    assert [new for _, new in recoveries(TASK, line)] == ["on failure of <b>: "]
+
+
+def test_an_action_that_a_stage_asks_for_means_that_stage() -> None:
+    line = "on failure coupled( x,y ): <a>"
+    assert next(new for _, new in recoveries(TASK, line)) == "on failure of <b>: "
+
+
+@given(st.text(alphabet="<>:=()xyabon failuresw&|", max_size=60))
+def test_only_stages_of_the_file_are_meant(line: str) -> None:
+    for match, new in recoveries(TASK, line):
+        assert new in ("on failure of <a>: ", "on failure of <b>: ", "on failure of <t>: ")
+        assert line[match.start() : match.end()] == match[0]
