@@ -22,13 +22,13 @@ from visup.rules.formula.units import (
     TIME,
     Dimension,
 )
-from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
 from visup.rules.predicates import outline_quantities as outline
 from visup.rules.predicates import signals as signal_words
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
+from visup.rules.predicates.motion import moving, moving_clearly
 from visup.rules.predicates.qualitative_words import along, three_points
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
@@ -41,7 +41,6 @@ from visup.rules.predicates.snapshot import (
     interval_between,
 )
 from visup.rules.presence.object_tracks import presence_memory
-from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.zones import QUESTIONS, zone_truth
 from visup.rules.wording.sentences import believed_name
 
@@ -55,8 +54,6 @@ IMPLIED = MappingProxyType(
 )
 """Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
 
-STILL_SPEED = RelationSettings().still_speed
-MOVING_SIGMAS = 3.0
 PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
 SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
@@ -175,15 +172,6 @@ def is_named(facts: Snapshot, name: str) -> Codes:
     return facts.each(look)
 
 
-def moving(facts: Snapshot) -> Codes:
-    """Whether an object moves in the image, by more than the noise of its outline makes."""
-    still = STILL_SPEED * image_diagonal(facts.mind.frame_size)
-    speeds, noise = facts.one("speed"), MOVING_SIGMAS * facts.one("velocity_sigma")
-    seen = zip(speeds.tolist(), np.maximum(still, noise).tolist(), strict=True)
-    codes = [MAYBE if v != v else code(v > least) for v, least in seen]  # NaN is not itself
-    return np.array(codes, dtype=np.int8)
-
-
 def first_contact(facts: Snapshot) -> Codes:
     """Whether the second is what the first would meet first."""
     return facts.first_contact
@@ -285,6 +273,9 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
         "lost": PredicateDefinition(_ONE, lost, "it is out of sight for no known reason"),
         "moving": PredicateDefinition(_ONE, moving, "it moves in the image"),
+        "moving_clearly": PredicateDefinition(
+            _ONE, moving_clearly, "it moves, and most of its outline is free of others"
+        ),
         "came_in": PredicateDefinition(
             _ONE, certainty.came_in, "it came over the border of the image"
         ),

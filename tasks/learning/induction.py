@@ -135,6 +135,7 @@ class _Draft:
             held = self._held(occurrence) if self._last(occurrence) else 0.0
             clause = f" for {held:g} s" if held else ""
             course = f"({_action(item)})" if held and isinstance(item, Joint) else _action(item)
+            course = f"already {course}" if self._from_the_start(occurrence) else course
             return f"<{name}> ::= {course}{clause}  # {seen}"
         took = f"{min(spans):.1f} to {max(spans):.1f} s"
         course = f"({_action(item)})" if isinstance(item, Joint) else _action(item)
@@ -145,6 +146,11 @@ class _Draft:
         while isinstance(plan, Series):
             plan = plan.parts[-1]
         return occurrence in leaves_of(plan)
+
+    def _from_the_start(self, occurrence: Occurrence) -> bool:
+        """Whether what a run ends with was so from its start in some run, as far as one can see."""
+        found = [event_of(row, occurrence) for row in self.rows]
+        return any(e is not None and not e.happening.begun for e in found)
 
     def _held(self, occurrence: Occurrence) -> float:
         """How long what a run ends with must hold, seconds; 0 where it does not last to the end."""

@@ -6,6 +6,7 @@ body stands before another. What is left is one row of happenings for each run, 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -55,10 +56,11 @@ def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
     if not any(met):
         return [[CourseEvent(h, h.begin) for h in run.happenings] for run in runs]
     words = _words(met)
+    begins = {pair for pair in _beginning(met) if words[pair] == "touching"}
     hidden = {m.pair for rows in met for m in rows} - _shared_pairs(met)
     return [
         sorted(
-            [*_events(run, rows, words), *_towards(run, rows, hidden)],
+            [*_events(run, rows, words), *_late(run, rows, begins), *_towards(run, rows, hidden)],
             key=lambda e: (e.at, _RANK[e.symbol[0]], e.symbol),
         )
         for run, rows in zip(runs, met, strict=True)
@@ -68,6 +70,33 @@ def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
 def _shared_pairs(met: Sequence[Collection[Meeting]]) -> set[Pair]:
     """Pairs that meet in every run."""
     return set.intersection(*({m.pair for m in rows} for rows in met))
+
+
+def _beginning(met: Sequence[Collection[Meeting]]) -> set[Pair]:
+    """Pairs that are seen to meet in most of the runs in which they are together."""
+    together = Counter(pair for rows in met for pair in {m.pair for m in rows})
+    begun = Counter(pair for rows in met for pair in {m.pair for m in rows if m.begun})
+    return {pair for pair, runs in begun.items() if 2 * runs > together[pair]}
+
+
+def _late(
+    run: RunTrace, meetings: Sequence[Meeting], pairs: Collection[Pair]
+) -> Iterator[CourseEvent]:
+    """Meetings that are so from the start in this run alone, where one stands before the other in the image.
+
+    They count from when the two have come near.
+    """
+    for meeting in meetings:
+        begin, end = meeting.touching
+        if meeting.pair not in pairs or meeting.begun or end <= run.end - ENDED_S:
+            continue
+        symbol = ("converging", meeting.pair)
+        nearing = [h for h in run.happenings if h.symbol == symbol and begin <= h.begin < end]
+        if nearing:
+            near = nearing[0].end
+            touch = Happening(("touching", meeting.pair), near, end, begun=False)
+            yield CourseEvent(nearing[0], near)
+            yield CourseEvent(touch, near, lasts=True)
 
 
 def _towards(

@@ -9,8 +9,8 @@ from itertools import combinations
 from visup.agent import Mind, Presence, Truth
 from visup.rules.formula.truth import YES
 from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates.motion import moving, moving_clearly
 from visup.rules.predicates.snapshot import Snapshot
-from visup.rules.predicates.vocabulary import moving
 from visup.rules.wording.sentences import believed_name
 from visup.tasks.verification.observe import RelationLookup
 
@@ -57,7 +57,7 @@ class RunTrace:
         always: Actors that were in the scene from their first sight to the end.
         moved_s: For how long each moved, seconds.
         moves: When each moved, from when to when, seconds.
-        fastest: How fast each moved at most, for `SUSTAINED_S`, px/s.
+        fastest: How fast each clearly moved at most, for `SUSTAINED_S`, px/s.
         diagonal: Of the image, pixels.
     """
 
@@ -121,13 +121,17 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
 
 
 def _motions(mind: Mind, names: dict[int, str]) -> Iterator[tuple[str, float | None, bool]]:
-    """Of each object its speed, px/s, where it is seen, and whether that counts as moving."""
+    """Of each object its speed, px/s, where it is seen, and whether that counts as moving.
+
+    The speed is 0 where it does not clearly move: then the body rests, or is covered in part.
+    """
     facts = Snapshot(mind)
-    codes, speeds = moving(facts), facts.one("speed")
+    codes, clear, speeds = moving(facts), moving_clearly(facts), facts.one("speed")
     for number, row in facts.row.items():
         if number in names:
             seen = mind.objects[number].last_seen == mind.time and speeds[row] == speeds[row]
-            yield names[number], float(speeds[row]) if seen else None, codes[row] == YES
+            speed = float(speeds[row]) if clear[row] == YES else 0.0
+            yield names[number], speed if seen else None, codes[row] == YES
 
 
 def _merged(spans: Sequence[Span]) -> tuple[Span, ...]:

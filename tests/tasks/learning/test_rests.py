@@ -78,6 +78,27 @@ def test_what_was_so_from_the_start_is_no_stage() -> None:
     assert not any(e.symbol[1] == ("lid", "table") for row in rows for e in row)
 
 
+def moored(sets_out: float, *, hidden: bool = False) -> RunTrace:
+    """A boat comes to a pier; where it is hidden it stands before the pier from the first look on."""
+    pair = ("boat", "pier")
+    touches = 0.6 if hidden else sets_out + 2
+    return run(
+        Happening(("converging", pair), sets_out, sets_out + 4.0),
+        Happening(("touching", pair), touches, 12.0, begun=not hidden),
+    )
+
+
+@given(st.lists(st.floats(1.0, 4.0), min_size=2, max_size=4), st.floats(1.0, 4.0))
+def test_a_meeting_that_is_so_from_the_start_in_one_run_alone_is_a_stage_there_too(
+    sets_out: list[float], late: float
+) -> None:
+    rows = relevant([*map(moored, sets_out), moored(late, hidden=True)])
+    assert len({tuple(e.symbol for e in row) for row in rows}) == 1
+    touches = [next(e for e in row if e.symbol[0] == "touching") for row in rows]
+    assert [t.happening.begun for t in touches] == [True] * len(sets_out) + [False]
+    assert touches[-1].at == late + 4.0
+
+
 def test_who_is_carried_along_is_the_same_in_all_runs() -> None:
     rows = relevant([carried(9.0, 9.4), carried(9.0, 9.9), carried(9.0, 10.1)])
     symbols = [{e.symbol for e in row} for row in rows]
