@@ -1,4 +1,4 @@
-"""A frame with what is believed drawn over it: contours, names, alerts, stages."""
+"""Draws the beliefs over a frame: contours, names, alerts, stages."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Sizes that grow with the image, so that all sizes look alike.
+    """Drawing sizes in proportion to the image.
 
     Attributes:
         letters: Letter size, pixels.
         line: Width of a contour, pixels.
-        pad: Space round a text, pixels.
+        pad: Padding of texts, pixels.
     """
 
     letters: int
@@ -45,23 +45,22 @@ class Scale:
 
     @property
     def row(self) -> int:
-        """Height of a line of text with its space, pixels."""
+        """Height of a line of text with padding, pixels."""
         return round(self.letters * 1.3) + 2 * self.pad - 2
 
 
 def annotate(image: Image, mind: Mind) -> Image:
-    """Draw what is believed over a frame.
+    """Draw the beliefs over a frame.
 
-    Objects in view get a contour in their colour and a label with name and vote share; those that
-    are hidden a dashed one, where they were last seen. Open alerts stand at the top, the stages of
-    tasks and the time at the bottom.
+    Visible objects have a contour in their colour and a label with name and vote share; hidden ones a dashed
+    contour where they were last seen. Open alerts are at the top, stages of tasks and the time at the bottom.
 
     Args:
         image: (H, W, 3) uint8 BGR; not written to.
         mind: The mind after the step of that frame.
 
     Returns:
-        (H, W, 3) uint8 BGR, a new image; the same input always gives the same.
+        (H, W, 3) uint8 BGR, a new image; deterministic.
     """
     out = image.copy()
     scale = Scale.of(out.shape[1], out.shape[0])
@@ -77,7 +76,7 @@ def annotate(image: Image, mind: Mind) -> Image:
 
 
 def label_of(belief: ObjectBelief, mind: Mind) -> str:
-    """What an object is called in a picture, as sentences call it, such as '2 satellite 87 %'."""
+    """The label of an object in a picture, named as in sentences, such as '2 satellite 87 %'."""
     if not belief.candidates:
         return str(belief.id)
     name = spaced(called(mind, belief.name))
@@ -89,7 +88,7 @@ def _points(belief: ObjectBelief) -> NDArray[np.int32]:
 
 
 def _fill(image: Image, belief: ObjectBelief) -> None:
-    """A faint tint of the region, so that one sees what is inside."""
+    """A faint tint of the region, through which the image stays visible."""
     if belief.presence is not Presence.SEEN:
         return
     x, y, w, h = belief.region.bbox
@@ -101,7 +100,7 @@ def _fill(image: Image, belief: ObjectBelief) -> None:
 
 
 def _outline(image: Image, belief: ObjectBelief, scale: Scale) -> None:
-    """The contour on a dark edge, which keeps it visible on any ground."""
+    """The contour with a dark edge, to be visible on any background."""
     points, colour = _points(belief), object_colour(belief.id)[::-1]
     if belief.presence is Presence.SEEN:
         cv2.polylines(image, [points], True, INK[::-1], scale.line + 2, cv2.LINE_AA)
@@ -112,7 +111,7 @@ def _outline(image: Image, belief: ObjectBelief, scale: Scale) -> None:
 
 
 def _dashes(points: NDArray[np.int32], length: float) -> list[NDArray[np.int32]]:
-    """A closed line cut into dashes of a length, every other one left out."""
+    """A closed line cut into dashes."""
     closed = np.vstack([points, points[:1]]).astype(float)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     dashes = []
@@ -126,9 +125,9 @@ def _dashes(points: NDArray[np.int32], length: float) -> list[NDArray[np.int32]]
 def _labels(
     image: Image, mind: Mind, beliefs: list[ObjectBelief], edges: tuple[int, int], scale: Scale
 ) -> None:
-    """Name tags next to their objects, none over another."""
+    """Labels next to their objects without overlap."""
     placed: list[Box] = []
-    # Who is out of sight and has no name is nobody whom a reader would look for.
+    # Hidden objects without a name are of no interest to a reader.
     told = (b for b in beliefs if b.presence is not Presence.HIDDEN or b.candidates)
     for belief in sorted(told, key=lambda b: b.region.bbox[1]):
         hidden = " (hidden)" if belief.presence is Presence.HIDDEN else ""
@@ -145,7 +144,7 @@ def _labels(
 def _place(
     around: Box, size: tuple[int, int], placed: list[Box], edges: tuple[int, int], width: int
 ) -> Box:
-    """Above the object if there is room, else below it, else further down until nothing is hit."""
+    """Above the object if there is room, else below it, moved down until nothing overlaps."""
     (x, y, _, h), (w, row) = around, size
     left = min(max(x, 0), max(width - w, 0))
     top, bottom = edges[0], max(edges[0], edges[1] - row)
@@ -162,7 +161,7 @@ def _overlap(a: Box, b: Box) -> bool:
 
 
 def _alerts(image: Image, alerts: tuple[Alert, ...], scale: Scale) -> int:
-    """Open alerts across the top, gravest first; returns where they end, pixels."""
+    """Open alerts across the top, most severe first; returns the y of their lower edge, pixels."""
     graver = sorted(alerts, key=lambda a: (-a.severity, a.id))
     graver = [a for a in graver if a.closed is None and a.severity > Severity.INFO]
     y = 0
@@ -188,7 +187,7 @@ def _banner(image: Image, y: int, alert: Alert, more: str, scale: Scale) -> int:
 
 
 def _triangle(image: Image, centre: tuple[int, int], size: int, colour: Rgb, on: Rgb) -> None:
-    """A warning sign, since severity must not be shown by colour alone."""
+    """A warning sign, since severity must not be shown only by colour."""
     (x, y), r = centre, size * 0.55
     corners = np.array([[x, y - r], [x + r, y + r * 0.8], [x - r, y + r * 0.8]])
     cv2.fillPoly(image, [np.round(corners).astype(np.int32)], colour[::-1], cv2.LINE_AA)
@@ -202,7 +201,7 @@ def _width(text: str, scale: Scale) -> int:
 
 
 def _stages(image: Image, mind: Mind, scale: Scale) -> int:
-    """The stages of tasks along the bottom, and the time; returns where they begin, pixels."""
+    """The stages of tasks and the time along the bottom; returns the y of their upper edge, pixels."""
     height, width = int(image.shape[0]), int(image.shape[1])
     time = f"{mind.time:.1f} s"
     shown = mind.tasks[:MOST_TASKS]

@@ -1,4 +1,4 @@
-"""Containers that keep a whole run in bounded memory."""
+"""Containers that summarise a whole run in bounded memory."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ T = TypeVar("T")
 class Thinned(Generic[T]):
     """An evenly spaced selection of a stream of unknown length.
 
-    When it is full, every other item goes and from then on half as many are taken, so that between
-    half of `most` and `most` items stay, however long the stream is.
+    When it is full, every other item is dropped and the sampling interval doubles, so that between half of
+    `most` and `most` items are kept, however long the stream is.
 
     Attributes:
-        most: How many items may be kept, at least 2.
+        most: Maximum number of items, at least 2.
     """
 
     most: int
@@ -28,7 +28,7 @@ class Thinned(Generic[T]):
     _items: list[T] = field(default_factory=list, init=False)
 
     def offer(self, make: Callable[[], T]) -> None:
-        """Count one more item of the stream; it is made only if it is to be kept."""
+        """Count one more item of the stream; it is created only if it is kept."""
         if self._count % self._stride == 0:
             if len(self._items) >= self.most:
                 self._items = self._items[::2]
@@ -38,7 +38,7 @@ class Thinned(Generic[T]):
         self._count += 1
 
     def items(self) -> tuple[T, ...]:
-        """What was kept, in order."""
+        """The kept items, in order."""
         return tuple(self._items)
 
 
@@ -47,7 +47,7 @@ class SpanRecorder:
     """Converts values reported step by step into spans of time.
 
     Attributes:
-        most: How many closed spans may be kept; later ones are then dropped.
+        most: Maximum number of closed spans; later ones are dropped.
     """
 
     most: int
@@ -55,11 +55,11 @@ class SpanRecorder:
     _closed: list[StateSpan] = field(default_factory=list, init=False)
 
     def note(self, time: float, values: Mapping[tuple[str, ...], str]) -> None:
-        """Tell how everything is now; a subject that is not told has no value.
+        """Record the present values; a missing subject has no value.
 
         Args:
             time: Seconds.
-            values: Subject -> how it is.
+            values: Subject -> value.
         """
         for subject, (value, start) in list(self._open.items()):
             if values.get(subject) != value:
@@ -80,11 +80,11 @@ class SpanRecorder:
 
 @dataclass(slots=True)
 class Heaviest(Generic[T]):
-    """The items that matter most; among equals the earlier stay.
+    """The items of greatest weight; among equals the earlier ones.
 
     Attributes:
-        most: How many may be kept.
-        weight: How much an item matters.
+        most: Maximum number of items.
+        weight: Weight of an item.
     """
 
     most: int
@@ -96,7 +96,7 @@ class Heaviest(Generic[T]):
         return len(self._items) < self.most or weight > min(map(self.weight, self._items))
 
     def add(self, item: T) -> None:
-        """Keep an item, at the cost of the lightest (the latest of those) when there is no room."""
+        """Add an item; if full, the lightest (the latest of these) is dropped."""
         self._items.append(item)
         if len(self._items) > self.most:
             lightest = min(map(self.weight, self._items))
@@ -104,5 +104,5 @@ class Heaviest(Generic[T]):
             del self._items[last]
 
     def items(self) -> tuple[T, ...]:
-        """What was kept, in the order in which it came."""
+        """The kept items in order of arrival."""
         return tuple(self._items)

@@ -43,7 +43,7 @@ ENDS_WEIGHT = 2
 
 @dataclass(frozen=True, slots=True)
 class ReportLimits:
-    """Limits on the data kept of a run, whatever its length.
+    """Limits of the data kept of a run of any length.
 
     Attributes:
         samples: Moments of the series.
@@ -62,7 +62,7 @@ class ReportLimits:
 
 @dataclass(slots=True)
 class _CostTally:
-    """What a behaviour took so far."""
+    """The accumulated cost of a behaviour."""
 
     runs: int = 0
     failures: int = 0
@@ -71,12 +71,12 @@ class _CostTally:
 
 @dataclass(slots=True)
 class Collector:
-    """Keeps what the report of a run needs. Give its `add` to an agent as an observer.
+    """Collects the data for the report of a run. Add its `add` to an agent as an observer.
 
-    Its memory does not grow with the length of the run.
+    Its memory is bounded.
 
     Attributes:
-        limits: How much is kept.
+        limits: The limits of the data.
     """
 
     limits: ReportLimits = field(default_factory=ReportLimits)
@@ -104,11 +104,11 @@ class Collector:
         self._pictures = Heaviest(self.limits.key_frames, lambda k: k.weight)
 
     def add(self, step: Step, frame: Frame) -> None:
-        """Take note of one step.
+        """Add one step.
 
         Args:
             step: The step.
-            frame: The frame that it was about; only pictures made of it are kept.
+            frame: Its frame; only pictures made of it are kept.
         """
         mind = step.mind
         self._frames += 1
@@ -129,7 +129,7 @@ class Collector:
             self._last_pictured = frame.index
 
     def save(self) -> Mapping[str, Any]:
-        """All that was kept so far; see `visup.agent.storage.checkpoint`."""
+        """The state of the collector; see `visup.agent.storage.checkpoint`."""
         names = (f.name for f in fields(self) if f.name not in ("limits", "_pictures"))
         return {n: getattr(self, n) for n in names} | {"pictures": self._pictures.items()}
 
@@ -151,19 +151,18 @@ class Collector:
         events: Sequence[Event] = (),
         courses: Sequence[Branch] = (),
     ) -> RunData:
-        """All that was kept, at the end of the run.
+        """The collected data at the end of the run.
 
         Args:
-            verdict: How the run ended, or None when nothing was to be judged.
-            facts: Facts to show, such as settings, versions, timing; in this order. 'source' is
-                what was watched.
+            verdict: The verdict, or None without a task.
+            facts: Facts to show in this order, such as settings, versions, timing; 'source' is the source.
             problem: Why the source ended early (`Source.problem`).
-            notes: What had to be assumed (`Source.notes`).
-            events: Sentences that were told after the last step.
+            notes: Assumptions made (`Source.notes`).
+            events: Events after the last step.
             courses: The trees of the tasks (`visup.tasks.tools.outline`).
 
         Returns:
-            What `write_report` takes.
+            The input of `write_report`.
         """
         mind, frame = self._last or (Mind(), None)
         pictures = self._pictures.items()
@@ -207,7 +206,7 @@ class Collector:
                 self._alerts[a.id] = a
 
     def _remember_matches(self, step: Step) -> None:
-        """The latest looks of regions in view; the shape matcher need not run on each frame."""
+        """The latest matches of visible regions; the shape matcher may not run on each frame."""
         seen = {r.id for r in step.observation.of("region")}
         found = matches_of(step.observation.of("hypothesis"))
         self._matches = {k: v for k, v in self._matches.items() if k in seen or k in found}
@@ -233,7 +232,7 @@ class Collector:
         )
 
     def _looks(self, mind: Mind, frame: Frame) -> list[RegionCloseup]:
-        # A region that was not seen just now is where its object is believed to be: no picture of it.
+        # The region of an object not seen now is only a prediction: no picture of it.
         seen = [b for b in mind.present() if b.last_seen == mind.time]
         largest = sorted(seen, key=lambda b: -b.region.area)[:MOST_LOOKS]
         looks = []

@@ -1,4 +1,4 @@
-"""Pictures for the report: objects cut out of a frame, images made smaller, JPEG files."""
+"""Pictures for the report: crops of objects, thumbnails, JPEG encoding."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ JPEG_QUALITY = 82
 
 
 def cut_out(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]:
-    """An object cut out of a frame with a little of what is round it, which is dimmed.
+    """A crop of an object with a dimmed margin.
 
     Args:
         image: (H, W, 3) uint8 BGR.
-        belief: An object that is seen in it.
+        belief: An object visible in it.
 
     Returns:
         (h, w, 3) uint8 BGR, its longer side at most `LOOK_SIZE` pixels.
@@ -38,7 +38,7 @@ def cut_out(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]
 
 
 def shrunk(image: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
-    """The image no wider than `width` pixels, its proportions kept."""
+    """The image reduced to at most `width` pixels, with the same aspect ratio."""
     if image.shape[1] <= width:
         return image
     height = max(1, round(image.shape[0] * width / image.shape[1]))

@@ -1,7 +1,7 @@
-"""Pictures on terminals that can show them: kitty's protocol and sixels, else coloured characters.
+"""Pictures on terminals: kitty's protocol, sixels, or coloured characters.
 
-A terminal is not asked what it can, since its answer would stand among what is typed; it is known by what it
-sets in the environment. `VISUP_GRAPHICS=kitty|sixel|text` goes before that.
+Terminals are recognised by environment variables instead of being queried, since the response would mix with
+typed input. `VISUP_GRAPHICS=kitty|sixel|text` takes precedence.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from visup.report.pictures import png, text_picture
 
 Image = NDArray[np.uint8]
 COLOURS = 128
-"""Of a picture in sixels, of at most 256."""
+"""Colours of a sixel picture, at most 256."""
 
 CHUNK = 4096
-"""So many characters of a picture kitty takes at once."""
+"""Maximum characters per message in kitty's protocol."""
 
 WIDEST_PX = 1000
 
 
 class Graphics(StrEnum):
-    """How pictures reach a terminal."""
+    """The graphics protocols of terminals."""
 
     KITTY = "kitty"
     SIXEL = "sixel"
@@ -43,7 +43,7 @@ SIXEL_TERMINALS = ("foot", "mlterm", "yaft", "xterm-sixel", "contour")
 
 
 def graphics_of(environment: Mapping[str, str] = os.environ) -> Graphics:
-    """What a terminal can show, by what it sets in the environment.
+    """The graphics protocol of a terminal, by its environment variables.
 
     >>> graphics_of({"TERM": "xterm-kitty"}), graphics_of({"TERM": "foot"}), graphics_of({"TERM": "xterm"})
     (<Graphics.KITTY: 'kitty'>, <Graphics.SIXEL: 'sixel'>, <Graphics.TEXT: 'text'>)
@@ -53,7 +53,7 @@ def graphics_of(environment: Mapping[str, str] = os.environ) -> Graphics:
         return Graphics(wanted)
     term = environment.get("TERM", "").lower()
     if term.startswith(("tmux", "screen")):
-        return Graphics.TEXT  # which pass on neither
+        return Graphics.TEXT  # multiplexers pass on neither protocol
     program = environment.get("TERM_PROGRAM", "").lower()
     if "KITTY_WINDOW_ID" in environment or any(p in (program, term[6:]) for p in KITTY_PROGRAMS):
         return Graphics.KITTY
@@ -63,24 +63,24 @@ def graphics_of(environment: Mapping[str, str] = os.environ) -> Graphics:
 def terminal_picture(
     image: Image, columns: int = 80, graphics: Graphics | None = None
 ) -> RenderableType:
-    """An image as a terminal can show it.
+    """An image as a renderable for the terminal.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         columns: Width of a picture in characters.
-        graphics: How; None for what the environment says.
+        graphics: The protocol; None to derive it from the environment.
     """
     graphics = graphics or graphics_of()
     if graphics is Graphics.TEXT:
         return text_picture(image, columns)
     small = _no_wider(image)
     codes = kitty_codes(small) if graphics is Graphics.KITTY else sixel_codes(small)
-    # What rich takes for control is written as it is, and to terminals alone.
+    # Rich writes control segments unchanged, and only to terminals.
     return Segments([Segment(codes, None, [(ControlType.BELL,)]), Segment.line()])
 
 
 def kitty_codes(image: Image) -> str:
-    """An image by the graphics protocol of kitty: a PNG file in pieces of base64.
+    """An image in kitty's graphics protocol: a PNG file in base64 chunks.
 
     Args:
         image: (H, W, 3) uint8 BGR.
@@ -112,7 +112,7 @@ def sixel_codes(image: Image) -> str:
 
 
 def _band(rows: NDArray[np.uint8]) -> str:
-    """Six rows: for each colour in them a line of characters whose bits are its pixels."""
+    """Six rows: for each of their colours a line of characters whose bits are its pixels."""
     bits = (1 << np.arange(len(rows)))[:, None]
     lines = (
         f"#{n}{''.join(_runs((((rows == n) * bits).sum(axis=0) + 63).tolist()))}"
@@ -122,7 +122,7 @@ def _band(rows: NDArray[np.uint8]) -> str:
 
 
 def _runs(codes: list[int]) -> Iterator[str]:
-    """Characters, four and more of the same as a count."""
+    """Run-length encoded characters, for runs of four and more."""
     begin = 0
     for end in range(1, len(codes) + 1):
         if end < len(codes) and codes[end] == codes[begin]:

@@ -1,7 +1,7 @@
 """Antialiased text for pictures.
 
-Pillow renders a line once; numpy lays it over the picture. OpenCV's own letters are strokes of one
-width that are hard to read in small sizes and know only ASCII.
+Pillow renders a line once; NumPy blends it into the picture. OpenCV's stroke fonts are hard to read in small
+sizes and support only ASCII.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def ink(text: str, size: int) -> NDArray[np.float32]:
         size: Letter size, pixels.
 
     Returns:
-        (height, width) float32, 0 to 1; all lines of one size have one height. Not to be written.
+        (height, width) float32, 0 to 1, read-only; all lines of one size have the same height.
     """
     font = _font(size)
     width = max(1, round(font.getlength(text)) + 1)
@@ -43,7 +43,7 @@ def ink(text: str, size: int) -> NDArray[np.float32]:
 
 
 def fitted(text: str, size: int, width: int) -> str:
-    """The text, shortened with an ellipsis where it is wider than `width` pixels."""
+    """The text, shortened with an ellipsis if wider than `width` pixels."""
     if ink(text, size).shape[1] <= width:
         return text
     low, high = 0, len(text)
@@ -57,7 +57,7 @@ def fitted(text: str, size: int, width: int) -> str:
 
 
 def write(image: NDArray[np.uint8], text: str, at: tuple[int, int], size: int, colour: Rgb) -> None:
-    """Lay a line of text over an image, in place; what is outside is cut.
+    """Draw a line of text on an image, in place, clipped to it.
 
     Args:
         image: (H, W, 3) uint8 BGR, written to.
@@ -74,7 +74,7 @@ def write(image: NDArray[np.uint8], text: str, at: tuple[int, int], size: int, c
 def blend(
     image: NDArray[np.uint8], coverage: NDArray[np.float32], at: tuple[int, int], colour: Rgb
 ) -> None:
-    """Lay a colour over an image where it covers it, in place; what is outside is cut."""
+    """Blend a colour into an image by its coverage, in place, clipped to it."""
     (x, y), (h, w) = at, coverage.shape
     x0, y0 = max(x, 0), max(y, 0)
     x1, y1 = min(x + w, image.shape[1]), min(y + h, image.shape[0])
@@ -89,7 +89,7 @@ def blend(
 def shade(
     image: NDArray[np.uint8], box: tuple[int, int, int, int], colour: Rgb, opacity: float
 ) -> None:
-    """Lay a flat colour over a box (x, y, width, height) of an image, in place."""
+    """Blend a flat colour into a box (x, y, width, height) of an image, in place."""
     x, y, w, h = box
     if w > 0 and h > 0:
         blend(image, np.full((h, w), opacity, np.float32), (x, y), colour)

@@ -1,4 +1,4 @@
-"""What the report notes of one moment: how much it matters, votes and distances, states, matches."""
+"""The data of one moment for the report: weight, votes and distances, states, matches."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ KIND_WEIGHTS: Mapping[str, int] = {
 
 
 def weight_of(events: Sequence[Event]) -> int:
-    """How much a moment matters for the report; 0 when nothing worth a picture happened."""
+    """The weight of a moment for the report; 0 if it needs no picture."""
     return max((KIND_WEIGHTS.get(e.kind, 0) + 4 * int(e.severity) for e in events), default=0)
 
 
 def sample_of(mind: Mind) -> Sample:
-    """The series' values at one moment: votes of objects in view, distances between them.
+    """The samples of one moment: votes of visible objects, distances between them.
 
-    Distances are those of the relation 'distance' where rules report it, else the gap between the
-    outlines of objects that are both seen; of the hidden nothing is known.
+    Distances are those of the relation 'distance' if rules report it, else the gap between the outlines of
+    two visible objects.
     """
     objects = sorted(mind.present(), key=lambda b: -b.region.area)[:MOST_SUBJECTS]
     votes = {
@@ -81,7 +81,7 @@ def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:
 
 
 def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
-    """What the timelines show: stages, relations of pairs, objects in view."""
+    """The values of the timelines: stages, relations of pairs, objects in view."""
     now: dict[tuple[str, ...], str] = {}
     for task in mind.tasks:
         now |= {("stage", task.task, s.stage): s.status.value for s in task.stages}

@@ -1,7 +1,7 @@
-"""Colours that distinguish objects, severities and states, also for the colour-blind.
+"""Colours for objects, severities and states, distinguishable by the colour-blind.
 
-The object colours are those of Okabe and Ito ("Color Universal Design", 2008), the first ones
-chosen to stand out both on a dark sky and on a light page.
+The object colours are those of Okabe and Ito ("Color Universal Design", 2008), ordered so that the first ones
+stand out both on a dark sky and on a light page.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ STATUS_COLOURS: dict[Status, Rgb] = {
 
 
 def object_colour(object_id: int) -> Rgb:
-    """(r, g, b) of an object; ids that are far apart may share one."""
+    """(r, g, b) of an object; the colours repeat cyclically."""
     return OBJECT_COLOURS[(object_id - 1) % len(OBJECT_COLOURS)]
 
 
 def css(colour: Rgb) -> str:
-    """A colour as CSS writes it, such as `#56b4e9`."""
+    """A CSS colour such as `#56b4e9`."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

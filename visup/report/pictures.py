@@ -1,4 +1,4 @@
-"""Pictures where text is shown: as PNG in notebooks, as coloured characters on a terminal."""
+"""Pictures in text: as PNG in notebooks, as coloured characters on a terminal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def png(image: Image) -> bytes:
 
 
 def html_picture(image: Image) -> str:
-    """An image as an HTML element that needs no file.
+    """An image as an HTML element with embedded data.
 
     Args:
         image: (H, W, 3) uint8 BGR.
@@ -34,7 +34,7 @@ def html_picture(image: Image) -> str:
 
 
 def text_picture(image: Image, columns: int = 80) -> Segments:
-    """An image in characters, each of which shows two pixels: its upper and its lower half.
+    """An image in characters, each of which shows two pixels (half blocks).
 
     Args:
         image: (H, W, 3) uint8 BGR.

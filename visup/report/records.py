@@ -1,4 +1,4 @@
-"""What a report is made of: values only, small enough to keep, made by `collector.py`."""
+"""The data of a report: plain records, created by `collector.py`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from visup.tasks.tools.outline import Branch
 
 @dataclass(frozen=True, slots=True)
 class Distance:
-    """How far apart two objects were at one moment.
+    """The distance of two objects at one moment.
 
     Attributes:
         gap: Pixels between their outlines.
@@ -27,12 +27,12 @@ class Distance:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A moment of the run; what was not known is absent.
+    """A moment of the run; unknown values are absent.
 
     Attributes:
         time: Seconds.
         votes: Object id -> model name -> votes.
-        likelihoods: Object id -> model name -> how likely it is that, 0 to 1.
+        likelihoods: Object id -> model name -> probability, 0 to 1.
         distances: (smaller id, larger id) -> distance, for objects in view.
     """
 
@@ -44,11 +44,11 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class StateSpan:
-    """A stretch of time during which something stayed as it was.
+    """A time span in which a subject had one value.
 
     Attributes:
-        subject: What it is about, such as ('stage', 'dock', 'approach').
-        value: How it was, such as 'progressing'.
+        subject: Such as ('stage', 'dock', 'approach').
+        value: Such as 'progressing'.
         start: Seconds.
         end: Seconds.
     """
@@ -76,16 +76,16 @@ class MatchRow:
 
 @dataclass(frozen=True, slots=True)
 class RegionCloseup:
-    """One region at a key frame and what it looks like.
+    """One region at a key frame and its matches.
 
     Attributes:
         region_id: The region.
-        object_id: The object it belongs to, or None.
-        believed: What the object is believed to be.
-        share: Share of the votes for that, 0 to 1.
-        jpeg: The region cut out of the frame.
-        matches: Most similar first; empty when none was reported.
-        matched_at: Seconds; the matcher may have looked a little before.
+        object_id: Its object, or None.
+        believed: Identity of the object.
+        share: Share of the votes for it, 0 to 1.
+        jpeg: Crop of the region.
+        matches: Most similar first; may be empty.
+        matched_at: Time of the match, seconds, which may be a little earlier.
     """
 
     region_id: int
@@ -99,7 +99,7 @@ class RegionCloseup:
 
 @dataclass(frozen=True, slots=True)
 class KeyFrame:
-    """An annotated picture of a moment that matters.
+    """An annotated picture of an important moment.
 
     Attributes:
         frame_index: Number of the frame.
@@ -107,8 +107,8 @@ class KeyFrame:
         jpeg: The annotated picture.
         size: (width, height) of the picture, pixels.
         captions: Sentences of the events at that frame.
-        weight: How much it matters; when there are too many, the lightest go.
-        looks: The regions in view.
+        weight: Its importance; if there are too many key frames, the lightest are dropped.
+        looks: The visible regions.
     """
 
     frame_index: int
@@ -126,8 +126,8 @@ class ReportedObject:
 
     Attributes:
         id: Its number.
-        name: What it was last believed to be.
-        share: Share of the votes for that, 0 to 1.
+        name: Its last identity.
+        share: Share of the votes for it, 0 to 1.
         first_seen: Seconds.
         last_seen: Seconds.
     """
@@ -141,7 +141,7 @@ class ReportedObject:
 
 @dataclass(frozen=True, slots=True)
 class BehaviourCost:
-    """What a behaviour took.
+    """The cost of a behaviour.
 
     Attributes:
         behaviour: Its name.
@@ -158,30 +158,30 @@ class BehaviourCost:
 
 @dataclass(frozen=True, slots=True)
 class RunData:
-    """A finished run, as far as its report needs it.
+    """The data of a finished run for its report.
 
     Attributes:
-        source: What was watched.
-        verdict: How the run ended, or None when nothing was to be judged.
-        frame_size: (width, height), pixels; (0, 0) when no frame was seen.
-        frames: Frames that were looked at.
+        source: The source.
+        verdict: The verdict, or None without a task.
+        frame_size: (width, height), pixels; (0, 0) without frames.
+        frames: Number of processed frames.
         duration: Time of the last frame, seconds.
-        tasks: The tasks as they stood at the end.
+        tasks: The final beliefs about tasks.
         events: The narrative, in order.
-        events_left_out: Further events that the journal has but the report has not.
-        alerts: All alerts as they last stood, by id.
+        events_left_out: Number of further events in the journal.
+        alerts: All alerts in their last state, by id.
         objects: All objects that were confirmed, by id.
-        samples: Moments at an even spacing.
-        spans: How stages, relations and presences changed.
-        key_frames: In order of time.
-        efforts: What each behaviour took.
-        clock: When it was by the clock of the wall, as far as that is known: of a camera.
+        samples: Evenly spaced samples.
+        spans: Spans of stages, relations and presences.
+        key_frames: Key frames by time.
+        efforts: Cost of each behaviour.
+        clock: Wall clock of the run, if known.
         facts: Further facts about the run, in the order to show them: settings, versions, timing;
             values may be nested mappings and lists.
         problem: Why the source ended early, or None.
-        notes: Sentences about what had to be assumed.
+        notes: Sentences about assumptions.
         courses: The tree of each task.
-        videos: Names of the annotated videos beside the report, in order.
+        videos: Names of the annotated videos next to the report, in order.
     """
 
     source: str
@@ -210,5 +210,5 @@ class RunData:
         return tuple(s for s in self.spans if s.subject[0] == kind)
 
     def worst(self) -> Severity:
-        """The gravest severity of its alerts; INFO when there are none."""
+        """The highest severity of its alerts; INFO if there are none."""
         return max((a.severity for a in self.alerts), default=Severity.INFO)

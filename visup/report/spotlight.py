@@ -1,4 +1,4 @@
-"""A frame in which some regions are lit and the rest is dimmed: what an answer rests on."""
+"""Highlights the regions on which an explanation is based."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from visup.report.image_text import write
 from visup.report.palette import object_colour
 
 DIMMED = 0.35
-"""Brightness of what an answer does not rest on."""
+"""Brightness of the rest of the image."""
 
 LETTERS = 14
 
 
 def spotlight(image: NDArray[np.uint8], regions: Iterable[Region]) -> NDArray[np.uint8]:
-    """A frame with regions lit, outlined and numbered.
+    """A dimmed frame with regions highlighted, outlined and numbered.
 
     Args:
         image: (H, W, 3) uint8 BGR; not changed.
-        regions: Of that frame.
+        regions: Regions of the frame.
 
     Returns:
         (H, W, 3) uint8 BGR, a new image.

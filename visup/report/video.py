@@ -1,4 +1,4 @@
-"""The annotated video of a run, in a form that browsers play."""
+"""The annotated video of a run in a format that browsers play."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class WebmWriter:
         self._writer.write(image)
 
     def close(self) -> None:
-        """Finish the file; without a frame there is none."""
+        """Finish the file; without a frame none is created."""
         if self._writer is not None:
             self._writer.release()
             self._writer = None
@@ -75,7 +75,7 @@ class WebmWriter:
         self.close()
 
     def _opened(self, size: tuple[int, int]) -> cv2.VideoWriter:
-        # FFmpeg picks the tag of the container by itself and says so on standard error.
+        # FFmpeg chooses the container's tag itself and warns on standard error.
         with quiet():
             code = cv2.VideoWriter.fourcc(*FOURCC)
             writer = cv2.VideoWriter(opencv_name(self.path), cv2.CAP_FFMPEG, code, self.fps, size)
@@ -90,7 +90,7 @@ class WebmWriter:
 
 
 class AnnotatedVideo(WebmWriter):
-    """Writes each frame with what is believed drawn over it. Give its `add` to an agent as an observer.
+    """Writes each frame with the beliefs drawn over it. Add its `add` to an agent as an observer.
 
     Args:
         path: The file to write, `.webm`.
@@ -98,7 +98,7 @@ class AnnotatedVideo(WebmWriter):
     """
 
     def add(self, step: Step, frame: Frame) -> None:
-        """Write one frame as it was understood.
+        """Write one annotated frame.
 
         Raises:
             OutputError: The file cannot be written.
@@ -107,12 +107,12 @@ class AnnotatedVideo(WebmWriter):
 
 
 def playable_size(width: int, height: int, most: int = MOST_WIDTH) -> tuple[int, int]:
-    """The size of the video: no wider than allowed, proportions kept, sides even and at least 16.
+    """The size of the video: limited width, same aspect ratio, sides even and at least 16.
 
     Args:
-        width: Of the frames, pixels.
-        height: Of the frames, pixels.
-        most: Greatest width, pixels.
+        width: Width of the frames, pixels.
+        height: Height of the frames, pixels.
+        most: Maximum width, pixels.
 
     Returns:
         (width, height), pixels.

@@ -1,8 +1,7 @@
 """Sinks: alerts and metrics for other programs, outside the cycle.
 
-Read `outbox.py` (how nothing waits for a sink), `insistent_outbox.py` with `delivery_log.py` (how nothing is
-lost where a service watches), then `lines.py` (files), `webhook.py`, and
-`registry.py` (what `--sink` means).
+Read `outbox.py` (asynchronous delivery), `insistent_outbox.py` with `delivery_log.py` (reliable delivery for
+services), then `lines.py` (files), `webhook.py`, and `registry.py` (parses `--sink`).
 """
 
 from visup.sinks.messages import AlertSender

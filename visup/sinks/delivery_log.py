@@ -1,8 +1,8 @@
-"""Records that sinks have not taken yet, in a file: they outlive the process, and are sent by the next.
+"""A persistent queue of records that sinks have not accepted yet, which survives the process.
 
-What a step tells is noted for all sinks in one transaction, with the number of its frame, before any of it is
-sent: whoever goes on after a kill knows what was noted, and notes what was not. The name of a delivery
-follows from the alert, and none is noted twice. On a full disk all this goes on in room that was set aside.
+The records of a step are stored for all sinks in one transaction with its frame number before any is sent, so
+that a resumed process knows which are missing. The id of a delivery is derived from the alert, and none is
+stored twice. On a full disk a reserve is used.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ CREATE TABLE IF NOT EXISTS reserve (filling BLOB);
 DELETE FROM reserve;
 """
 RESERVE_BYTES, LOG_BYTES = 2**20, 2**19
-"""Set aside for a full disk: pages for some hundred records, and the log of one change."""
+"""Reserved for a full disk: pages for some hundred records, and the log of one transaction."""
 
 MOST_NOTED = 4000
-"""Alerts that are remembered as noted: far more than open between two checkpoints."""
+"""Maximum number of remembered alerts: far more than open between two checkpoints."""
 
 SYNCHRONOUS = "FULL"
-"""What is noted is on the disk before it is sent, also where the power goes; tests need not wait for it."""
+"""Records are on disk before they are sent, even if the power fails; tests relax this."""
 
 MOST_WAITING = 10_000
-"""Records of one sink; beyond, the oldest are lost."""
+"""Maximum records per sink; beyond it the oldest are lost."""
 
 DELIVERY = "delivery"
-"""Key of a record: the same when it is sent again because nobody knows whether it arrived."""
+"""Key of the delivery id of a record, which is unchanged when the record is sent again."""
 
 
 class DeliveryLog:
-    """What waits, by sink.
+    """The queues of all sinks.
 
     Args:
-        path: The file; made if it is not there.
+        path: The file; created if missing.
 
     Raises:
         OutputError: It cannot be read or written.
@@ -59,7 +59,7 @@ class DeliveryLog:
         self._lock = threading.Lock()
         try:
             self._db = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-            # Its log keeps its length and is written over, which needs no room; see `disk_reserve`.
+            # The log keeps its length and is overwritten, which needs no space; see `disk_reserve`.
             self._db.execute("PRAGMA journal_mode=PERSIST")
             self._db.execute(f"PRAGMA synchronous={SYNCHRONOUS}")
             self._db.executescript(SCHEMA)
@@ -79,19 +79,19 @@ class DeliveryLog:
 
     @property
     def told_frame(self) -> int:
-        """Number of the last frame whose alerts were noted; -1 before the first."""
+        """Number of the last frame whose alerts were stored; -1 before the first."""
         with self._lock:
             row = self._db.execute("SELECT frame_index FROM told").fetchone()
         return int(row[0]) if row else -1
 
     def begin(self) -> None:
-        """A new run counts its frames and alerts from nothing; what waits still waits."""
+        """Begin a new run, with frames and alerts counted from 0; waiting records stay."""
         with self._lock:
             self._db.execute("DELETE FROM told")
             self._name_course(anew=True)
 
     def labelled(self, record: Mapping[str, Any]) -> dict[str, Any]:
-        """A record with the name of its delivery: that of an alert is the same whoever tells it."""
+        """A record with its delivery id, which for an alert does not depend on the process."""
         if record.get("record") != "alert":
             return {**record, DELIVERY: uuid.uuid4().hex}
         told = f"{record['id']} {record['opened']!r} {record['state']}"
@@ -103,15 +103,15 @@ class DeliveryLog:
         records: Sequence[Mapping[str, Any]],
         frame_index: int | None = None,
     ) -> int:
-        """Note records for all sinks, all or none of them; alerts that were noted before are left out.
+        """Store records for all sinks atomically; alerts that were stored before are skipped.
 
         Args:
-            sinks: Their keys.
-            records: In the order in which they are to be sent.
-            frame_index: Of the step that tells them; None of what no step tells.
+            sinks: Keys of the sinks.
+            records: Records in order of delivery.
+            frame_index: Frame of their step; None for records without a step.
 
         Returns:
-            How many old records were lost, since too many wait.
+            Number of old records lost because too many were waiting.
 
         Raises:
             sqlite3.Error: They cannot be written.
@@ -142,12 +142,12 @@ class DeliveryLog:
         return (int(row[0]), json.loads(row[1])) if row else None
 
     def done(self, number: int) -> None:
-        """A record was taken."""
+        """Remove an accepted record."""
         with self._lock:
             self._db.execute("DELETE FROM waiting WHERE number = ?", (number,))
 
     def count(self, sink: str) -> int:
-        """How many records wait for a sink."""
+        """Number of records waiting for a sink."""
         with self._lock:
             sql = "SELECT count(*) FROM waiting WHERE sink = ?"
             return int(self._db.execute(sql, (sink,)).fetchone()[0])
@@ -158,7 +158,7 @@ class DeliveryLog:
             self._db.close()
 
     def _name_course(self, *, anew: bool) -> None:
-        """Find or draw the name of runs that follow one another: their alerts are numbered together."""
+        """Load or draw the id of a sequence of runs, whose alerts are numbered together."""
         found = self._db.execute("SELECT name FROM course").fetchone()
         if anew or not found:
             found = (uuid.uuid4().hex,)
@@ -166,7 +166,7 @@ class DeliveryLog:
         self._course = uuid.UUID(found[0])
 
     def _is_new(self, record: Mapping[str, Any]) -> bool:
-        """Note an alert; False when it was noted before, perhaps by a process that is gone."""
+        """Store the id of an alert; False if it was stored before, perhaps by an earlier process."""
         if record.get("record") != "alert":
             return True
         sql = "INSERT OR IGNORE INTO noted (delivery) VALUES (?)"

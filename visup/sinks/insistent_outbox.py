@@ -1,4 +1,4 @@
-"""An outbox that does not give up: what a sink did not take is sent again, by the next process if need be."""
+"""An outbox with reliable delivery: records are retried, by the next process if necessary."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ LOOK_S = 0.5
 class InsistentOutbox:
     """Sends pending records to one sink, oldest first, in its own thread.
 
-    A sink that is down is tried again after 1 s, then 2, 4, ... up to 30. A record that it refuses for good
-    is counted and left out: it must not hold up all others.
+    A sink that is down is retried after 1 s, then 2, 4, ... up to 30. A record that it finally refuses is
+    counted and skipped, so that it does not block the others.
 
     Args:
-        sink: Where the records go.
-        key: Under which they wait.
-        log: Where they wait.
+        sink: The sink.
+        key: Key of its records.
+        log: The persistent queue.
 
     Attributes:
         sink: As given.
         key: As given.
-        delivered: Records that the sink took.
-        dropped: Records that were lost, since too many waited.
-        failed: Records that the sink refused.
-        fault: Why the last one was not delivered; empty when it was.
+        delivered: Number of delivered records.
+        dropped: Number of records lost because too many were waiting.
+        failed: Number of refused records.
+        fault: Why the last one was not delivered; empty if it was.
     """
 
     def __init__(self, sink: Sink, key: str, log: DeliveryLog) -> None:
@@ -50,33 +50,33 @@ class InsistentOutbox:
         self._thread.start()
 
     def wake(self) -> None:
-        """There is something to send."""
+        """Wake the thread to send."""
         self._new.set()
 
     def offer(self, record: Any) -> None:
-        """Send what could not be noted, as long as this process lives; returns at once."""
+        """Send a record that could not be stored, within this process; returns at once."""
         self.dropped += len(self._unwritten) == self._unwritten.maxlen
         self._unwritten.append(record)
         self.wake()
 
     def begin_closing(self) -> None:
-        """Send what can be sent at once, and no more; returns at once."""
+        """Send the pending records without further retries; returns at once."""
         self._closing.set()
         self._new.set()
 
     def close(self, wait_s: float = CLOSING_S) -> None:
-        """Give the sink a last time; what it has not taken then waits for the next process."""
+        """Wait a last time for the sink; remaining records wait for the next process."""
         self.begin_closing()
         self._thread.join(wait_s)
         self._over = True
 
     @property
     def note(self) -> str | None:
-        """What the user should know at the end, or None when all was delivered."""
+        """A note for the user at the end, or None if all was delivered."""
         return not_delivered(self.sink.name, self.failed, self.dropped, self.fault)
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """What is wrong with the sink now."""
+        """Present faults of the sink."""
         yield from sink_fault(self.sink.name, self.fault, self.dropped)
 
     def _run(self) -> None:
@@ -99,7 +99,7 @@ class InsistentOutbox:
             self.fault = f"{type(fault).__name__}: {fault}"
 
     def _send_oldest(self) -> bool | None:
-        """Whether it is dealt with; None when there is none."""
+        """Whether the oldest record is dealt with; None if there is none."""
         try:
             found = self._log.oldest(self.key)
         except (sqlite3.Error, ValueError) as fault:
@@ -108,7 +108,7 @@ class InsistentOutbox:
         if found is None and not self._unwritten:
             return None
         number, record = found or (None, self._unwritten[0])
-        # One that was sent and could not be crossed off is not sent again.
+        # A record that was sent but could not be removed is not sent again.
         dealt_with = (number is not None and number == self._sent) or self._delivered(record)
         if dealt_with and number is None:
             self._unwritten.popleft()
@@ -122,7 +122,7 @@ class InsistentOutbox:
         return dealt_with
 
     def _delivered(self, record: Any) -> bool:
-        """Whether the sink took a record, or will never take it."""
+        """Whether the sink accepted a record, or finally refused it."""
         try:
             self.sink.deliver(record)
         except Exception as fault:

@@ -1,4 +1,4 @@
-"""Sinks that need nothing but Python: standard output, a file."""
+"""Sinks for JSON lines: standard output, a file."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from visup.agent.model.errors import OutputError
 from visup.wording import escaped_json
 
 TIMEOUT_S = 5.0
-"""For one attempt to reach another machine, seconds."""
+"""Timeout of one attempt to reach another machine, seconds."""
 
 
 class JsonLines:
-    """One JSON object a line, written out at once.
+    """Writes one JSON object per line, flushed at once.
 
     Args:
-        name: Of the sink.
-        stream: Where to.
+        name: Name of the sink.
+        stream: The stream.
         owned: Whether to close it at the end.
     """
 
@@ -57,5 +57,5 @@ def to_file(name: str, path: Path) -> JsonLines:
 
 
 def json_text(record: Mapping[str, Any]) -> str:
-    """A record as one line of JSON, in which no terminal finds anything to obey."""
+    """A record as one line of JSON without terminal control characters."""
     return escaped_json(record, ensure_ascii=False, separators=(",", ":"), sort_keys=True)

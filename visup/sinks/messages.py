@@ -19,7 +19,7 @@ VERSION = 1
 
 
 def alert_record(alert: Alert, source: str) -> dict[str, Any]:
-    """An alert as it goes to other programs (docs/formats.md)."""
+    """The record of an alert (docs/formats.md)."""
     state = "opened" if alert.closed is None else "closed"
     return {
         "version": VERSION,
@@ -31,7 +31,7 @@ def alert_record(alert: Alert, source: str) -> dict[str, Any]:
 
 
 def verdict_record(verdict: Verdict | None, steps: int, source: str) -> dict[str, Any]:
-    """The end of a run."""
+    """The record of the end of a run."""
     told = verdict.value if verdict else None
     return {
         "version": VERSION,
@@ -43,17 +43,17 @@ def verdict_record(verdict: Verdict | None, steps: int, source: str) -> dict[str
 
 
 class AlertSender:
-    """An observer that leaves records of alerts in outboxes.
+    """An observer that puts records of alerts into outboxes.
 
     Args:
-        outboxes: Of the sinks.
-        source: What is watched.
-        stamp: What else stands in every record: camera, host, time of the wall.
-        log: Where records wait for outboxes that do not give up; None where they are left in outboxes.
+        outboxes: Outboxes of the sinks.
+        source: The source.
+        stamp: Common fields of all records: camera, host, wall-clock time.
+        log: The persistent queue for reliable delivery, or None.
 
     Attributes:
-        links: Tells where the evidence of an alert is, by keys of its record.
-        gate: Tells which alerts of a step are sent now.
+        links: Returns links to the evidence of an alert, by keys of its record.
+        gate: Selects the alerts of a step that are sent now.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class AlertSender:
             self._send(records, step.frame_index)
 
     def late(self, step: Step) -> None:
-        """Send the records of a step that a process recorded but was killed before sending."""
+        """Send the records of a step that an earlier process recorded but did not send."""
         if self._log and step.alerts and step.frame_index > self._log.told_frame:
             records = [self._record_of(alert) for alert in self.gate(step)]
             self._send(records, step.frame_index)
@@ -107,7 +107,7 @@ class AlertSender:
     def _noted(
         self, log: DeliveryLog, records: Sequence[dict[str, Any]], frame_index: int | None
     ) -> bool:
-        """Whether records wait in the log now; where it cannot be written they go out at once or never."""
+        """Store records in the log; returns False if it cannot be written, and they are sent without it."""
         insistent = [o for o in self._outboxes if isinstance(o, InsistentOutbox)]
         try:
             lost = log.add([o.key for o in insistent], records, frame_index)

@@ -19,7 +19,7 @@ class Mqtt:
         place: `HOST[:PORT]/TOPIC`.
 
     Raises:
-        SettingsError: It is not of that form.
+        SettingsError: It is malformed.
         ExtraMissingError: paho-mqtt is not installed.
     """
 
@@ -40,10 +40,10 @@ class Mqtt:
         self._connected = False
 
     def deliver(self, record: Mapping[str, Any]) -> None:
-        """Publish one record and wait until the broker has it.
+        """Publish one record and wait for the broker's acknowledgement.
 
         Raises:
-            OSError, RuntimeError: The broker did not take it.
+            OSError, RuntimeError: The broker did not accept it.
         """
         if not self._connected:
             self._client.connect(*self._place)
@@ -55,7 +55,7 @@ class Mqtt:
             raise TimeoutError("the broker did not answer")
 
     def close(self) -> None:
-        """Say goodbye to the broker."""
+        """Disconnect from the broker."""
         if self._connected:
             self._client.disconnect()
             self._client.loop_stop()

@@ -14,14 +14,14 @@ EXPECTED = "an address that Apprise knows, such as mailto://USER:PASSWORD@HOST o
 
 
 class Notification:
-    """Sends each record as a short message, with the picture of the alert where there is one.
+    """Sends each record as a short message, with the picture of the alert if there is one.
 
     Args:
-        address: Of Apprise: `mailto://...`, `slack://...`, `tgram://...` and a hundred more. Nearly all
-            hold a password or token, so that none is ever shown.
+        address: Apprise URL: `mailto://...`, `slack://...`, `tgram://...` and a hundred more. Most contain a
+            password or token, so none is ever shown.
 
     Raises:
-        SettingsError: Apprise knows no such address.
+        SettingsError: Apprise does not support the address.
         ExtraMissingError: Apprise is not installed.
     """
 
@@ -32,7 +32,7 @@ class Notification:
             raise ExtraMissingError("a sink for mail and chat", "serve") from missing
         scheme = address.partition("://")[0]
         self.name = f"notify:{scheme}"
-        # Its log names addresses; what went wrong is told once, without them.
+        # Apprise logs addresses; faults are reported once, without them.
         logging.getLogger("apprise").setLevel(logging.CRITICAL)
         self._service = apprise.Apprise()
         if "://" not in address or not self._service.add(address):
@@ -42,7 +42,7 @@ class Notification:
         """Send one record.
 
         Raises:
-            DeliveryError: It was not taken.
+            DeliveryError: It was not accepted.
         """
         picture = record.get("snapshot")
         there = isinstance(picture, str) and Path(picture).is_file()
@@ -53,11 +53,11 @@ class Notification:
             raise DeliveryError("the message was not accepted")
 
     def close(self) -> None:
-        """There is nothing to close."""
+        """Nothing to close."""
 
 
 def title_of(record: Mapping[str, Any]) -> str:
-    """What a message is headed by: which camera, and how grave it is."""
+    """The title of a message: camera and severity."""
     who = record.get("camera") or record.get("source", "visup")
     if record.get("record") == "alert":
         over = "over: " if record.get("state") == "closed" else ""
@@ -68,7 +68,7 @@ def title_of(record: Mapping[str, Any]) -> str:
 
 
 def body_of(record: Mapping[str, Any]) -> str:
-    """What a message says: the sentence, when it was, where more is to be seen."""
+    """The body of a message: the sentence, its time, and links."""
     kind = record.get("record")
     said = record.get("text") if kind == "notice" else record.get("cause")
     if kind == "verdict":

@@ -1,7 +1,7 @@
-"""Between the cycle and a sink: a queue of bounded length, and a thread that empties it.
+"""A bounded queue between the cycle and a sink, with a thread that empties it.
 
-The cycle never waits. When a sink is slower than what is told, the newest goes overboard; how much is
-counted and told as an alert. A sink that fails is tried again with the next record.
+The cycle never waits. If a sink is too slow, new records are dropped, counted and reported as an alert. A
+sink that fails is tried again with the next record.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ CLOSING_S = 5.0
 
 
 class Sink(Protocol):
-    """Where records go. Its methods run in a thread of their own, and may wait and raise."""
+    """A destination of records. Its methods run in a separate thread, and may block and raise."""
 
     name: str
 
@@ -28,7 +28,7 @@ class Sink(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of files and connections."""
+        """Close files and connections."""
         ...
 
 
@@ -36,15 +36,15 @@ class Outbox:
     """The queue and the thread of one sink.
 
     Args:
-        sink: Where the records go.
-        most: How many may wait.
+        sink: The sink.
+        most: Maximum length of the queue.
 
     Attributes:
         sink: As given.
-        delivered: Records that the sink took.
-        dropped: Records for which there was no room.
-        failed: Records that the sink could not deliver.
-        fault: Why the last one was not delivered; empty when it was.
+        delivered: Number of delivered records.
+        dropped: Number of records dropped because the queue was full.
+        failed: Number of records that could not be delivered.
+        fault: Why the last one was not delivered; empty if it was.
     """
 
     def __init__(self, sink: Sink, most: int = MOST_WAITING) -> None:
@@ -59,7 +59,7 @@ class Outbox:
         self._thread.start()
 
     def offer(self, record: Any) -> None:
-        """Leave a record for the sink; returns at once."""
+        """Queue a record; returns at once."""
         try:
             self._queue.put_nowait(record)
         except Full:
@@ -68,22 +68,22 @@ class Outbox:
             self._taken += 1
 
     def close(self, wait_s: float = CLOSING_S) -> None:
-        """Give the sink a last time to empty the queue; what it has not taken then is dropped."""
+        """Wait a last time for the queue to empty; remaining records are dropped."""
         self._closing.set()
         self._thread.join(wait_s)
         if self._thread.is_alive() and not self._given_up.is_set():
-            # First it must take no more; what it has in its hands nobody knows to be delivered.
+            # First stop the thread from taking more; the record in progress may or may not be delivered.
             self._given_up.set()
             self.dropped += self._taken - self.delivered - self.failed
             self.fault = self.fault or "it did not answer in time"
 
     @property
     def note(self) -> str | None:
-        """What the user should know at the end, or None when all was delivered."""
+        """A note for the user at the end, or None if all was delivered."""
         return not_delivered(self.sink.name, self.failed, self.dropped, self.fault)
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """What is wrong with the sink now."""
+        """Present faults of the sink."""
         yield from sink_fault(self.sink.name, self.fault, self.dropped)
 
     def _run(self) -> None:
@@ -105,7 +105,7 @@ class Outbox:
         try:
             self.sink.deliver(record)
         except Exception as fault:
-            # Whatever a sink does is its own failure, never the supervisor's.
+            # Any exception is a failure of the sink, never of the supervisor.
             self.failed += 1
             self.fault = f"{type(fault).__name__}: {fault}"
         else:
@@ -114,7 +114,7 @@ class Outbox:
 
 
 def not_delivered(name: str, failed: int, dropped: int, fault: str) -> str | None:
-    """What the user should know of a sink at the end, or None when it took all."""
+    """A note about a sink for the user at the end, or None if all was delivered."""
     if not (dropped or failed):
         return None
     why = f": {fault}" if fault else ""
@@ -122,7 +122,7 @@ def not_delivered(name: str, failed: int, dropped: int, fault: str) -> str | Non
 
 
 def sink_fault(name: str, fault: str, dropped: int) -> Iterable[AlertCondition]:
-    """The condition of a sink that does not take all, as long as it does not."""
+    """The alert condition of a sink while it does not accept all records."""
     if fault or dropped:
         yield AlertCondition(
             SINK_FAILED,

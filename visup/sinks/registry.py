@@ -1,4 +1,4 @@
-"""What `--sink` means, and the observer that serves all sinks of a run."""
+"""Parses `--sink`, and serves all sinks of a run as one observer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from visup.sinks.outbox import CLOSING_S, MOST_WAITING, Outbox, Sink
 from visup.sinks.webhook_access import WebhookAccess
 
 MOST_STEPS = 64
-"""Whole steps that may wait, with their frames: some tens of megabytes."""
+"""Maximum number of whole steps with frames in a queue: some tens of megabytes."""
 
 KINDS = (
     "jsonl:-, file:PATH, webhook:URL, mqtt:HOST[:PORT]/TOPIC, notify:ADDRESS, otel:console, otel:otlp, "
@@ -28,14 +28,14 @@ KINDS = (
 
 
 def open_sink(wanted: str, access: WebhookAccess | None = None) -> Sink:
-    """A sink, from `--sink`.
+    """Open a sink.
 
     Args:
         wanted: `KIND:PLACE`, one of `KINDS`.
-        access: How servers of webhooks know that records come from here.
+        access: Authentication of webhooks.
 
     Raises:
-        SettingsError: There is no such kind, or the place is not as it should be.
+        SettingsError: There is no such kind, or the place is not valid.
         ExtraMissingError: It needs an extra that is not installed.
         OutputError: Its file cannot be written.
     """
@@ -54,16 +54,16 @@ class Sinks:
     """All sinks of a run, as one observer.
 
     Args:
-        wanted: As of `--sink`.
-        source: What is watched.
-        closing_s: How long each may take to deliver what is left at the end, seconds.
-        stamp: What else stands in every record of an alert.
-        access: How servers of webhooks know that records come from here.
-        log: Where records of alerts wait until sinks take them; None to drop what they do not.
+        wanted: As in `--sink`.
+        source: The source.
+        closing_s: Time limit for delivering remaining records at the end, seconds.
+        stamp: Common fields of the records of alerts.
+        access: Authentication of webhooks.
+        log: The persistent queue of alerts; None to drop undelivered ones.
 
     Attributes:
-        outboxes: One for each.
-        alerts: What leaves records of alerts in them.
+        outboxes: One per sink.
+        alerts: Puts records of alerts into them.
     """
 
     def __init__(
@@ -95,25 +95,25 @@ class Sinks:
         self.alerts.notice(text)
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """What is wrong with sinks now."""
+        """Present faults of the sinks."""
         return [concern for outbox in self.outboxes for concern in outbox.runtime_faults()]
 
     def end(self, verdict: Verdict | None, steps: int) -> tuple[str, ...]:
-        """Send the verdict, close everything, and say what was not delivered."""
+        """Send the verdict, close everything, and return notes about undelivered records."""
         self.alerts.end(verdict, steps)
         self.close()
         return tuple(o.note for o in self.outboxes if o.note)
 
     @property
     def delivered(self) -> bool:
-        """Whether every sink for alerts took all; those of whole steps may miss some."""
+        """Whether every alert sink accepted all records; sinks of whole steps may miss some."""
         return not any(o.note for o in self._of_alerts)
 
     def close(self) -> None:
-        """Close all sinks; once is enough."""
+        """Close all sinks; idempotent."""
         insistent = [o for o in self.outboxes if isinstance(o, InsistentOutbox)]
         for outbox in insistent:
-            outbox.begin_closing()  # all at once: what is left then is not lost
+            outbox.begin_closing()  # start all together, to share the time limit
         until = time.monotonic() + self._closing_s
         for each in self.outboxes:
             left = max(0.05, until - time.monotonic()) if each in insistent else self._closing_s

@@ -15,7 +15,7 @@ JPEG_QUALITY = 80
 
 
 class Rerun:
-    """A sink of pairs of a step and its frame: written to a file, or sent to a viewer.
+    """A sink for pairs of step and frame: writes to a file, or sends to a viewer.
 
     Args:
         place: A file (`run.rrd`), or the address of a viewer (`rerun+http://...`).
@@ -52,7 +52,7 @@ class Rerun:
             stream.log(f"behaviours/{report.behaviour}/ms", rr.Scalars(report.elapsed_ms))
 
     def close(self) -> None:
-        """Write what is left."""
+        """Flush."""
         self._stream.flush()
         self._stream.disconnect()
 

@@ -1,8 +1,8 @@
 """Traces and metrics for OpenTelemetry; needs `visup[otel]`.
 
-A step is a span with a child for each behaviour that ran, both as long as they took; counters tell of
-steps, events, alerts and failures. The exporter is what the environment sets up (such as with
-`OTEL_EXPORTER_OTLP_ENDPOINT`), or standard error with `otel:console`.
+A step is a span with a child for each behaviour that ran, with their durations; counters count steps, events,
+alerts and failures. The exporter is configured by the environment (such as `OTEL_EXPORTER_OTLP_ENDPOINT`), or
+is standard error with `otel:console`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ NAME = "visup"
 
 
 class Telemetry:
-    """A sink of whole steps.
+    """A sink for whole steps.
 
     Args:
-        place: 'console', or 'otlp' for what the environment says.
-        providers: Tracer and meter providers to use instead; for programs that have their own.
+        place: 'console', or 'otlp' for the exporter of the environment.
+        providers: Tracer and meter providers to use instead, for programs with their own.
 
     Raises:
         SettingsError: `place` is neither.
@@ -46,12 +46,12 @@ class Telemetry:
         self._objects = meter.create_histogram("visup.objects", description="objects in view")
 
     def deliver(self, record: Step) -> None:
-        """Tell of one step."""
+        """Export one step."""
         self._count(record)
         self._trace(record)
 
     def close(self) -> None:
-        """Export what is left."""
+        """Flush."""
         for provider in (self._traces, self._figures):
             provider.shutdown()
 
@@ -111,9 +111,9 @@ def _providers(place: str) -> tuple[Any, Any]:
 
 
 def service_resource() -> Any:
-    """The resource: service `visup` with its version, unless the environment says otherwise.
+    """The resource: service `visup` with its version, unless the environment overrides it.
 
-    `OTEL_SERVICE_NAME` and `OTEL_RESOURCE_ATTRIBUTES` go before, as they do everywhere.
+    `OTEL_SERVICE_NAME` and `OTEL_RESOURCE_ATTRIBUTES` take precedence, as usual.
     """
     from opentelemetry.sdk.resources import OTELResourceDetector, Resource
 

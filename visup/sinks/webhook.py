@@ -1,4 +1,4 @@
-"""The sink that posts each record to a URL, by urllib3."""
+"""A sink that posts each record to a URL, using urllib3."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ HEADERS = {"Content-Type": "application/json", "User-Agent": "visup"}
 
 
 class DeliveryError(OSError):
-    """A record was not taken.
+    """A record was not accepted.
 
     Attributes:
-        final: Whether it will not be, however often it is sent.
+        final: Whether retrying is useless.
     """
 
     def __init__(self, said: str, *, final: bool = False) -> None:
@@ -44,18 +44,17 @@ class DeliveryError(OSError):
 class Webhook:
     """Posts each record as JSON to a URL.
 
-    A server that cannot be reached or says that it is at fault (5xx, or 429) is tried again, each time
-    after twice as long; any other answer but 2xx is final. A redirect is such an answer: followed, it would
-    turn the record into a request without one, and let the server send visup to places that it may
-    reach and the server may not. Of an answer only its status is read, and an attempt ends after
-    `timeout_s` whatever the server does.
+    A server that is unreachable or reports a temporary fault (5xx or 429) is retried with doubling waits; any
+    other response except 2xx is final. Redirects are not followed: that would drop the body, and let the
+    server direct visup to addresses that only this machine can reach. Only the status of a response is read,
+    and an attempt ends after `timeout_s` whatever the server does.
 
     Args:
-        url: http or https.
-        timeout_s: For one attempt, seconds.
-        tries: Attempts for one record.
-        access: How the server knows that it comes from here.
-        wait: Waits so many seconds; an argument so that tests need not.
+        url: http or https URL.
+        timeout_s: Time limit of one attempt, seconds.
+        tries: Attempts per record.
+        access: Authentication.
+        wait: Sleeps for some seconds; replaced in tests.
 
     Raises:
         SettingsError: It is no such URL.
@@ -84,7 +83,7 @@ class Webhook:
         """Post one record.
 
         Raises:
-            DeliveryError: It was not taken.
+            DeliveryError: It was not accepted.
         """
         body = json_text(record).encode()
         for attempt in range(self._tries):
@@ -107,7 +106,7 @@ class Webhook:
         self._manager.clear()
 
     def _post(self, body: bytes) -> int:
-        """The status of the answer."""
+        """The status of the response."""
         with self._deadline():
             answer = self._manager.urlopen(
                 "POST",
@@ -120,12 +119,12 @@ class Webhook:
                 preload_content=False,
             )
             status = int(answer.status)
-            answer.close()  # with its connection: of the body nothing is read
+            answer.close()  # closes the connection; the body is not read
             return status
 
     @contextmanager
     def _deadline(self) -> Iterator[None]:
-        """End the connection when the time is over, also where a byte comes now and then."""
+        """Close the connection at the deadline, even if the server keeps sending slowly."""
         over = threading.Event()
         timer = threading.Timer(self._timeout_s, self._hang_up, (over,))
         timer.daemon = True
@@ -136,7 +135,7 @@ class Webhook:
             timer.cancel()
             while self._opened:
                 self._opened.pop().close()
-        if over.is_set():  # half an answer may look like a whole one
+        if over.is_set():  # a partial response may look complete
             raise TimeoutError(ETIMEDOUT, "the server did not answer in time")
 
     def _hang_up(self, over: threading.Event) -> None:
@@ -147,7 +146,7 @@ class Webhook:
 
 
 def _shown(url: str) -> str:
-    """An address safe to print: chat services put their keys in the path."""
+    """A URL that is safe to print: chat services put their keys in the path."""
     told = parse_url(url)
     port = f":{told.port}" if told.port else ""
     beyond = "/..." if (told.path or "/") != "/" or told.query else ""
@@ -163,7 +162,7 @@ def _is_web_address(url: str) -> bool:
 
 
 def _manager(url: str, opened: list[socket.socket]) -> urllib3.PoolManager:
-    """Connections as the environment says (`https_proxy` and the like), each noted when it is made."""
+    """A connection manager that respects the environment (`https_proxy` etc.) and records its sockets."""
 
     class Noted(HTTPConnection):
         def _new_conn(self) -> socket.socket:
@@ -184,13 +183,13 @@ def _manager(url: str, opened: list[socket.socket]) -> urllib3.PoolManager:
 
 
 def _noted(made: socket.socket, opened: list[socket.socket]) -> socket.socket:
-    # A second handle: that of a connection with TLS is taken over by what wraps it.
+    # A duplicate, since the TLS wrapper takes over the original socket.
     opened.append(made.dup())
     return made
 
 
 def _answer(status: int) -> str:
-    """A status in words of our own: the server's may hold anything."""
+    """A status in our own words: the server's are untrusted."""
     if 300 <= status < 400:
         return f"the server answered {status}: it redirects, which is not followed"
     try:
@@ -200,7 +199,7 @@ def _answer(status: int) -> str:
 
 
 def _reason(fault: Exception) -> str:
-    """What went wrong, without the workings of the library."""
+    """The reason of a fault, without internals of the library."""
     inner = getattr(fault, "reason", None) or fault.__cause__ or fault
     if isinstance(inner, OSError) and inner.strerror:
         return inner.strerror

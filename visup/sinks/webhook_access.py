@@ -22,10 +22,10 @@ class WebhookAccess:
 
     Attributes:
         headers: Name -> value.
-        key: By which bodies are signed, or None.
+        key: Key that signs bodies, or None.
 
     Raises:
-        SettingsError: A header cannot stand in a request.
+        SettingsError: A header is not valid.
     """
 
     headers: Mapping[str, str] = field(default_factory=dict, repr=False)
@@ -39,7 +39,7 @@ class WebhookAccess:
                     expected="a name such as Authorization or X-Api-Key",
                 )
             if not value.isprintable() or not value.isascii():
-                # The value may be a secret, so that it is not quoted.
+                # The value may be a secret, so it is not quoted.
                 raise SettingsError(
                     f"the value of the header {name!r} of webhooks cannot be sent",
                     expected="one line of plain ASCII text",
@@ -51,8 +51,8 @@ class WebhookAccess:
         """The headers of one request.
 
         Args:
-            body: What is sent.
-            now_s: Seconds since 1970: a request that is sent again later by a stranger is told by its age.
+            body: The body.
+            now_s: Seconds since 1970, by which receivers can reject replayed requests.
         """
         if self.key is None:
             return dict(self.headers)

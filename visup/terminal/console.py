@@ -1,6 +1,6 @@
 """All output of visup goes through here, so that no untrusted text can control the terminal.
 
-Names of models, texts of tasks or a server's answer may contain escape sequences that clear the screen,
+Names of models, texts of tasks or the answer of a server may contain escape sequences that clear the screen,
 set its title or reverse the reading order. `tests/terminal/test_console.py` checks that nothing else in
 visup prints. Output is also best effort: when the reader goes away (as in `visup watch ... | head -1`),
 further output is dropped and the run continues.
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 WIDE = 1000
-"""Columns of output that a program reads."""
+"""Width of output that is not a terminal, columns."""
 
 
 def make_console(*, whole: bool = False, **options: Any) -> Console:
-    """A rich console that prints only what `printable` lets through.
+    """A rich console that prints only text passed by `printable`.
 
     Args:
         whole: Whether to leave output to a pipe unwrapped and uncut.
-        options: As of `rich.console.Console`; highlighting is off by default.
+        options: As for `rich.console.Console`; highlighting is off by default.
     """
     from rich.console import Console, RenderHook
 

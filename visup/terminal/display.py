@@ -1,8 +1,8 @@
-"""How each public record is shown on the terminal and in a notebook.
+"""The display of public records on the terminal and in notebooks.
 
-`shown(record)` gives what rich prints; `html(record)` the same for Jupyter. The records of `visup.agent`
-know nothing of it: they are shown so when they are printed with rich or stand last in a notebook's
-cell, once `visup.terminal.display` can be imported (see `visup/agent/model/display.py`).
+`shown(record)` returns a rich renderable, `html(record)` the same for Jupyter. The records of `visup.agent`
+do not depend on this module: it is used when they are printed with rich or are the result of a notebook cell,
+if it can be imported (see `visup/agent/model/display.py`).
 """
 
 from __future__ import annotations
@@ -61,10 +61,10 @@ _MARKS = {"+": "green", "-": "red", "~": "yellow"}
 
 @singledispatch
 def shown(record: Any) -> RenderableType:
-    """A record as rich prints it, readable at 80 columns.
+    """A record as a rich renderable for 80 columns.
 
     Args:
-        record: Any public record; one that nothing is known of is shown by its fields.
+        record: Any public record; unknown types are shown by their fields.
     """
     if not is_dataclass(record) or isinstance(record, type):
         return Text(str(record))
@@ -89,7 +89,7 @@ def html_of(text: RenderableType) -> str:
     made = console.export_html(
         inline_styles=True, code_format=f'<pre style="{style}">{{code}}</pre>'
     )
-    # Frames of tables are drawn in characters, which no font of a notebook joins.
+    # Table borders are drawn in characters that do not join in notebook fonts.
     return _UPRIGHT.sub(" ", _RULE.sub("", made))
 
 
@@ -192,7 +192,7 @@ def _only(region: Region) -> Report:
 
 
 def _silhouette(region: Region, columns: int = 40) -> str:
-    """The mask in characters: two pixels in height for one in width, as letters are."""
+    """The mask in characters, with twice as many pixels per row as per column, like letters."""
     _, width = region.mask.shape
     step = max(1, -(-width // columns))
     rows = region.mask[:: 2 * step, ::step]

@@ -39,7 +39,7 @@ class Narrator:
     """Prints the notable events of each step. Give it to an agent as an observer.
 
     Attributes:
-        console: Where to.
+        console: The console.
         as_json: Print every event as one line of JSON, instead of sentences.
         narrative: Chooses what to print.
         last: The last step.
@@ -72,7 +72,7 @@ class Narrator:
         elif self.console.is_terminal:
             self.console.print(event_row(event))
         else:
-            # A file or a pipe has no width: one line per event, so that it can be searched.
+            # In a file or pipe: one line per event, so that it can be searched.
             self.console.print(Text(event_line(event)), soft_wrap=True)
 
 

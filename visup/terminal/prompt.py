@@ -64,8 +64,8 @@ def completions(session: Session, line: str) -> list[str]:
     """Completions of the last word of a line.
 
     Args:
-        session: Knows who is there, which stages and rules there are, and what is set.
-        line: What was typed so far.
+        session: Provides objects, stages, rules, breakpoints and marks.
+        line: The text typed so far.
     """
     *before, last = line.split(" ")
     if not before:
@@ -99,7 +99,7 @@ def read_commands(session: Session) -> Iterator[str]:
 
 
 def toolbar(session: Session) -> str:
-    """Where the session is, in one line of at most 80 characters."""
+    """The position of the session in one line of at most 80 characters."""
     stepper = session.stepper
     branch = f"  branch from {stepper.begin}" if len(session.timelines) > 1 else ""
     inside = f"  after {stepper.paused.phase.value}" if stepper.paused else ""

@@ -35,16 +35,16 @@ PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 
 
 class Session:
-    """Holds a stepper and the branches begun from it, and carries out commands.
+    """Executes commands on a stepper and its branches.
 
     Args:
         agent: The agent.
-        frames: Where its frames come from, or a feed of what was perceived.
-        console: Where to write; standard output by default.
-        picture: Gives the frame of a number, (H, W, 3) uint8 BGR, where frames can be had again.
+        frames: Its frames, or a source of observations.
+        console: The console; standard output by default.
+        picture: Returns the frame of a number, (H, W, 3) uint8 BGR, if frames can be read again.
 
     Attributes:
-        timelines: The run, and the branches that were begun from one another; the last one is stepped.
+        timelines: The run and the nested branches; the last one is stepped.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Session:
         """Carry out commands until 'quit' or their end.
 
         Returns:
-            Exit code: 0, or 2 when a command could not be obeyed.
+            Exit code: 0, or 2 if a command was refused.
         """
         self.console.print(
             "[dim]Type 'step' to advance by one frame, 'help' for all commands.[/dim]"
@@ -121,7 +121,7 @@ class Session:
         except VisupError as fault:
             return refusal(str(fault))
 
-    # Forth and back
+    # Stepping
 
     def _step(self, words: Sequence[str]) -> Answer:
         count = number_in(words)
@@ -157,7 +157,7 @@ class Session:
                 self.console.print(Text(event_line(event)), soft_wrap=True)
 
     def _place(self, stopped: StepResult | None = None) -> RenderableType:
-        """Where the session is: why it stopped, watched values, frame and time."""
+        """The position of the session: reasons for stopping, watched values, frame and time."""
         mind, lines = self.stepper.mind, []
         if stopped is not None:
             lines += [Text(f"stopped: {why}", style="bold") for why in stopped.reasons]
@@ -174,7 +174,7 @@ class Session:
         return Group(*lines)
 
     def _aside(self) -> str:
-        """Details of the place besides frame and time."""
+        """Details of the position besides frame and time."""
         stepper = self.stepper
         told = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
         if stepper.paused:
@@ -225,7 +225,7 @@ class Session:
     def _show_why(
         self, picture: Callable[[int], NDArray[np.uint8]], words: Sequence[str]
     ) -> Answer:
-        """The frame on which an answer is based, with the regions on which it is based."""
+        """The frame of an explanation with its regions highlighted."""
         file = words[-1] if words and words[-1].endswith(PICTURES) else None
         asked = list(words[:-1] if file else words)
         if not asked:
@@ -244,7 +244,7 @@ class Session:
         return self._shown(spotlight(picture(frame), regions), frame, file)
 
     def _shown(self, image: NDArray[np.uint8], frame: int, file: str | None) -> Answer:
-        """A picture on a terminal, or in a file."""
+        """Show a picture on the terminal, or write it to a file."""
         if self.console.is_terminal and file is None:
             return terminal_picture(image, self.console.width)
         path = Path(file or f"frame-{frame:05d}.png")
@@ -256,7 +256,7 @@ class Session:
             ) from fault
         return Text(f"{path}: {image.shape[1]} x {image.shape[0]} pixels")
 
-    # Where to stop
+    # Breakpoints and watches
 
     def _break(self, words: Sequence[str]) -> Answer:
         if not words:
@@ -288,7 +288,7 @@ class Session:
         self.stepper.unwatch(number)
         return self._watch(())
 
-    # What if
+    # Branches
 
     def _assume(self, words: Sequence[str], *, retract: bool) -> Answer:
         belief = parse_assumption(self.stepper.mind, words, self.agent.models, retract=retract)

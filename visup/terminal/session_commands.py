@@ -12,10 +12,10 @@ class Command:
     """One command of a session.
 
     Attributes:
-        usage: How it is written.
-        does: What it does, in one clause.
-        more: What else there is to know.
-        completes: What its words may be: 'stop', 'why', 'object', 'relation', 'break', 'mark', 'file',
+        usage: Its syntax.
+        does: Its effect, in one clause.
+        more: Further help.
+        completes: Kind of its arguments: 'stop', 'why', 'object', 'relation', 'break', 'mark', 'file',
             'command', 'expression'.
     """
 
@@ -150,7 +150,7 @@ _COMMANDS = (
     Command("help [COMMAND]", "list the commands, or explain one", completes=("command",)),
 )
 COMMANDS: Mapping[str, Command] = MappingProxyType({c.name: c for c in _COMMANDS})
-"""By their names."""
+"""By name."""
 
 _WIDTH = max(len(c.usage) for c in _COMMANDS)
 HELP = "\n".join(

@@ -27,7 +27,7 @@ from visup.terminal.tables import (
 
 Words = Sequence[str]
 View = Callable[[Stepper, Words], RenderableType]
-"""Carries out a command, given the words after its name."""
+"""Executes a command, given the words after its name."""
 
 _NO_STEP = Text("no step has been taken yet")
 
@@ -42,7 +42,7 @@ def refusal(text: str) -> Refusal:
 
 
 def usage(name: str) -> str:
-    """The syntax of a command, and what it does."""
+    """The syntax and the effect of a command."""
     return f"{COMMANDS[name].usage}: {COMMANDS[name].does}"
 
 
@@ -143,4 +143,4 @@ VIEWS: Mapping[str, View] = MappingProxyType(
         "help": _help,
     }
 )
-"""By the names of their commands."""
+"""By command name."""

@@ -119,7 +119,7 @@ def questions_list(questions: Iterable[Question]) -> RenderableType:
 
 
 def behaviours_table(reports: Iterable[Report]) -> RenderableType:
-    """What each behaviour did."""
+    """The reports of behaviours."""
     rows = table("behaviour", "state", "percepts", "ms", "error")
     for r in reports:
         count, took = str(len(r.percepts)), f"{r.elapsed_ms:.1f}"

@@ -1,4 +1,4 @@
-"""What-if commands, in words: `touching 1 2 true`, `object 1 arm`, `object 2 hidden`, `rules FILE`."""
+"""Parses what-if commands: `touching 1 2 true`, `object 1 arm`, `object 2 hidden`, `rules FILE`."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ _PRESENCES = tuple(p.value for p in Presence)
 def parse_assumption(
     mind: Mind, words: Sequence[str], models: Iterable[str] = (), *, retract: bool = False
 ) -> Assumption:
-    """The belief that the words of a command describe.
+    """Parse the assumption of a command.
 
     Args:
-        mind: Where it is to be held.
+        mind: The present mind.
         words: `[relation] NAME IDS [TRUTH]`, `object ID NAME`, or `object ID seen|hidden|left`.
-        models: Models that are known besides those spoken of.
-        retract: Whether it shall not be known: an unknown relation, an unknown object.
+        models: Known models that do not occur in the mind.
+        retract: Whether to make it unknown: an unknown relation, an unknown object.
 
     Raises:
-        SettingsError: They tell none.
+        SettingsError: They are no assumption.
     """
     said = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
     if not said:
@@ -91,12 +91,12 @@ def replaced_reasoners(reasoners: Reasoners, kind: str, place: str) -> Reasoners
     """Reasoners with other rules or another task.
 
     Args:
-        reasoners: Those that there are.
+        reasoners: The present reasoners.
         kind: 'rules' or 'task'.
         place: A file, or the name of a shipped task.
 
     Raises:
-        VisupError: The file is not as it should be.
+        VisupError: The file is not valid.
     """
     if kind == "rules":
         return with_rules(reasoners, load_rules(place))

@@ -1,5 +1,5 @@
-"""How the motion segmenter understood a frame, drawn for people.
+"""Visualises the internals of the motion segmenter for a frame.
 
-`panels.py` draws four panels (constraints, layers, labels, regions); `marks.py` the arrows, hatching and
-headings on them.
+`panels.py` draws four panels (constraints, layers, labels, regions), `marks.py` their arrows, hatching and
+headings.
 """

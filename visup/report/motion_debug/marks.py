@@ -1,4 +1,4 @@
-"""Marks for pictures of the segmenter's workings: arrows, hatching, colours of flow, headings."""
+"""Drawing primitives for the segmenter's internals: arrows, hatching, flow colours, headings."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Floats = NDArray[np.floating]
 
 WHITE: Rgb = (255, 255, 255)
 INK: Rgb = (14, 18, 25)
-SUBPIXEL = 4  # bits of fraction that OpenCV's lines take: without them short arrows point wrong
-FASTEST = 250.0  # pixels per second at which a colour of flow is full
+SUBPIXEL = 4  # fractional bits of OpenCV's coordinates: without them short arrows point in wrong directions
+FASTEST = 250.0  # pixels per second of full saturation
 LETTERS = 13
 
 
@@ -30,8 +30,8 @@ def arrow(
         image: (H, W, 3) uint8 BGR.
         start: (2,) x, y, pixels.
         along: (2,) from start to tip, pixels; longer ones than `longest` are cut short.
-        colour: Of the arrow.
-        width: Of its line, pixels.
+        colour: Colour of the arrow.
+        width: Line width, pixels.
         longest: Greatest length, pixels.
     """
     length = float(np.hypot(*along))
@@ -49,7 +49,7 @@ def arrow(
 
 
 def line(image: Image, start: Floats, end: Floats, colour: Rgb, width: int = 1) -> None:
-    """Draw a line between two points (2,), with its fractions of a pixel, in place."""
+    """Draw a line between two points (2,) with subpixel accuracy, in place."""
     cv2.line(image, _fixed(start), _fixed(end), colour[::-1], width, cv2.LINE_AA, SUBPIXEL)
 
 
@@ -59,7 +59,7 @@ def _fixed(at: Floats) -> tuple[int, int]:
 
 
 def flow_colours(velocity: Floats) -> NDArray[np.float32]:
-    """Colours of velocities: the hue says whither, the strength of the colour how fast.
+    """Colours of velocities: hue for direction, saturation for speed.
 
     Args:
         velocity: (N, 2) pixels per second.
@@ -69,14 +69,14 @@ def flow_colours(velocity: Floats) -> NDArray[np.float32]:
     """
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     hue = np.degrees(np.arctan2(velocity[:, 1], velocity[:, 0])) % 360
-    # Speeds range over four powers of ten: their logarithm shows them all.
+    # Speeds span four orders of magnitude, hence the logarithm.
     strength = np.clip(np.log1p(speed) / np.log1p(FASTEST), 0, 1)
     hsv = np.stack([hue, strength, np.ones_like(hue)], axis=1).astype(np.float32)[None]
     return np.asarray(cv2.cvtColor(hsv, cv2.COLOR_HSV2BGR)[0] * 255, np.float32)
 
 
 def wheel(image: Image, centre: tuple[int, int], radius: int) -> None:
-    """The key to `flow_colours`: each direction in its colour, in place."""
+    """The legend of `flow_colours`: each direction in its colour, in place."""
     ys, xs = np.mgrid[-radius : radius + 1, -radius : radius + 1]
     reach = np.hypot(xs, ys) / radius
     way = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
@@ -90,18 +90,18 @@ def wheel(image: Image, centre: tuple[int, int], radius: int) -> None:
 
 
 def hatched(shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """(H, W) bool: diagonal lines, the sign for what is uncertain."""
+    """(H, W) bool: diagonal lines that mark uncertainty."""
     ys, xs = np.mgrid[: shape[0], : shape[1]]
     return np.asarray((xs + ys) % 6 < 1)
 
 
 def heading(width: int, title: str, legend: Sequence[tuple[str, Rgb]]) -> Image:
-    """A strip above a panel: its title, and what its colours mean at the right.
+    """A strip above a panel: its title, and a legend of its colours at the right.
 
     Args:
         width: Pixels.
         title: One line.
-        legend: Words, each with its colour; those that find no room are left out.
+        legend: Words with their colours; those that do not fit are left out.
 
     Returns:
         (H, width, 3) uint8 BGR.

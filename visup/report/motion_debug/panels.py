@@ -1,6 +1,6 @@
-"""How the segmenter understood a frame, in four panels: constraints, layers, labels, regions.
+"""Four panels of the segmenter's internals for a frame: constraints, layers, labels, regions.
 
-Velocities are told in pixels of the frame per second; arrows are drawn for `ARROW_S` of motion.
+Velocities are in frame pixels per second; arrows show `ARROW_S` of motion.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from visup.report.motion_debug.marks import (
 )
 from visup.report.palette import Rgb, object_colour
 
-PANEL = (640, 480)  # most pixels of a panel's picture, width and height
+PANEL = (640, 480)  # maximum size of a panel's picture, pixels
 ARROW_S = 0.25
 SURE = 0.75  # share of its label below which a superpixel is shown as uncertain
 MOST_ROWS = 6
@@ -49,7 +49,7 @@ OUTLIER_PX2 = MotionSettings().outlier ** 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Canvas:
-    """What all panels are drawn on.
+    """The common background of all panels.
 
     Attributes:
         image: (H, W, 3) uint8 BGR, the frame at the size of a panel.
@@ -62,18 +62,18 @@ class Canvas:
     scale: float
 
     def ground(self, light: float) -> Image:
-        """The frame in dim grey, on which colours stand out."""
+        """The frame in dim grey, as a background for colours."""
         grey = cv2.cvtColor(self.image, cv2.COLOR_BGR2GRAY).astype(np.float32) * light
         return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
 
 
 def draw_motion(frame: Frame, trace: SegmentationTrace | None, regions: Sequence[Region]) -> Image:
-    """Four panels that show how a frame was understood.
+    """Draw the four panels of a frame.
 
     Args:
         frame: The frame.
-        trace: The segmenter's workings after it; None where it had nothing to compare with yet.
-        regions: What was reported of it.
+        trace: The segmenter's internals after it; None for the first frame.
+        regions: The reported regions.
 
     Returns:
         (H, W, 3) uint8 BGR; the size depends on that of the frame only.
@@ -112,12 +112,12 @@ def _with_heading(image: Image, title: str, legend: Sequence[tuple[str, Rgb]]) -
 
 
 def colour_of(track: Track) -> Rgb:
-    """The colour of a track: of its id, or that of candidates before they are confirmed."""
+    """The colour of a track by its id, or that of unconfirmed candidates."""
     return object_colour(track.id) if track.id > 0 else CANDIDATE
 
 
 def best_measured(trace: SegmentationTrace) -> tuple[NDArray[np.bool_], ...]:
-    """For each baseline, which constraints are shown: each point on its longest one."""
+    """For each baseline a mask of the shown constraints: each point on its longest baseline."""
     taken = np.zeros(len(trace.scene.points), dtype=bool)
     out = []
     for m in reversed(trace.scene.measured):
@@ -128,15 +128,15 @@ def best_measured(trace: SegmentationTrace) -> tuple[NDArray[np.bool_], ...]:
 
 
 def explained_by(trace: SegmentationTrace, m: BaselineMotion) -> NDArray[np.int64]:
-    """Which layer explains each constraint of a baseline best.
+    """The layer that explains each constraint of a baseline best.
 
     Args:
-        trace: The segmenter's workings.
-        m: One baseline of them.
+        trace: The segmenter's internals.
+        m: One of its baselines.
 
     Returns:
-        (N,) int64: 0 for the background, k for the k-th track, -1 where none does. A track explains
-        only what is in it or beside it.
+        (N,) int64: 0 for the background, k for the k-th track, -1 for none. A track explains only constraints
+        in or next to it.
     """
     c, cells = m.constraints, trace.scene.cells
     best, layer = m.background.distances(c), np.zeros(len(c), np.int64)
@@ -160,14 +160,14 @@ def _constraints(canvas: Canvas, trace: SegmentationTrace | None) -> Image:
         colours |= {k: colour_of(t) for k, t in enumerate(trace.tracks, 1)}
         for m, shown in zip(trace.scene.measured, best_measured(trace), strict=True):
             layer = explained_by(trace, m)
-            # What moves by itself is drawn last, over the rest.
+            # Independent motion is drawn last, on top.
             for i in sorted(np.flatnonzero(shown), key=lambda i: layer[i] != 0):
                 _constraint(out, m.constraints, int(i), colours[int(layer[i])], canvas.factor)
     return _with_heading(out, title, legend)
 
 
 def _constraint(image: Image, c: Constraints, i: int, colour: Rgb, factor: float) -> None:
-    """An arrow, and a bar along the direction in which its motion is not known."""
+    """An arrow, and a bar along the direction in which the motion is undetermined."""
     at = (c.xy[i] + 0.5) * factor
     xx, xy, yy = c.information[i].astype(float)
     weak = max((xx + yy) / 2 - np.hypot((xx - yy) / 2, xy), 1e-4)
@@ -181,7 +181,7 @@ def _constraint(image: Image, c: Constraints, i: int, colour: Rgb, factor: float
 
 
 def velocities(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.int64]]:
-    """The velocity of each superpixel by the layer that has it.
+    """The velocity of each superpixel by its layer.
 
     Args:
         trace: The segmenter's workings.
@@ -195,7 +195,7 @@ def velocities(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.int64]]:
     layer = np.zeros(scene.cells.count, np.int64)
     models = last.background.models
     prior = last.background.prevalence.log_prior(centre, len(models))
-    # Where nothing tells them apart it is the last one, which follows the camera.
+    # Ties go to the last one, which follows the camera.
     which = len(models) - 1 - prior[::-1].argmax(axis=0)
     ways = np.stack([m.at(centre) for m in models]) / last.constraints.span_s
     out = ways[which, np.arange(len(centre))]
@@ -237,7 +237,7 @@ def _grid_of_arrows(
 
 
 def _numbers(image: Image, trace: SegmentationTrace, factor: float) -> None:
-    """The number of each layer in its middle."""
+    """The number of each layer in its centre."""
     for t in trace.tracks:
         if t.last_seen == trace.scene.time:
             text = str(t.key)
@@ -248,10 +248,10 @@ def _numbers(image: Image, trace: SegmentationTrace, factor: float) -> None:
 
 
 def layer_rows(trace: SegmentationTrace) -> list[tuple[str, Rgb]]:
-    """A line for each layer: what it is, how fast, how sure, how well supported.
+    """A line for each layer: kind, speed, confidence, support.
 
     Returns:
-        Words and colour, the background first.
+        Text and colour, the background first.
     """
     scene, scale = trace.scene, trace.scene.image.scale
     last = scene.measured[-1]
@@ -290,14 +290,14 @@ def _support(weight: float) -> str:
 
 
 def _enlarged(trace: SegmentationTrace, canvas: Canvas) -> NDArray[np.int32]:
-    """The numbers of superpixels at the size of a panel, (H, W)."""
+    """The superpixel labels at the size of a panel, (H, W)."""
     height, width = canvas.image.shape[:2]
     labels = cv2.resize(trace.scene.cells.labels, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(labels, np.int32)
 
 
 def label_colours(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.bool_]]:
-    """The colour of each superpixel, mixed from its labels, and where it is uncertain.
+    """The colour of each superpixel, mixed from its labels, and whether it is uncertain.
 
     Args:
         trace: The segmenter's workings.
@@ -350,7 +350,7 @@ def _regions(
 
 
 def _tag(image: Image, region: Region, grow: float) -> None:
-    """Id and velocity above a region, or below where there is no room."""
+    """Id and velocity above a region, or below it if there is no room."""
     vx, vy = region.velocity
     text = f"{region.id}  {np.hypot(vx, vy):.1f} px/s" + (" cut" if region.cut else "")
     width = ink(text, 13).shape[1] + 16
@@ -365,7 +365,7 @@ def _tag(image: Image, region: Region, grow: float) -> None:
 def _footer(
     width: int, frame: Frame, trace: SegmentationTrace | None, regions: Sequence[Region]
 ) -> Image:
-    """Time, and what was measured."""
+    """Time and measurements."""
     strip = np.zeros((26, width, 3), np.uint8)
     strip[:] = INK[::-1]
     words = [f"frame {frame.index}, {frame.time:.2f} s", f"regions: {len(regions)}"]

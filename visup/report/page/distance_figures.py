@@ -18,10 +18,10 @@ FEWEST_POINTS = 3
 
 @dataclass(frozen=True, slots=True)
 class FigureLine:
-    """A straight line through the distances while a pair moved in one way.
+    """A straight line through the distances of a pair during one kind of motion.
 
     Attributes:
-        span: When, and how it moved.
+        span: The time and kind of motion.
         start: Pixels at the first point.
         end: Pixels at the last point.
         slope: Pixels per second.
@@ -40,13 +40,13 @@ def fitted_lines(
 ) -> tuple[FigureLine, ...]:
     """Least-squares lines through distances, one for each span (paper, section 7.4).
 
-    A gap of 0 only says that the outlines touch, not how deep one body is before the other, so that
-    such moments tell nothing about the speed and are left out.
+    A gap of 0 only means that the outlines touch and carries no information about the speed, so such moments
+    are left out.
 
     Args:
         times: Seconds, growing.
         gaps: Pixels.
-        spans: How the pair moved, and when.
+        spans: The kinds of motion of the pair over time.
 
     Returns:
         A line for each span with at least three distances above 0.
@@ -67,7 +67,7 @@ def fitted_lines(
 
 
 def distance_figures(run: RunData) -> list[Figure]:
-    """Distance over time of each pair with its fitted lines, the longest known pairs first."""
+    """Distance over time of each pair with its fitted lines, pairs with the most data first."""
     counts: dict[tuple[int, int], int] = {}
     for sample in run.samples:
         for pair in sample.distances:
@@ -106,7 +106,7 @@ def _distance_figure(run: RunData, pair: tuple[int, int]) -> Figure:
 
 
 def _shaded(span: StateSpan) -> dict[str, Any]:
-    """A stretch of time in which a pair was one body, as a band behind the lines."""
+    """A band behind the lines for the time in which a pair was coupled."""
     return {
         "type": "rect",
         "xref": "x",
@@ -123,7 +123,7 @@ def _shaded(span: StateSpan) -> dict[str, Any]:
 
 
 def _series(known: list[tuple[float, Any]], name: str) -> dict[str, Any]:
-    """The measured distance; a gap in what is known stays a gap in the line."""
+    """The measured distance; missing data leave a gap in the line."""
     return {
         "type": "scatter",
         "mode": "lines",
@@ -137,7 +137,7 @@ def _series(known: list[tuple[float, Any]], name: str) -> dict[str, Any]:
 
 
 def _band(points: list[tuple[float, Any]]) -> list[dict[str, Any]]:
-    """One standard deviation to both sides, where all points have one."""
+    """A band of one standard deviation, if all points have one."""
     if not points or any(d.sigma is None for _, d in points):
         return []
     times = [rounded(t) for t, _ in points]

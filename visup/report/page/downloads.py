@@ -1,4 +1,4 @@
-"""Tables of a run to download from its page: CSV, and Parquet where pyarrow is installed."""
+"""Downloadable tables of a run: CSV, and Parquet if pyarrow is installed."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from visup.report.records import RunData, StateSpan
 
 Row = Mapping[str, Any]
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What a spreadsheet takes for a formula when a text begins with it."""
+"""First characters by which spreadsheets recognise a formula."""
 
 
 def downloads(run: RunData) -> str:
-    """Links to the tables; they are in the page itself."""
+    """Links to the tables, which are embedded in the page."""
     items = "".join(_links(name, rows) for name, rows in tables_of(run).items() if rows)
     return f"<p class=downloads>Download: {items}</p>" if items else ""
 
@@ -84,7 +84,7 @@ def _base64(data: bytes) -> str:
 
 
 def csv_bytes(rows: Sequence[Row]) -> bytes:
-    """A table as CSV, UTF-8; no text in it is a formula to a spreadsheet."""
+    """A table as CSV in UTF-8, with formulas disabled for spreadsheets."""
     text = StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
@@ -97,7 +97,7 @@ def _harmless(value: Any) -> Any:
 
 
 def parquet_bytes(rows: Sequence[Row]) -> bytes | None:
-    """A table as Parquet; None where pyarrow is not installed."""
+    """A table as Parquet; None without pyarrow."""
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq

@@ -1,4 +1,4 @@
-"""The figures of the report as Plotly draws them: plain values, themed by the page."""
+"""The Plotly figures of the report as plain values, themed by the page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from visup.report.records import ReportedObject, RunData, StateSpan
 CANDIDATE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8a8f98")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")
 LEAST_VOTES = 0.03
-"""Candidates that never got more votes are left out, as in figure 9 of the paper."""
+"""Candidates that never exceed this share of votes are left out, as in figure 9 of the paper."""
 MOST_CANDIDATES = 6
 MOST_FIGURES = 8
 MOST_ROWS = 16
@@ -28,8 +28,8 @@ class Figure:
 
     Attributes:
         key: Its id in the page.
-        title: What it shows.
-        caption: The same in words, for those who cannot see it.
+        title: Its title.
+        caption: A description for screen readers.
         traces: Plotly traces.
         layout: Plotly layout, without colours of text and ground.
     """
@@ -47,7 +47,7 @@ def vote_figures(run: RunData) -> list[Figure]:
 
 
 def likelihood_figures(run: RunData) -> list[Figure]:
-    """How likely each object is to be which model, over time."""
+    """The identity probabilities of each object over time."""
     figures = [_candidate_figure(run, s, "likelihoods", "likelihood") for s in _identified(run)]
     for figure in figures:
         figure.layout["yaxis"] |= {"range": [0, 1.02], "autorange": False}
@@ -55,7 +55,7 @@ def likelihood_figures(run: RunData) -> list[Figure]:
 
 
 def _identified(run: RunData) -> list[ReportedObject]:
-    """The objects that were compared with models, those longest in view."""
+    """The objects that were matched with models, longest in view first."""
     voted = {i for s in run.samples for i in s.votes}
     subjects = [s for s in run.objects if s.id in voted]
     longest = sorted(subjects, key=lambda s: (s.first_seen - s.last_seen, s.id))[:MOST_FIGURES]
@@ -101,13 +101,13 @@ def _vote_trace(samples: list[tuple[float, Any]], name: str, i: int) -> dict[str
 
 
 def _known(votes: Mapping[str, float] | None, name: str) -> float | None:
-    """Votes for a name; those that were not kept are unknown, not zero."""
+    """Votes for a name; missing ones are unknown, not zero."""
     value = (votes or {}).get(name)
     return None if value is None else rounded(value)
 
 
 def stage_figure(run: RunData) -> Figure | None:
-    """How each stage of each task stood, over time."""
+    """The status of each stage of each task over time."""
     several = len(run.tasks) > 1
     rows: dict[tuple[str, ...], str] = {
         ("stage", t.task, s.stage): f"{t.task}: {s.stage}" if several else s.stage
@@ -164,7 +164,7 @@ def _bars(
     rows: Mapping[tuple[str, ...], str],
     colour_of: Callable[[StateSpan], str],
 ) -> dict[str, Any]:
-    """All spans of one value; what waits or is hidden is faint."""
+    """All spans of one value; pending and hidden ones are faint."""
     words = spans[0].value.replace("_", " ")
     faint = spans[0].value in ("pending", "hidden")
     return {
@@ -185,7 +185,7 @@ def _bars(
 
 
 def time_layout(y_title: str, run: RunData, rangemode: str = "normal") -> dict[str, Any]:
-    """What all figures share: one time axis, and a mark where an alert opened."""
+    """The common layout of all figures: a time axis with marks for alerts."""
     grave = [a for a in run.alerts if a.severity > Severity.INFO]
     return {
         "height": 300,
@@ -215,5 +215,5 @@ def time_layout(y_title: str, run: RunData, rangemode: str = "normal") -> dict[s
 
 
 def rounded(x: float) -> float:
-    """Rounded, so that the page stays small."""
+    """Rounded to keep the page small."""
     return round(float(x), 3)

@@ -1,4 +1,4 @@
-"""The report: one HTML file that opens offline, with its pictures, figures and script inside."""
+"""The report: one HTML file that opens offline, with embedded pictures, figures and scripts."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ PARTS: Mapping[str, Callable[[RunData], str]] = MappingProxyType(
         "facts": sections.run_facts,
     }
 )
-"""Places of the page and what stands in them."""
+"""Placeholder -> content."""
 FIGURES: Mapping[str, tuple[Callable[[RunData], Sequence[Figure | None]], str]] = MappingProxyType(
     {
         "stages": (lambda run: [stage_figure(run)], "No stage was followed."),
@@ -57,7 +57,7 @@ FIGURES: Mapping[str, tuple[Callable[[RunData], Sequence[Figure | None]], str]] 
         "votes": (vote_figures, "No object was identified."),
     }
 )
-"""Figures in the order of the page, and what is said where there are none."""
+"""Figures in the order of the page, and the text if there are none."""
 SCRIPTS = ("figures.js", "report.js", "cursor.js", "filters.js")
 
 
@@ -66,7 +66,7 @@ def write_report(run: RunData, path: Path) -> None:
 
     Args:
         run: From `Collector.finish`.
-        path: The file to write; replaced as a whole when it exists.
+        path: The file to write, replaced atomically.
 
     Raises:
         ExtraMissingError: The run has figures, and Plotly is not installed.
@@ -82,8 +82,7 @@ def report_page(run: RunData) -> str:
         run: From `Collector.finish`.
 
     Returns:
-        HTML that needs nothing outside itself, and links the annotated videos beside it; the same run
-        always gives the same page.
+        Self-contained HTML with links to the annotated videos next to it; it depends only on the run.
 
     Raises:
         ExtraMissingError: The run has figures, and Plotly is not installed.

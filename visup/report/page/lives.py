@@ -1,4 +1,4 @@
-"""The objects of a run: name, picture, and when each was in view."""
+"""The objects of a run: name, picture, and times in view."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from visup.report.palette import css, object_colour
 from visup.report.records import ReportedObject, RunData
 
 MOST_LIVES = 120
-"""Rows; further objects are in the tables to download."""
+"""Maximum rows; further objects are in the downloadable tables."""
 
 
 def lives(run: RunData) -> str:
-    """A row for each object, in the order in which they came."""
+    """A row for each object, in order of appearance."""
     if not run.objects:
         return "<p class=empty>No object was followed.</p>"
     looks = _closeups(run)
@@ -44,7 +44,7 @@ def _life(run: RunData, one: ReportedObject, look: bytes | None) -> str:
 
 
 def _closeups(run: RunData) -> dict[int, bytes]:
-    """The largest picture of each object, where a key frame shows it."""
+    """The largest picture of each object in a key frame."""
     found: dict[int, bytes] = {}
     for key in run.key_frames:
         for look in key.looks:

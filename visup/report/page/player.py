@@ -1,4 +1,4 @@
-"""The video of a run in its report, and the cursor that picture, figures and text share."""
+"""The video player of a report, and the cursor shared by picture, figures and text."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _FOLD = "<button type=button data-fold aria-label='Show or hide the video' aria-
 
 
 def player(run: RunData) -> str:
-    """A corner of the page with the cursor, and above it the annotated video where there is one file of it.
+    """A corner of the page with the cursor, and the annotated video if it is a single file.
 
-    The video lies beside the page. It has all frames at an even pace: where a camera dropped some, it is
-    ahead of or behind the cursor by as much as that.
+    The video is next to the page. It plays frames at a constant rate: if a camera dropped some, it deviates
+    from the cursor by that time.
     """
     if not run.duration:
         return ""

@@ -1,4 +1,4 @@
-"""The parts of the report's page, each from the data of a run to HTML; all text is escaped here."""
+"""The sections of the report as HTML; all text is escaped here."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ MARKS = {Severity.INFO: "•", Severity.WARNING: "▲", Severity.CRITICAL: "◆"
 FEWEST_FILTERED = 4
 """Fewer alerts need no filter."""
 MANY_OBJECTS, FEW_FRAMES = 12, 8
-"""With more objects than so many the gallery has that few pictures."""
+"""With more than this many objects the gallery is limited to the second number of pictures."""
 MOST_COMPARED = 10
-"""Key frames in the similarity table; the journal has all hypotheses."""
+"""Maximum key frames in the similarity table; the journal has all hypotheses."""
 
 
 def hero(run: RunData) -> str:
-    """The summary and, beside it, the picture that matters most."""
+    """The summary and the most important picture."""
     heaviest = max(run.key_frames, key=lambda k: (k.weight, k.time), default=None)
     picture = f"<div class=hero-picture>{_image(run, heaviest)}</div>" if heaviest else ""
     words = f"<p class=lead>{escape(summary(run))}</p>{_tiles(run)}{_videos(run)}"
@@ -39,7 +39,7 @@ def hero(run: RunData) -> str:
 
 
 def verdict_badge(run: RunData) -> str:
-    """The verdict as a badge, and what it means."""
+    """The verdict as a badge with its meaning."""
     word, meaning = verdict_words(run)
     kind = run.verdict.value if run.verdict else "none"
     return (
@@ -49,7 +49,7 @@ def verdict_badge(run: RunData) -> str:
 
 
 def notices(run: RunData) -> str:
-    """What the reader must know before believing anything: a source cut short, what was assumed."""
+    """Important notices: a truncated source, assumptions."""
     problem = (
         [f'<p class="notice grave" role=note>{escape(run.problem)}</p>'] if run.problem else []
     )
@@ -68,7 +68,7 @@ def _tiles(run: RunData) -> str:
 
 
 def _videos(run: RunData) -> str:
-    """Links to the annotated videos, which lie beside the page."""
+    """Links to the annotated videos, which are next to the page."""
     parts = [f", part {n}" for n in range(1, len(run.videos) + 1)] if run.videos[1:] else [""]
     links = (
         f'<a href="{quote(name)}">Annotated video{part}</a>'
@@ -82,7 +82,7 @@ def _tile(name: str, value: str) -> str:
 
 
 def narrative(run: RunData) -> str:
-    """All sentences in order, each leading to the key frame nearest to it."""
+    """All sentences in order, each linked to the nearest key frame."""
     if not run.events:
         return "<p class=empty>Nothing notable happened.</p>"
     shown = shown_frames(run)
@@ -96,12 +96,12 @@ def narrative(run: RunData) -> str:
 
 
 def nearest(key_frames: Sequence[KeyFrame], event: Event) -> KeyFrame | None:
-    """The key frame closest in time to an event, or None when there is none."""
+    """The key frame closest in time to an event, or None."""
     return min(key_frames, key=lambda k: (abs(k.time - event.time), k.time), default=None)
 
 
 def _time(run: RunData, seconds: float, lead: str = "") -> str:
-    """A time of the source, with that of the wall where it is known."""
+    """A time of the source, with the wall-clock time if known."""
     wall = run.clock.text(seconds)
     if wall is None:
         return f"<time>{lead}{seconds:.1f} s</time>"
@@ -119,14 +119,14 @@ def _told(run: RunData, event: Event, key: KeyFrame | None) -> str:
 
 
 def alerts(run: RunData) -> str:
-    """Each alert with its life and its evidence."""
+    """Each alert with its times and its evidence."""
     if not run.alerts:
         return "<p class=empty>No alert was raised.</p>"
     return f"<ul class=alerts>{''.join(_alert(run, a) for a in run.alerts)}</ul>"
 
 
 def alert_filter(run: RunData) -> str:
-    """Choices that cut the list of alerts down, where there is more than one."""
+    """Filters of the alert list, for properties with several values."""
     if len(run.alerts) < FEWEST_FILTERED:
         return ""
     grave = sorted({a.severity for a in run.alerts}, reverse=True)
@@ -166,14 +166,14 @@ def _alert(run: RunData, alert: Alert) -> str:
 
 
 def key_frames(run: RunData) -> str:
-    """The annotated pictures, each a place that the narrative leads to."""
+    """The annotated pictures with anchors for the narrative."""
     if not run.key_frames:
         return "<p class=empty>No frame was seen.</p>"
     return f"<div class=gallery>{''.join(_key_frame(run, k) for k in shown_frames(run))}</div>"
 
 
 def shown_frames(run: RunData) -> Sequence[KeyFrame]:
-    """The key frames of the gallery: where many objects come and go, their lives tell more."""
+    """The key frames of the gallery: fewer if there are many objects, which have their own section."""
     if len(run.objects) <= MANY_OBJECTS:
         return run.key_frames
     heaviest = sorted(run.key_frames, key=lambda k: (-k.weight, k.time))[:FEW_FRAMES]
@@ -237,7 +237,7 @@ def _stage(stage: StageBelief) -> str:
 
 
 def figures(made: Iterable[Figure | None], empty: str) -> str:
-    """Places where the page's script draws the figures, with their captions."""
+    """Containers in which the page's script draws the figures, with captions."""
     shown = [f for f in made if f is not None]
     if not shown:
         return f"<p class=empty>{escape(empty)}</p>"
@@ -297,7 +297,7 @@ def _look(look: RegionCloseup, time: float) -> str:
 
 
 def run_facts(run: RunData) -> str:
-    """Settings and versions, and what each behaviour took."""
+    """Settings, versions, and the cost of each behaviour."""
     rows = "".join(
         f"<tr><th scope=row>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in flat(run.facts)
     )
@@ -308,7 +308,7 @@ def run_facts(run: RunData) -> str:
 
 
 def flat(facts: Mapping[str, Any], lead: str = "") -> list[tuple[str, str]]:
-    """Nested facts as rows of name and text; what is empty is left out.
+    """Nested facts as rows of name and text, without empty ones.
 
     >>> flat({"every": 2, "actors": {"arm": ["rms_arm", "crane"]}, "rules": []})
     [('every', '2'), ('actors, arm', 'rms_arm, crane')]

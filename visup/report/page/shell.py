@@ -1,4 +1,4 @@
-"""What pages that hold all that they show have in common: head, style, scripts, and what these may do."""
+"""The shell of self-contained pages: head, style, scripts, and content security policy."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SAID = {
     " page, and each figure in words, is here without them.</p></noscript>",
     "whole": "Written by visup. This page is self-contained and loads nothing from the network.",
 }
-"""What bodies of pages may name, and every page says alike."""
+"""Common texts of pages, by placeholder."""
 MEDIA = " media-src 'self' file:;"
-"""What a page with a video may load besides itself; any other loads nothing."""
+"""Policy of a page with a video; other pages load nothing."""
 
 
 def filled_page(
@@ -31,14 +31,14 @@ def filled_page(
     title: str,
     scripts: Sequence[str] = ("figures.js",),
 ) -> str:
-    """A page that needs nothing outside itself.
+    """A self-contained page.
 
     Args:
-        body: Template of what stands between the tags of the body.
-        text: What stands in its places, as HTML without characters that control.
-        drawn: All figures that it names.
-        title: Of the window, as HTML.
-        scripts: Names of files in this folder. Only these may run.
+        body: Template of the body.
+        text: Placeholder -> HTML without control characters.
+        drawn: The figures of the page.
+        title: Title of the window, as HTML.
+        scripts: File names in this folder; only these scripts may run.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
@@ -60,7 +60,7 @@ def filled_page(
 
 
 def write_page(page: str, path: Path) -> None:
-    """Write a page whole or not at all.
+    """Write a page atomically.
 
     Raises:
         OutputError: The file cannot be written.
@@ -76,7 +76,7 @@ def write_page(page: str, path: Path) -> None:
 
 
 def _script_hash(script: str) -> str:
-    """A script as a content security policy allows it, and no other."""
+    """The hash of a script for the content security policy."""
     digest = hashlib.sha256(script.encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode()}'"
 

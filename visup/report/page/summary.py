@@ -1,4 +1,4 @@
-"""The run in sentences: what the page says before it shows anything."""
+"""The summary of a run in sentences, at the top of the page."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MOST_NAMED = 4
 
 
 def verdict_words(run: RunData) -> tuple[str, str]:
-    """The verdict in a word, and what it means."""
+    """The verdict in a word, and its meaning."""
     judged = run.verdict or verdict_without_task(grave_kinds(run.alerts))
     if run.verdict is None and (run.tasks or judged or not run.frames):
         return "No verdict", "The run was not judged."
@@ -49,30 +49,30 @@ def verdict_words(run: RunData) -> tuple[str, str]:
 
 
 def title_of(run: RunData) -> str:
-    """What the page is about, short: the last two parts of a path, or the source as it is."""
+    """The title: the last two parts of a path, or the source unchanged."""
     parts = PurePath(run.source).parts
     return "/".join(parts[-2:]) if len(parts) > 2 and "://" not in run.source else run.source
 
 
 def summary(run: RunData) -> str:
-    """One paragraph: what was watched, what was seen, how it ended and why."""
+    """One paragraph: the source, the objects, the verdict and its reason."""
     sentences = [_watched(run), _followed(run), *_why(run), _alerted(run.alerts)]
     return " ".join(s for s in sentences if s)
 
 
 def name_of(subject: ReportedObject) -> str:
-    """What an object is called on the page, such as 'Object 2, spartan'."""
+    """The name of an object on the page, such as 'Object 2, spartan'."""
     known = subject.name != UNKNOWN_OBJECT
     return f"Object {subject.id}, {spoken(subject.name)}" if known else f"Object {subject.id}"
 
 
 def spoken(name: str) -> str:
-    """A model's name as it is said: 'payload_bay' is 'payload bay'."""
+    """A model's name in a sentence: 'payload_bay' is 'payload bay'."""
     return name.replace("_", " ")
 
 
 def called(run: RunData, object_id: int) -> str:
-    """What an object is called, by its number."""
+    """The name of an object by its number."""
     return next((name_of(s) for s in run.objects if s.id == object_id), f"Object {object_id}")
 
 
@@ -82,7 +82,7 @@ def span_sentence(span: StateSpan) -> str:
 
 
 def picture_words(run: RunData, key: KeyFrame) -> str:
-    """What a key frame shows, for those who cannot see it."""
+    """A description of a key frame for screen readers."""
     seen = [f"{called(run, k.object_id)}" for k in key.looks if k.object_id is not None]
     objects = f"in view: {'; '.join(seen)}" if seen else "no object in view"
     return (
@@ -108,7 +108,7 @@ def _watched(run: RunData) -> str:
 
 
 def _began(run: RunData) -> str:
-    """When it began by the clock of the wall, where that is known."""
+    """When it began in wall-clock time, if known."""
     at = run.clock.text(0.0)
     return f" It began on {at[:10]} at {at[11:19]} UTC." if at else ""
 

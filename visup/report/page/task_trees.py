@@ -1,8 +1,7 @@
 """The tree of each task on the report's page, in the colours of its stages at any moment.
 
-The page shows how the stages stood at the end; with scripts a slider goes through the run. What
-each stage was, and from when, stands in the page beside its name, so that nothing is asked of
-the network and the tree can be read without scripts.
+The page shows the final statuses of the stages; with scripts a slider goes through the run. The history of
+each stage is embedded next to its name, so that nothing is loaded and the tree is readable without scripts.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ PENDING = Status.PENDING.value
 
 
 def courses(run: RunData) -> str:
-    """The trees of all tasks of a run; empty when there is none."""
+    """The trees of all tasks of a run; empty without a task."""
     return "".join(_course(run, tree) for tree in run.courses)
 
 
 def changes(run: RunData, task: str, stage: str) -> list[tuple[float, str]]:
-    """(seconds, status) of a stage from then on, in order; empty for one that is never judged."""
+    """(seconds, status) changes of a stage in order; empty for one that is never evaluated."""
     spans = (s for s in run.spans_about("stage") if s.subject == ("stage", task, stage))
     return [(round(s.start, 3), s.value) for s in sorted(spans, key=_start)]
 
