@@ -7,12 +7,12 @@ Rooms, by what is evaluated:
 - `health`: camera faults injected into good video.
 - `missions`: the whole supervisor on missions with ground truth.
 - `simulation`: percepts simulated from a mission's ground truth, with the errors of real ones.
-- `reasoning`: missions reasoned about without perception, relations of boxes.
+- `reasoning`: reasoning on missions without perception, relations of boxes.
 - `runtime`: resume, speed, memory, stepping.
 
 An evaluation is a function `evaluate_NAME(...)` that returns `{"total": {...}, "items": {name: {...}}}`;
 `record` writes that as JSON. Start with `motion/runner.py`; `bench` (`make bench`) runs them all, `oracles`
-finds the comparisons with slow oracles, which a source checkout has in `tests/oracles` (`make oracles`).
+loads comparisons with slow oracles, which are in `tests/oracles` of a source checkout (`make oracles`).
 """
 
 from visup.evaluation.oracles import oracle

@@ -1,4 +1,4 @@
-"""`make bench`: the bars of rendered clips and every figure that shared data gives, in one run."""
+"""`make bench`: runs all evaluations for which data are available."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def main() -> int:
     """Run the evaluations one after another; figures go to the terminal and to JSON files.
 
     Returns:
-        0 when all ran and none missed its bar, else 1; what has no data is left out.
+        0 if all ran and met their bars, else 1; evaluations without data are skipped.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     beside = Path.cwd().parent / "shared" / "data"
@@ -39,7 +39,7 @@ def main() -> int:
     parser.add_argument("--only", help="only evaluations whose name contains this")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    # Rendered clips and what is damaged on purpose need no data.
+    # These need no data.
     results = [
         _run(kind, None, given.out)
         for kind in (
@@ -75,7 +75,7 @@ def _run(kind: str, folder: Path | None, out: Path) -> int:
     target = out / f"{name}.json"
     echo(f"== visup eval {name.replace('-', ' ', 1)}")
     begin = time.perf_counter()
-    # A process each, so that the timing of one is not coloured by what another left behind.
+    # A process each, so that timings do not affect each other.
     command = [sys.executable, "-m", "visup.cli", "eval", kind, *place, "--json", str(target)]
     code = subprocess.run(command, check=False).returncode
     echo(f"   {time.perf_counter() - begin:.0f} s, exit code {code}")

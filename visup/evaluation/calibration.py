@@ -1,7 +1,7 @@
-"""How well confidence agrees with being right: reliability and expected calibration error.
+"""Calibration of confidences: reliability and expected calibration error.
 
-Of all that is said with 80 % confidence, 80 % should be right. Confidences are put into bins; the error
-is the mean distance of a bin's share right from its mean confidence, each weighed by its size
+Of all statements with 80 % confidence, 80 % should be correct. Confidences are binned; the error is the mean
+difference between a bin's accuracy and its mean confidence, weighted by its size
 (Naeini, Cooper and Hauskrecht, "Obtaining Well Calibrated Probabilities Using Bayesian Binning", 2015).
 """
 
@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 BINS = 10
 
 Counts = list[list[float]]
-"""For each bin: how many, the sum of their confidences, how many were right."""
+"""For each bin: count, sum of confidences, number of correct statements."""
 
 
 @dataclass(slots=True)
 class Calibration:
-    """Counts of what was said, by how sure it was."""
+    """Counts of statements by confidence."""
 
     _bins: Counts = field(default_factory=lambda: [[0.0, 0.0, 0.0] for _ in range(BINS)])
 
@@ -30,22 +30,22 @@ class Calibration:
         row[2] += right
 
     def join(self, counts: Sequence[Sequence[float]]) -> None:
-        """Count what another counted."""
+        """Add the counts of another calibration."""
         for row, other in zip(self._bins, counts, strict=True):
             for k, value in enumerate(other):
                 row[k] += value
 
     def counts(self) -> Counts:
-        """What was counted, for `join`."""
+        """The counts, for `join`."""
         return [list(row) for row in self._bins]
 
     def error(self) -> float | None:
-        """Expected calibration error, 0 to 1, or None when nothing was counted."""
+        """Expected calibration error, 0 to 1, or None without counts."""
         total = sum(n for n, _, _ in self._bins)
         return sum(abs(said - right) for _, said, right in self._bins) / total if total else None
 
     def table(self) -> list[dict[str, float]]:
-        """One row for each bin that holds anything: count, mean confidence, share right."""
+        """One row for each non-empty bin: count, mean confidence, accuracy."""
         return [
             {"count": n, "confidence": said / n, "right": right / n}
             for n, said, right in self._bins

@@ -1,4 +1,4 @@
-"""Families of sequences (one scene, camera or film), and how sure a mean over them is: they fail together."""
+"""Families of sequences (same scene, camera or film), and standard errors over families."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _FIRST_WORD = re.compile(r"[^\W\d_]+")
 def family_of(name: str) -> str:
     """The family of a sequence: the first word of the last part of its name.
 
-    Data sets name sequences of one scene, camera or film alike, and this says so too often rather than too
-    seldom: two sets' `tennis` are one family.
+    Data sets name sequences of one scene, camera or film alike; this errs on the side of merging: the
+    `tennis` of two sets is one family.
 
     >>> [family_of(n) for n in ("moseg/cars4", "davis/drift-straight", "09")]
     ['cars', 'drift', '09']
@@ -28,15 +28,15 @@ def family_of(name: str) -> str:
 
 
 def mean_and_spread(scores: Scores) -> tuple[float, float]:
-    """The mean over sequences, and its standard error when families are what was drawn.
+    """The mean over sequences, and its standard error with families as clusters.
 
-    Sequences of one family fail together, so their deviations are summed before they are squared.
+    Sequences of one family are correlated, so their deviations are summed before they are squared.
 
     Args:
-        scores: Of at least one sequence.
+        scores: Scores of at least one sequence.
 
     Returns:
-        Mean and standard error; the latter is infinite where there is only one family.
+        Mean and standard error; the latter is infinite for a single family.
     """
     mean = sum(scores.values()) / len(scores)
     off: dict[str, float] = defaultdict(float)

@@ -1,4 +1,4 @@
-"""Precision of alerts, from what people said of them in the console."""
+"""Precision of alerts, from the feedback given in the console."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from visup.evaluation.figures import Progress, silent
 
 
 def evaluate_feedback(folder: Path, progress: Progress = silent) -> dict[str, Any]:
-    """How alerts were judged, over all runs below a folder.
+    """The precision of alerts over all runs below a folder.
 
     Args:
-        folder: Run folders anywhere below it; those that cannot be read are counted, and left out.
+        folder: Searched recursively for run folders; unreadable ones are counted and skipped.
         progress: Shows what is being done.
 
     Returns:
-        `items` by kind of alert: `alerts`, `right`, `false`, `precision` (None while none was judged);
+        `items` by kind of alert: `alerts`, `right`, `false`, `precision` (None without feedback);
         `total` over all, with `runs` and `unreadable`.
     """
     entries = RunLibrary([folder]).scan()

@@ -1,4 +1,4 @@
-"""What every evaluation needs: showing its progress, means over items, the memory of the process."""
+"""Helpers of all evaluations: progress, means over items, parallel processing, memory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def silent(text: str) -> None:
 
 
 def mean_of(items: Sequence[Mapping[str, Any]], key: str) -> float | None:
-    """Mean of one figure over the items that have it, or None when none has."""
+    """Mean of one figure over the items that have it, or None."""
     values = [item[key] for item in items if key in item]
     return sum(values) / len(values) if values else None
 
@@ -35,12 +35,12 @@ Found = TypeVar("Found")
 def each_in_processes(
     work: Callable[[Item], Found], items: Sequence[Item], workers: int
 ) -> Iterator[tuple[Item, Found]]:
-    """Each item with what was made of it, as they come; in this process where one worker does.
+    """Each item with its result, in order of completion; in this process with a single worker.
 
     Args:
-        work: A function of a module; it is sent to other processes.
-        items: What to do.
-        workers: Processes that share the work.
+        work: A module-level function, which is pickled.
+        items: Its arguments.
+        workers: Worker processes.
     """
     if min(workers, len(items)) <= 1:
         yield from ((item, work(item)) for item in items)
@@ -53,7 +53,7 @@ def each_in_processes(
 
 
 def _alone() -> None:
-    """One thread for each process: the processes share the cores already."""
+    """Limit each process to one thread: the processes share the cores already."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -63,7 +63,7 @@ def resident_mb() -> float:
     """Resident memory of this process, megabytes."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
-    except OSError:  # not Linux: the most that it ever was
+    except OSError:  # not Linux: the peak
         import resource
 
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -1,4 +1,4 @@
-"""Evaluation of alarms: sound footage watched without a task, and what is raised all the same.
+"""Evaluation of false alarms: normal footage watched without a task.
 
 Read `runner`.
 """

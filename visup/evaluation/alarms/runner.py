@@ -1,8 +1,8 @@
-"""`visup eval alarms`: how often each kind of alert of severity warning or above is raised for nothing.
+"""`visup eval alarms`: the rate of false alarms (severity warning or above) by kind of alert.
 
-Every clip below a folder is watched without a task. Nothing is told of what it shows, and it counts as sound,
-but for the kinds of trouble that a `truth.json` beside it expects. A recorded run is not seen again but
-reasoned about again, in seconds, so that rules can be tried on hours of footage.
+Every clip below a folder is watched without a task. It counts as normal except for the kinds of faults that a
+`truth.json` next to it expects. A recorded run is replayed in seconds instead of being watched, so that rules
+can be tested on hours of footage.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from visup.story import Narrative
 
 @dataclass(slots=True)
 class AlarmCounts:
-    """What one clip raised.
+    """The alerts of one clip.
 
     Attributes:
-        grave: How many alerts of severity warning or above opened, by kind.
-        noted: The same of those below.
+        grave: Counts of alerts of severity warning or above, by kind.
+        noted: Counts of those below.
         seconds: Length of the clip.
-        lines: What a person reads of it on a terminal.
+        lines: Lines of its narrative on a terminal.
     """
 
     grave: Counter[str] = field(default_factory=Counter)
@@ -43,7 +43,7 @@ class AlarmCounts:
     _narrative: Narrative = field(default_factory=Narrative, repr=False)
 
     def __call__(self, step: Step, frame: object = None) -> None:
-        """Take down one step; the agent calls it."""
+        """Add one step; an observer."""
         self.seconds = max(self.seconds, step.time)
         self.lines += len(self._narrative.lines(step, None))
         for event in step.events:
@@ -58,11 +58,11 @@ def evaluate_alarms(
     limit: int | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Count the alarms that sound footage raises.
+    """Count the false alarms in normal footage.
 
     Args:
-        folder: Video files, folders of images and recorded runs stand anywhere below it.
-        limit: Most frames of each clip that is seen, or None for all.
+        folder: Searched recursively for video files, folders of images and recorded runs.
+        limit: Maximum frames of each watched clip, or None for all.
         progress: Shows what is being done.
 
     Returns:
@@ -71,7 +71,7 @@ def evaluate_alarms(
         `raised` lists the clips that did.
 
     Raises:
-        SettingsError: There is neither video nor a recorded run below the folder.
+        SettingsError: There is no video or recorded run below the folder.
     """
     found: dict[str, AlarmCounts] = {}
     runs = sorted(p.parent for p in folder.rglob(JOURNAL))
@@ -85,7 +85,7 @@ def evaluate_alarms(
 
 
 def alarm_rates(found: Mapping[str, AlarmCounts]) -> dict[str, Any]:
-    """The figures of some clips, by name."""
+    """The figures of clips by name."""
     hours = sum(c.seconds for c in found.values()) / 3600
     kinds = sorted({k for c in found.values() for k in c.grave})
     items = {
@@ -122,7 +122,7 @@ def _recorded(run: Path) -> AlarmCounts:
 
 
 def _expected(place: Path) -> set[str]:
-    """The kinds of trouble that the truth beside a clip tells of."""
+    """The expected kinds of alerts in the truth of a clip."""
     truth = place.parent / "truth.json"
     if not truth.is_file():
         return set()

@@ -1,6 +1,6 @@
-"""`visup eval archive`: lakes that fill whatever happens, and answer fast.
+"""`visup eval archive`: robustness and speed of lakes.
 
-Read `runner.py` (all parts together), `recorded.py` (a lake of simulated missions), `conditions.py` (random
-conditions) with `exactness.py` (what is found equals what a replay says), `multiplied.py` (a large lake made
-of a small one) with `large_lake.py` (how fast it answers), `kills.py`, `throughput.py` and `scheduling.py`.
+Read `runner.py` (all parts), `recorded.py` (a lake of simulated missions), `conditions.py` (random
+conditions) with `exactness.py` (search results equal a replay), `multiplied.py` (a large lake made of a small
+one) with `large_lake.py` (its query times), `kills.py`, `throughput.py` and `scheduling.py`.
 """

@@ -1,4 +1,4 @@
-"""How much the confidences of a lake are worth, on runs whose truth is known."""
+"""Calibration of the confidences of a lake on runs with known truth."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ SAID = {
     "stage": "SELECT run, stage, status, confidence FROM lake.stages WHERE open ORDER BY ALL",
     "verdict": "SELECT run, task, verdict, confidence FROM lake.tasks WHERE open ORDER BY ALL",
 }
-"""What was said at last: run, of what, what, how surely."""
+"""Final statements: run, subject, value, confidence."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunTruth:
-    """What is true of a run.
+    """The truth of a run.
 
     Attributes:
-        verdict: How it ended, or ''.
-        objects: Number of an object -> the model that it is.
-        stages: Stage -> its status at the end.
+        verdict: The verdict, or ''.
+        objects: Number of an object -> its model.
+        stages: Stage -> its final status.
     """
 
     verdict: str
@@ -41,7 +41,7 @@ class RunTruth:
     stages: Mapping[str, str]
 
     def of(self, kind: str, what: str) -> str | None:
-        """What is true of something that was said, or None where nobody knows."""
+        """The true value of a subject, or None if not known."""
         if kind == "verdict":
             return self.verdict or None
         return (self.objects if kind == "identity" else self.stages).get(what)
@@ -49,15 +49,15 @@ class RunTruth:
 
 @dataclass(frozen=True, slots=True)
 class Reliability:
-    """How much the confidences of one kind are worth.
+    """The reliability of the confidences of one kind.
 
     Attributes:
         kind: 'identity', 'stage' or 'verdict'.
-        count: How much was said of which the truth is known.
-        right: Share of it that is true.
-        error: Expected calibration error: by how much confidence and truth differ, over all bins.
-        brier: Mean squared difference of confidence and truth; what is certain and right has 0.
-        bins: From unsure to sure, as of `Calibration.table`.
+        count: Number of statements with known truth.
+        right: Share of correct ones.
+        error: Expected calibration error over all bins.
+        brier: Brier score: mean squared difference of confidence and truth.
+        bins: Rows of `Calibration.table`, by increasing confidence.
     """
 
     kind: str
@@ -69,14 +69,14 @@ class Reliability:
 
 
 def read_truth(path: Path) -> dict[str, RunTruth]:
-    """The truth of runs, by their source or its name.
+    """Read the truth of runs by source or clip name.
 
     Args:
         path: CSV with the column `source`, and those of `verdict`, `objects` (`1=spartan;2=arm`) and
             `stages` (`captured=done`) that are known.
 
     Raises:
-        SourceError: It cannot be read, or is not so.
+        SourceError: It cannot be read, or is malformed.
     """
     try:
         reader = csv.DictReader(StringIO(read_text_file(path, LARGEST_MANIFEST_BYTES)), strict=True)
@@ -101,14 +101,14 @@ def read_truth(path: Path) -> dict[str, RunTruth]:
 
 
 def truth_by_run(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> Mapping[str, RunTruth]:
-    """The truth of the runs of a lake, by their keys.
+    """The truth of the runs of a lake by key.
 
     Args:
         database: The lake.
-        truth: By what was watched, or its name.
+        truth: Truth by source or clip name.
 
     Raises:
-        SourceError: No run of the lake is among those whose truth is known.
+        SourceError: No run of the lake has a known truth.
     """
     named = database.ask("SELECT run, source FROM lake.runs").to_pylist()
     known = {
@@ -126,22 +126,22 @@ def truth_by_run(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> Mappi
 
 
 def reliabilities(database: LakeDatabase, known: Mapping[str, RunTruth]) -> tuple[Reliability, ...]:
-    """How much confidences are worth, by kind; those of which no truth is known are left out.
+    """The reliability by kind, for kinds with known truth.
 
     Args:
         database: The lake.
-        known: The truth of its runs, by their keys.
+        known: The truth of its runs by key.
     """
     found = ((kind, list(_judged(database, kind, known))) for kind in KINDS)
     return tuple(reliability(kind, said) for kind, said in found if said)
 
 
 def reliability(kind: str, said: Sequence[tuple[float, bool]]) -> Reliability:
-    """How much confidences are worth.
+    """Compute the reliability of confidences.
 
     Args:
-        kind: Of what.
-        said: Confidence (0 to 1), and whether it was right; at least one.
+        kind: Kind of statement.
+        said: Confidence (0 to 1), and whether it was correct; at least one.
 
     >>> reliability("verdict", [(0.75, True), (0.75, True), (0.75, True), (0.75, False)]).error
     0.0

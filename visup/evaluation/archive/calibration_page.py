@@ -18,7 +18,7 @@ SMALLEST_PX, LARGEST_PX = 6.0, 24.0
 
 
 def calibration_page(found: Sequence[Reliability], lake: Path, fitted: str) -> str:
-    """The whole page; the same figures always give the same one.
+    """The whole page; deterministic.
 
     Args:
         found: Reliability of each kind of statement.
@@ -76,7 +76,7 @@ def reliability_figure(one: Reliability) -> Figure:
 
 
 def _size(share: float) -> float:
-    """Diameter of a point, pixels, so that its area grows with its share."""
+    """Diameter of a point, pixels, with an area proportional to its share."""
     return rounded(SMALLEST_PX + (LARGEST_PX - SMALLEST_PX) * share**0.5)
 
 

@@ -1,7 +1,7 @@
-"""What it costs to cut a video into chunks: the events against those of the same video watched unbroken.
+"""The effect of processing a video in chunks: its events compared with those of an uncut run.
 
-How much of that is chance is told by the same video unbroken but for its first frame: whoever begins at
-another frame sees outlines that differ by some pixels, and what is near a threshold falls otherwise.
+As a control the same video is processed uncut without its first frame: outlines then differ by some pixels,
+so that values near thresholds fall differently by chance.
 """
 
 from __future__ import annotations
@@ -31,28 +31,26 @@ from visup.runs.wiring import open_video
 
 CHUNKS = 3
 EventCounts = tuple[int, int, int]
-"""Events alike, in excess, missed."""
+"""Equal, excess and missed events."""
 Beliefs = Mapping[int, Sequence[Region]]
-"""Frame -> objects in sight, as regions with the ids of the objects."""
+"""Frame -> visible objects, as regions with the ids of the objects."""
 
 
 def compare_chunks(
     place: Path, missions: Sequence[Path], database: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Watch missions unbroken and cut in three.
+    """Process missions uncut and in three chunks.
 
     Args:
         place: A folder for the lakes.
         missions: Folders with `mission.json` and `video.mp4`.
-        database: Of the models.
+        database: The model database.
         progress: Shows what is being done.
 
     Returns:
-        `missions`; `events` of the unbroken runs, `missed` and `excess` of those in chunks, `event_f1`,
-        `scored_f1` of the kinds by which missions are scored, `shifted_f1` of the unbroken runs without
-        their first frame;
-        `verdicts` that differ; `longer`, by how much more frames are looked at in chunks, a share; `worst`
-        mission by F1.
+        `missions`; `events` of the uncut runs, `missed` and `excess` of those in chunks, `event_f1`,
+        `scored_f1` of the scored kinds, `shifted_f1` of the uncut runs without their first frame; `verdicts`
+        that differ; `longer`, the relative overhead in frames; `worst` mission by F1.
     """
     found = [_compared(place, mission, database, progress) for mission in missions]
     right, excess, missed = _sums(one.counts for one in found)
@@ -72,16 +70,16 @@ def compare_chunks(
 
 @dataclass(frozen=True, slots=True)
 class _Compared:
-    """A mission unbroken and in chunks.
+    """A mission uncut and in chunks.
 
     Attributes:
         mission: Its name.
-        counts: Events alike, in excess, missed.
-        scored: The same of the kinds by which missions are scored.
-        shifted: Of all kinds, of the unbroken run without its first frame.
-        verdicts: Of both.
-        frames: Of the video.
-        looked: How many frames the chunks have looked at, together.
+        counts: Equal, excess and missed events.
+        scored: The same for scored kinds only.
+        shifted: The same for the uncut run without its first frame.
+        verdicts: Both verdicts.
+        frames: Frames of the video.
+        looked: Total frames of all chunks.
     """
 
     mission: str
@@ -118,7 +116,7 @@ def _compared(place: Path, mission: Path, database: Path, progress: Progress) ->
 
 
 def _counted(whole: Lake, other: Lake) -> tuple[EventCounts, EventCounts]:
-    """Events of two runs of a video compared: all, and those of the kinds by which missions are scored."""
+    """Compare the events of two runs of a video: all, and those of scored kinds."""
     (one, seen), (again, seen_again) = _told(whole), _told(other)
     same = same_objects(seen, seen_again)
     return (
@@ -135,14 +133,14 @@ def _facts(lake: Lake) -> Mapping[str, Any]:
 def matching_events(
     whole: Iterable[Line], cut: Iterable[Line], same: Mapping[int, int]
 ) -> EventCounts:
-    """How many events of a run in chunks are those of the unbroken one, in excess, missed.
+    """Numbers of equal, excess and missed events of a run in chunks.
 
-    They are the same when kind, objects and what the details name agree, within a second; each counts once.
+    Events are equal if kind, objects and named details agree within a second; each counts once.
 
     Args:
-        whole: Events of the unbroken run.
-        cut: Those of the other.
-        same: Object of the other -> that of the unbroken run.
+        whole: Events of the uncut run.
+        cut: Events of the other run.
+        same: Object of the other run -> object of the uncut run.
     """
     real, said = list(whole), list(cut)
     left = set(range(len(real)))
@@ -168,7 +166,7 @@ def _sums(counts: Iterable[EventCounts]) -> EventCounts:
 
 
 def same_objects(whole: Beliefs, cut: Beliefs) -> dict[int, int]:
-    """Object of the run in chunks -> that of the unbroken one, by where they are believed to be."""
+    """Object of the run in chunks -> object of the uncut one, by overlap."""
     matcher = RegionMatcher()
     for frame in whole.keys() & cut.keys():
         matcher.add(whole[frame], cut[frame])
@@ -182,7 +180,7 @@ def _about(event: Line, same: Mapping[int, int]) -> tuple[Any, ...]:
 
 
 def _told(lake: Lake) -> tuple[Transcript, Beliefs]:
-    """What the run of a lake told, and where its objects were believed to be."""
+    """The transcript of the run of a lake, and the regions of its objects."""
     seen: dict[int, list[Region]] = {}
 
     def look(step: Step) -> None:
@@ -197,4 +195,4 @@ def _told(lake: Lake) -> tuple[Transcript, Beliefs]:
 
 
 def _silent(outcome: ClipOutcome) -> None:
-    """Nothing is told of a clip."""
+    """Ignore an outcome."""

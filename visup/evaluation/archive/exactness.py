@@ -1,4 +1,4 @@
-"""What is found in a lake equals what a replay with the condition as a rule says, step by step."""
+"""Checks that search results in a lake equal a replay with the condition as a rule, step by step."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from visup.rules.safety.queries import verdicts
 from visup.runs.replay import replay
 
 AT_ONCE = 25
-"""Conditions that are judged in one replay."""
+"""Conditions per replay."""
 
 
 @dataclass(slots=True)
 class FindComparison:
-    """What was compared.
+    """The result of a comparison.
 
     Attributes:
-        verdicts: How many truths of a condition, for some objects, at a step.
-        different: How many of them differ, or are hits in a run that was left out.
-        looked: Pairs of a condition and a run that had to be looked into.
-        pairs: All of these pairs.
-        quick: Those whose hits were compared that are found without reasoning again.
-        examples: Conditions that differ.
+        verdicts: Number of compared truth values (condition, objects, step).
+        different: Number of differences, including hits in a skipped run.
+        looked: Pairs of condition and run that had to be evaluated.
+        pairs: All pairs of condition and run.
+        quick: Pairs evaluated without replaying the reasoning.
+        examples: Conditions with differences.
     """
 
     verdicts: int = 0
@@ -54,19 +54,18 @@ class FindComparison:
 def compare_find(
     lake: Lake, formulas: int, seed: int, scratch: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Compare the finding of random conditions with replays of all runs of a lake.
+    """Compare search results of random conditions with replays of all runs of a lake.
 
     Args:
         lake: Recorded runs.
-        formulas: How many conditions.
-        seed: They are drawn with.
+        formulas: Number of conditions.
+        seed: Random seed.
         scratch: A folder for rules files.
         progress: Shows what is being done.
 
     Returns:
-        `formulas`, `verdicts`, `different` (0 when all is well), `quick` (share that is judged without
-        reasoning again), `scanned` (share of runs that had to be
-        looked into) and `examples` of conditions that differ.
+        `formulas`, `verdicts`, `different` (0 if correct), `quick` (share evaluated without replaying the
+        reasoning), `scanned` (share of runs that had to be evaluated) and `examples` of differences.
     """
     found = FindComparison()
     texts = random_conditions(formulas, seed)

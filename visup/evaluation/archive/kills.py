@@ -1,4 +1,4 @@
-"""A lake filled while workers, and the command with its scheduler, are killed: the same in the end."""
+"""Checks that a lake is filled correctly while workers and the whole command are killed."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ FRAMES = 16
 SIZE = (160, 120)
 DISC = 31
 STEP = 5
-"""Pixels that a disc moves in a frame."""
+"""Motion of a disc, pixels per frame."""
 WORKERS = 2
 SLOWEST_S = 3600.0
 Gray = NDArray[np.uint8]
 KINDS = ("workers", "starters", "heads")
-"""Who is killed: workers, the processes that these are started by, the command with all of them."""
+"""What is killed: workers, their parent processes, or the command with all of them."""
 
 
 def write_clips(folder: Path, count: int, seed: int = 0) -> Path:
-    """Short clips, no two alike: two textured discs pass each other before a textured ground."""
+    """Distinct short clips: two textured discs pass each other before a textured background."""
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(count):
         rng = np.random.default_rng((seed, number))
@@ -60,21 +60,20 @@ def compare_killed(
 ) -> dict[str, Any]:
     """Fill a lake undisturbed, and one while processes are killed; compare them row for row.
 
-    Kills are spread over about as long as filling the lake undisturbed takes. Should it be full before all
-    of them are done, further lakes are filled, and compared, too.
+    Kills are spread over about the time of filling the lake undisturbed. If it is full before all are done,
+    further lakes are filled and compared, too.
 
     Args:
         place: A folder for all lakes.
-        clips: How many short clips.
-        kills: How many times a worker is killed.
-        heads: How many times the command is, with its scheduler and all its workers; and as many times one
-            of the processes that workers are started by.
-        seed: Of the clips, and of when and whom.
+        clips: Number of short clips.
+        kills: Number of kills of workers.
+        heads: Number of kills of the command with scheduler and workers; also of the parents of workers.
+        seed: Random seed of clips and kills.
         progress: Shows what is being done.
 
     Returns:
-        `clips`, `workers`, `starters` and `heads` that were killed, `calls` of the command, `lakes` that were
-        filled, `rows` compared, and `different` rows.
+        `clips`; killed `workers`, `starters` and `heads`; `calls` of the command, filled `lakes`, compared
+        `rows`, and `different` rows.
     """
     footage = write_clips(place / "clips", clips, seed)
     progress("undisturbed")
@@ -122,9 +121,9 @@ class RandomKills:
     """Kills processes of the command at random moments.
 
     Args:
-        wanted: How often, for each of `KINDS`.
+        wanted: Number of kills for each of `KINDS`.
         pause_s: The longest time between two kills.
-        rng: Of when, and whom.
+        rng: Random generator.
     """
 
     def __init__(self, wanted: Mapping[str, int], pause_s: float, rng: Random) -> None:
@@ -133,12 +132,12 @@ class RandomKills:
 
     @property
     def left(self) -> dict[str, int]:
-        """How many kills of each kind are still to be done."""
+        """Remaining kills by kind."""
         left = {kind: self._wanted[kind] - self.done[kind] for kind in self._wanted}
         return {kind: count for kind, count in left.items() if count > 0}
 
     def disturb(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill processes of one call of the command, and perhaps itself, until it has ended."""
+        """Kill processes of one call of the command, perhaps the command itself, until it has ended."""
         while process.poll() is None:
             time.sleep(self._rng.uniform(0.0, self._pause_s))
             if not (left := self.left):
@@ -151,7 +150,7 @@ class RandomKills:
         process.wait()
 
     def _victims(self, command: int, kind: str) -> list[int]:
-        """Who is to be killed at once: one worker, one of those that start them, or all."""
+        """The processes to kill at once: one worker, one parent of workers, or all."""
         starters, everybody = _family(command)
         if kind == "heads":
             return [command, *everybody]
@@ -160,7 +159,7 @@ class RandomKills:
 
 
 def _family(process: int) -> tuple[list[int], list[int]]:
-    """The processes that one has started, and those with all that these have started."""
+    """The children of a process, and all its descendants."""
     psutil = imported("psutil")
     try:
         command = psutil.Process(process)
@@ -176,7 +175,7 @@ def _kill(processes: list[int]) -> None:
         try:
             psutil.Process(process).kill()
         except psutil.Error:
-            continue  # it has ended by itself
+            continue  # already ended
 
 
 def _runs(lake: Path) -> list[str]:
@@ -184,7 +183,7 @@ def _runs(lake: Path) -> list[str]:
 
 
 def _differences(one: Path, other: Path) -> tuple[int, int]:
-    """How many rows there are, and how many differ."""
+    """Number of rows, and of different ones."""
     rows = different = 0
     for name in TABLES:
         first, second = list(Lake(one).rows(name)), list(Lake(other).rows(name))

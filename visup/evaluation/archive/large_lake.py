@@ -1,4 +1,4 @@
-"""How fast a large lake answers, in a process of its own, as a command is one."""
+"""Query times of a large lake, in a separate process like a command."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ QUESTIONS = {
 def time_large_lake(
     small: Lake, place: Path, runs: int, rows: int, seed: int, progress: Progress
 ) -> dict[str, Any]:
-    """Make a large lake and ask it.
+    """Create a large lake and query it.
 
     Args:
-        small: What it is made of.
-        place: A new folder for it, or one in which it was made before.
-        runs: How many it has.
-        rows: How many rows of relations and events, about.
-        seed: Of all that is drawn.
+        small: The lake that is multiplied.
+        place: A folder, new or with the large lake of an earlier call.
+        runs: Number of runs.
+        rows: Approximate number of rows of relations and events.
+        seed: Random seed.
         progress: Shows what is being done.
 
     Returns:
-        `runs`, `partitions`, `gb` on the disk; `open_s`; for each pattern `index_NAME_s` (which runs can have
-        it, warm), `possible_NAME` and `scanned_NAME` (share of runs); `find_s` and `find_cpu_s`, the same and
-        all of these runs judged, of the pattern with names, warm, on one core; for each question
-        `sql_NAME_s`, warm; `memory_mb`, the most that the process took.
+        `runs`, `partitions`, `gb` on disk; `open_s`; for each pattern `index_NAME_s` (prefilter, warm),
+        `possible_NAME` and `scanned_NAME` (share of runs); `find_s` and `find_cpu_s`, including the
+        evaluation of these runs, for the pattern with names, warm, on one core; for each question
+        `sql_NAME_s`, warm; `memory_mb`, the peak memory.
     """
     if (place / "lake.json").exists():
         lake = Lake.open(place)
@@ -61,7 +61,7 @@ def time_large_lake(
 
 
 def _alone(lake: Lake, small: Lake) -> list[tuple[Any, dict[str, Any]]]:
-    """Ask in a fresh process, whose memory is nobody else's."""
+    """Query in a fresh process, to measure its memory."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
@@ -87,7 +87,7 @@ def _answers(lake: Lake, small: Lake) -> dict[str, Any]:
 
 
 def _find(lake: Lake, database: LakeDatabase) -> tuple[float, float]:
-    """Seconds that it takes to find the pattern with names, and those of the processor."""
+    """Elapsed and processor seconds of searching the pattern with names."""
     begin, busy = time.perf_counter(), time.process_time()
     search = read_search(PATTERNS["named"])
     for _ in find(lake, search, search.possible_runs(database), 0):

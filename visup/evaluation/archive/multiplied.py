@@ -1,8 +1,8 @@
-"""A large lake made of a small one: its runs again and again, each with other times, names and gaps.
+"""Creates a large lake from a small one: copies of its runs with other times, names and gaps.
 
-A copy is stretched or squeezed in time, lives longer by repeating itself until it has the rows that are
-wanted, is recorded on some day of two years, and loses some of its relations; and in most of them the actors
-are somebody else. So are lakes of real runs: alike, and no two the same.
+A copy is scaled in time, repeated until it has the requested rows, recorded on a random day within two years,
+and loses some of its relations; in most copies the actors have other names. So runs are similar but not
+equal, like real ones.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from visup.evaluation.figures import Progress
 KEPT = 0.9
 """Share of the relations that a copy keeps."""
 OTHERS = 400
-"""In one copy of so many the actors keep their names."""
+"""One in this many copies keeps the names of the actors."""
 FIRST_DAY_US = 1_700_000_000_000_000
 DAY_US = 86_400_000_000
 TIMES = ("begin", "end", "time", "opened", "updated", "closed", "first_seen", "last_seen")
@@ -46,9 +46,9 @@ class _Copies:
     """Some copies of a run.
 
     Attributes:
-        keys: Of each.
-        stretch: By how much each is longer.
-        repeats: How often each repeats itself.
+        keys: Keys of the copies.
+        stretch: Time scale of each.
+        repeats: Number of repetitions of each.
     """
 
     keys: tuple[str, ...]
@@ -59,18 +59,18 @@ class _Copies:
 def multiply(
     small: Lake, place: Path, runs: int, rows: int, seed: int, progress: Progress
 ) -> tuple[Lake, int]:
-    """Make a large lake.
+    """Create a large lake.
 
     Args:
-        small: What is multiplied.
-        place: A new folder for it.
-        runs: How many runs it has.
-        rows: How many rows of relations and events, about.
-        seed: Of all that is drawn.
+        small: The lake to multiply.
+        place: A new folder.
+        runs: Number of runs.
+        rows: Approximate number of rows of relations and events.
+        seed: Random seed.
         progress: Shows what is being done.
 
     Returns:
-        It, and how many rows of relations and events it has.
+        The lake, and its number of rows of relations and events.
     """
     rng = np.random.default_rng(seed)
     base = _tables(small)
@@ -93,7 +93,7 @@ def multiply(
 
 
 def lend_recordings(small: Lake, large: Lake, runs: list[str]) -> None:
-    """Let runs of a large lake be reasoned about again: each has the journal of one that it was made of."""
+    """Give runs of a large lake the journals of their originals, so that they can be replayed."""
     known = small.runs()
     for number, run in enumerate(runs):
         link = large.path / RECORDINGS / run[:2] / run
@@ -167,7 +167,7 @@ def _longest(rows: Any, column: str) -> float:
 
 
 def _renamed(objects: Any, copies: _Copies) -> Any:
-    """In most copies nobody plays an actor, and nobody has the name of a model."""
+    """Remove actors and model names in most copies."""
     arrow = imported("pyarrow")
     same = {key for key in copies.keys if int(key[:6], 16) % OTHERS == 0}
     keys = objects["run"].to_pylist()

@@ -1,4 +1,4 @@
-"""A small lake of recorded runs: missions whose percepts are made from their truth, with noise."""
+"""A small lake of simulated runs: percepts are generated from the truth of missions with noise."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from visup.version import __version__
 def lake_of_missions(
     place: Path, missions: Sequence[Path], seeds: int, every: int, progress: Progress
 ) -> Lake:
-    """A lake of missions, each seen with the noise of several seeds.
+    """A lake of missions, each simulated with several noise seeds.
 
     Args:
         place: A folder for it and the journals.
@@ -45,7 +45,7 @@ def lake_of_missions(
 
 
 def record_mission(run: Path, mission: Mission, noise: PerceptNoise, every: int) -> None:
-    """Record a run of a mission, seen with noise, in a new folder."""
+    """Record a simulated run of a mission in a new folder."""
     run.mkdir(parents=True)
     told = mission.description
     settings = WatchSettings(

@@ -1,4 +1,4 @@
-"""All parts of `visup eval archive`: those that are wanted, with their figures."""
+"""Runs the requested parts of `visup eval archive`."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ ROWS_PER_RUN = 1_000
 
 @dataclass(frozen=True, slots=True)
 class ArchiveSizes:
-    """How much is done of each part.
+    """The sizes of the parts.
 
     Attributes:
-        formulas: Random conditions whose finding is compared.
-        every: Of recorded runs, use every n-th frame of a mission.
+        formulas: Number of random conditions.
+        every: Frame stride of simulated missions.
         kills: Kills of workers; a tenth as many of the command with its scheduler.
-        clips: Short clips that are watched meanwhile.
-        runs: Of the large lake.
-        frames: Of each mission whose watching is timed.
-        rounds: How often that is.
-        jobs: Of the scheduler.
-        workers: Of the scheduler.
-        watched: Missions that are watched unbroken and in chunks.
+        clips: Number of short clips for the kills.
+        runs: Runs of the large lake.
+        frames: Frames per mission for the throughput.
+        rounds: Repetitions of the throughput measurement.
+        jobs: Jobs of the scheduler.
+        workers: Workers of the scheduler.
+        watched: Missions processed uncut and in chunks.
     """
 
     formulas: int = 50
@@ -64,7 +64,7 @@ class _Evaluation:
     small: Lake | None = None
 
     def recorded(self) -> Lake:
-        """The recorded runs, made when they are first wanted."""
+        """The lake of simulated runs, created on demand."""
         if self.small is None:
             of = self.missions, 1, self.sizes.every, self.progress
             self.small = lake_of_missions(self.place, *of)
@@ -124,15 +124,15 @@ def evaluate_archive(
     """Figures of lakes.
 
     Args:
-        folder: Missions, of which lakes are made.
-        part: Which parts, of `PARTS`; all if none.
-        seed: Of all that is drawn.
+        folder: Missions from which lakes are created.
+        part: Some of `PARTS`; all if none.
+        seed: Random seed.
         models: Model database; by default one is built as for `visup eval missions`.
         progress: Shows what is being done.
-        sizes: How much is done, as of `ArchiveSizes`.
+        sizes: As in `ArchiveSizes`.
 
     Returns:
-        `items` with the figures of each part, `total` with `different`: what ought to be equal and is not.
+        `items` with the figures of each part, `total` with `different`: number of unexpected differences.
 
     Raises:
         SettingsError: There is no such part, or no mission.

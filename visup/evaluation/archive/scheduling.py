@@ -1,9 +1,8 @@
-"""How many workers one scheduler can serve: by workers that sleep for as long as a clip takes.
+"""Capacity of a Dask scheduler, estimated with sleeping workers.
 
-A process cannot be a thousand workers of a cluster, but it can be a hundred that sleep: the scheduler, in a
-process of its own, does for each of them and for each job what it does for any. What it takes then, when
-nothing is done and for each job, is reckoned up to the workers and clips that are asked about: Dask lets a
-worker of many tell less often that it is there.
+One process can host a hundred sleeping workers; the scheduler, in a separate process, treats them like any
+others. Its measured load, idle and per job, is extrapolated to the requested workers and clips, considering
+that Dask reduces the heartbeat rate with many workers.
 """
 
 from __future__ import annotations
@@ -26,25 +25,24 @@ ASKED_WORKERS = 1_000
 MOST_BUSY = 0.6
 ASKED_CLIPS = 100_000
 CLIP_S = 60.0
-"""How long a worker takes for a clip: a minute of video in real time."""
+"""Time of a worker per clip: a minute of video in real time."""
 WAITING_PER_WORKER = 3
 _WORKERS = "from visup.evaluation.archive.scheduling import sleepers; sleepers('{}', {})"
 _ADDRESS = re.compile(rb"tcp://[\d.]+:\d+")
 
 
 def measure_scheduler(workers: int, jobs: int, progress: Progress) -> dict[str, Any]:
-    """What a scheduler takes.
+    """Measure the load of a scheduler.
 
     Args:
-        workers: How many sleep.
-        jobs: How many jobs they do.
+        workers: Number of sleeping workers.
+        jobs: Number of jobs.
         progress: Shows what is being done.
 
     Returns:
-        `workers` and `jobs`; `beat_ms` of the processor for each time that a worker tells that it is there,
-        `job_ms` for each job; `busy`, the share of a core that a scheduler of 1,000 workers takes, each of
-        which is a minute at a clip; `breaks_at`, the workers with which it would be 60 % busy; `hours` for
-        100,000 clips.
+        `workers` and `jobs`; processor time `beat_ms` per heartbeat and `job_ms` per job; `busy`, the share
+        of a core with 1,000 workers and a minute per clip; `breaks_at`, the number of workers at 60 % load;
+        `hours` for 100,000 clips.
     """
     distributed, psutil = imported("distributed"), imported("psutil")
     with (
@@ -76,14 +74,14 @@ def measure_scheduler(workers: int, jobs: int, progress: Progress) -> dict[str, 
 
 
 def _timed(process: Any, client: Any, jobs: int, workers: int) -> tuple[float, float]:
-    """Seconds that some jobs take, and those of the scheduler's processor."""
+    """Elapsed seconds of some jobs, and processor seconds of the scheduler."""
     begin = time.perf_counter()
     took = _taken(process, lambda: _run_jobs(client, jobs, workers))
     return time.perf_counter() - begin, took
 
 
 def _taken(process: Any, work: Any) -> float:
-    """Seconds of the processor that a process takes meanwhile."""
+    """Processor seconds of a process during some work."""
     before = process.cpu_times()
     work()
     after = process.cpu_times()
@@ -91,7 +89,7 @@ def _taken(process: Any, work: Any) -> float:
 
 
 def _run_jobs(client: Any, jobs: int, workers: int) -> None:
-    """Jobs handed over as a lake's are: a few for each worker, and one more for each that is done."""
+    """Submit jobs like those of a lake: a few per worker, and one more for each completed."""
     completed = imported("distributed").as_completed()
     left = iter(range(jobs))
     for _, number in zip(range(workers * WAITING_PER_WORKER), left, strict=False):
@@ -117,7 +115,7 @@ def _scheduler() -> Iterator[tuple[int, str]]:
 
 @contextmanager
 def _sleeping(address: str, workers: int) -> Iterator[None]:
-    """So many workers in a process."""
+    """Start sleeping workers in a process."""
     code = _WORKERS.format(address, workers)
     with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as process:
         try:
@@ -127,7 +125,7 @@ def _sleeping(address: str, workers: int) -> Iterator[None]:
 
 
 def sleepers(address: str, workers: int) -> None:
-    """Be so many workers of one thread each, until somebody ends this process."""
+    """Run workers of one thread each until the process is ended."""
     asyncio.run(_sleepers(address, workers))
 
 

@@ -1,4 +1,4 @@
-"""What two workers bring over one, and what a lake costs over plain watching."""
+"""Speedup of two workers over one, and overhead of a lake over plain watching."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from visup.runs.settings import WatchSettings
 def measure_throughput(
     place: Path, missions: Sequence[Path], frames: int, rounds: int, progress: Progress
 ) -> dict[str, Any]:
-    """Watch the beginnings of missions plainly, into a lake, by one worker, and by two, in turn.
+    """Process the beginnings of missions in turn plainly, into a lake, by one worker, and by two.
 
     Args:
-        place: A folder for all of it.
+        place: A working folder.
         missions: Folders with `video.mp4`.
-        frames: Of each that are watched.
-        rounds: How often; the ratios are medians of those of the rounds.
+        frames: Frames per mission.
+        rounds: Number of repetitions; ratios are medians over them.
         progress: Shows what is being done.
 
     Returns:
-        `video_s` of a round; `plain_s`, `lake_s`, `one_s` and `two_s`, medians; `speedup` of two workers over
-        one; `overhead` of a lake over plain watching on one process, a share, and `overhead_cpu`, the same of
-        processor time, which other work on the machine changes little.
+        `video_s` of a round; medians `plain_s`, `lake_s`, `one_s` and `two_s`; `speedup` of two workers;
+        relative `overhead` of a lake over plain watching in one process, and `overhead_cpu`, the same in
+        processor time, which depends less on the load of the machine.
     """
     clips = [_beginning(m / "video.mp4", place / f"{m.name}.avi", frames) for m in missions]
     taken: dict[str, list[float]] = {name: [] for name in ("plain", "lake", "one", "two")}
     busy: dict[str, list[float]] = {name: [] for name in taken}
     video_s = 0.0
     with open_pool(PoolSettings(workers=1)) as one, open_pool(PoolSettings(workers=2)) as two:
-        for pool in (one, two):  # what is loaded once a worker is loaded
+        for pool in (one, two):  # warm up the workers
             _filled(place / "warm", clips, pool)
         _plain(place / "warm-run", clips)
         for number in range(rounds):
@@ -93,7 +93,7 @@ def _beginning(source: Path, target: Path, frames: int) -> Path:
 
 
 def _plain(folder: Path, clips: Sequence[Path]) -> float:
-    """Watch clips into run folders; gives no seconds of video, since a lake tells them alone."""
+    """Watch clips into run folders; returns 0 seconds of video, which only a lake reports."""
     for number, clip in enumerate(clips):
         place = folder / str(number)
         place.mkdir(parents=True)
@@ -103,7 +103,7 @@ def _plain(folder: Path, clips: Sequence[Path]) -> float:
 
 
 def _filled(folder: Path, clips: Sequence[Path], pool: Pool) -> float:
-    """Fill a new lake; gives the seconds of video."""
+    """Fill a new lake; returns the seconds of video."""
     lake = Lake.create(folder)
     plan = make_plan(lake, [Clip(c, taken=0.0) for c in clips], WatchSettings(""))
     result = fill(lake, plan, pool, _silent)
@@ -112,4 +112,4 @@ def _filled(folder: Path, clips: Sequence[Path], pool: Pool) -> float:
 
 
 def _silent(outcome: ClipOutcome) -> None:
-    """Nothing is told of a clip."""
+    """Ignore an outcome."""

@@ -1,8 +1,8 @@
-"""How much a vote for an identity tells, fitted to labelled runs: the temperature of its confidences.
+"""Fits the weight of identity votes to labelled runs (temperature scaling).
 
-Confidence is a softmax over votes (`rules/identity/votes.py`); its one factor says how fast votes become
-certainty. It is chosen so that what is true was the likeliest to be said. A few labels say little, so that
-what visup ships with counts as if it had been fitted to some of its own.
+Confidence is a softmax over votes (`rules/identity/votes.py`) with one factor, the weight of a vote. It is
+fitted by maximum likelihood with a prior around the shipped value, since a few labels carry little
+information.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from visup.runs.settings import LARGEST_EVIDENCE
 
 LEAST_EVIDENCE = 0.05
 SPREAD = 0.5
-"""How far, as a logarithm, the right factor may well be from the shipped one: by two thirds more, or less."""
+"""Standard deviation of the prior of the log factor: about two thirds more or less than the shipped value."""
 FEWEST = 10
-"""Of fewer labelled objects nothing is fitted."""
+"""Minimum number of labelled objects."""
 
 
 @dataclass(frozen=True, slots=True)
 class LabelledVotes:
-    """The votes of an object at last, and what it truly is.
+    """The final votes of an object, and its true identity.
 
     Attributes:
-        votes: Of each name.
-        none: For its being none of the models.
+        votes: Votes by name.
+        none: Votes for none of the models.
         truth: The model, or 'unknown object'.
     """
 
@@ -44,7 +44,7 @@ class LabelledVotes:
     truth: str
 
     def likelihood(self, evidence: float) -> float:
-        """How likely the truth was called, where a vote tells so much."""
+        """The probability of the truth for a weight of votes."""
         said = {**self.votes, UNKNOWN_OBJECT: self.none}
         most = max(said.values())
         odds = {name: exp(evidence * (v - most)) for name, v in said.items()}
@@ -53,7 +53,7 @@ class LabelledVotes:
 
 
 def fitted_evidence(labelled: Sequence[LabelledVotes]) -> float | None:
-    """How much a vote tells, by labelled objects; None where there are too few.
+    """The fitted weight of a vote; None with too few labelled objects.
 
     >>> sure = LabelledVotes({"arm": 2.0, "cup": 1.0}, 0.5, "arm")
     >>> wrong = LabelledVotes({"arm": 2.0, "cup": 1.0}, 0.5, "cup")
@@ -75,11 +75,11 @@ def fitted_evidence(labelled: Sequence[LabelledVotes]) -> float | None:
 
 
 def labelled_votes(lake: Lake, truth: Mapping[str, RunTruth]) -> Iterator[LabelledVotes]:
-    """The votes of the confirmed objects of a lake that are labelled, at the ends of their runs.
+    """The final votes of the confirmed and labelled objects of a lake.
 
     Args:
-        lake: The runs are reasoned about again.
-        truth: Run -> what is true of it.
+        lake: The lake, whose runs are replayed.
+        truth: Run -> its truth.
 
     Raises:
         VisupError: A run is damaged.

@@ -1,1 +1,1 @@
-"""What was chosen or learnt on some families of sequences is scored on the others (`--folds`)."""
+"""Cross-validation over families of sequences (`--folds`)."""

@@ -1,7 +1,7 @@
 """`visup eval motion --folds`: settings chosen on some families of sequences are scored on the others.
 
-Each (sequence, settings, variant) is measured once and kept in a cache, under a digest of the code that
-sees, of the settings and of the sequence's files: what is read from it is what would be measured.
+Results of each (sequence, settings, variant) are cached under a digest of the perception code, the settings
+and the files of the sequence.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.foreground.perceptron import write_model
 
 WEAK = 0.25  # J below which a sequence counts as lost
-UNSTABLE = 0.05  # most by which J may move between variants
+UNSTABLE = 0.05  # difference of J between variants that counts as unstable
 KEPT = ("J", "F", "ghost")
 ROOMS = ("agent/model", "evaluation/motion", "percepts/motion", "percepts/video")
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One sequence to be measured in one way.
+    """One measurement of a sequence.
 
     Attributes:
-        sequence: Which.
-        settings: Of the segmenter.
-        variant: Name of the variant that is shown.
-        limit: Most frames of the video that are shown, or None.
-        cache: Folder of what was measured before.
+        sequence: The sequence.
+        settings: Settings of the segmenter.
+        variant: Name of the variant.
+        limit: Maximum frames, or None.
+        cache: Folder of cached results.
     """
 
     sequence: LabelledSequence
@@ -60,19 +60,19 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class FoldPlan:
-    """What is measured by folds.
+    """The plan of a cross-validation.
 
     Attributes:
-        folds: How many folds.
-        cache: Folder for what was measured; made when missing.
-        tries: Settings to choose from beside the defaults, each as 'name=value,name=value'.
-        stability: Whether variants of each sequence are shown as well, with the default settings.
-        against: Figures of an earlier evaluation, written with `--json`, to be compared with.
-        limit: Most frames of each sequence.
-        workers: Processes that share the work; as many as there are cores when None.
-        train: Whether what moves is learnt anew for each fold, from all others.
-        also: Folders of sequences that are learnt from besides, for every fold.
-        seed: Of what is learnt.
+        folds: Number of folds.
+        cache: Folder for cached results; created if missing.
+        tries: Candidate settings besides the defaults, each as 'name=value,name=value'.
+        stability: Whether to measure variants of each sequence, with the default settings.
+        against: Figures of an earlier evaluation (`--json`) to compare with.
+        limit: Maximum frames per sequence.
+        workers: Worker processes; None for one per core.
+        train: Whether to retrain the motion model for each fold on all others.
+        also: Folders of further training sequences for every fold.
+        seed: Random seed of training.
     """
 
     folds: int
@@ -92,7 +92,7 @@ def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) ->
 
     Args:
         folder: As for `evaluate_motion`; only sequences with masks count.
-        plan: What is measured.
+        plan: The plan.
         progress: Shows what is being done.
 
     Returns:
@@ -153,7 +153,7 @@ def _learnt(
     plan: FoldPlan,
     progress: Progress,
 ) -> dict[int, Path]:
-    """The models of the folds, each learnt from all other folds, and what is always learnt from, as files."""
+    """The model files of the folds, each trained on all other folds and the additional sequences."""
     how = TrainingPlan(plan.cache, plan.seed)
     common = gathered(found_below(plan.also), how, progress)
     found = gathered(sequences, how, progress)
@@ -169,7 +169,7 @@ def _learnt(
 
 
 def tried_changes(text: str) -> dict[str, Any]:
-    """Settings to be changed, from text such as 'confirm_s=0.3,evidence=0.8'.
+    """Parse settings such as 'confirm_s=0.3,evidence=0.8'.
 
     Raises:
         SettingsError: A setting is unknown or its value is no number.
@@ -194,7 +194,7 @@ def tried_changes(text: str) -> dict[str, Any]:
 
 
 def _figures(path: Path) -> dict[str, float]:
-    """J by sequence, of an earlier evaluation."""
+    """J by sequence of an earlier evaluation."""
     try:
         items = json.loads(path.read_text(encoding="utf-8"))["items"]
         return {name: float(item["J"]) for name, item in items.items() if "J" in item}
@@ -232,7 +232,7 @@ def _total(items: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 def _measured(
     trials: Mapping[Any, Trial], workers: int, progress: Progress
 ) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """The figures of trials, by their keys, as they come."""
+    """The results of trials by key, in order of completion."""
     for count, (key, figures) in enumerate(_scored(trials, workers), 1):
         progress(f"{count} of {len(trials)}")
         yield key, figures
@@ -250,14 +250,14 @@ def _scored(trials: Mapping[Any, Trial], workers: int) -> Iterator[tuple[Any, di
 
 
 def _alone() -> None:
-    """One thread for each process: the processes share the cores already."""
+    """Limit each process to one thread: the processes share the cores already."""
     import cv2
 
     cv2.setNumThreads(1)
 
 
 def _score(trial: Trial) -> dict[str, Any]:
-    """The figures of one trial, from the cache when it was measured before."""
+    """The result of one trial, from the cache if available."""
     file = trial.cache / f"{_digest(trial)}.json"
     if file.is_file():
         return dict(json.loads(file.read_text(encoding="utf-8")))
@@ -274,7 +274,7 @@ def _score(trial: Trial) -> dict[str, Any]:
 
 
 def _digest(trial: Trial) -> str:
-    """What the figures of a trial follow from."""
+    """The cache key of a trial."""
     digest = hashlib.sha256(code_digest(ROOMS))
     says = (asdict(trial.settings), trial.variant, trial.limit, trial.sequence.name)
     digest.update(json.dumps(says, default=str).encode())

@@ -1,6 +1,6 @@
-"""Evaluation of the health behaviour: faults injected into sound video, and what is reported.
+"""Evaluation of the health behaviour: faults injected into good video.
 
-Read `camera_faults` (the faults and the status that each must give), then `runner` (the campaign).
+Read `camera_faults` (the faults and their expected statuses), then `runner` (the campaign).
 """
 
 from visup.evaluation.health.runner import evaluate_health

@@ -1,4 +1,4 @@
-"""Camera faults put into sound frames, of many kinds and strengths, drawn from a seed."""
+"""Injects random camera faults of many kinds and strengths into good frames."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ EXPECTED = {
     "scrambled": HealthStatus.SCRAMBLED,
     "dropped": HealthStatus.DROPPED,
 }
-"""Kind of fault -> the status that names it."""
+"""Kind of fault -> expected status."""
 
 
 def inject(frames: Sequence[Frame], start: int, kind: str, seed: int) -> list[Frame]:
-    """A clip into which a fault was put.
+    """Inject a fault into a clip.
 
-    Strength, colour, place and the like are drawn from the seed.
+    Strength, colour, position etc. are drawn at random.
 
     Args:
-        frames: A sound clip.
-        start: Position in `frames` of the first frame with the fault.
+        frames: A good clip.
+        start: Index in `frames` of the first frame with the fault.
         kind: A key of `EXPECTED`.
-        seed: Of everything that is drawn.
+        seed: Random seed.
 
     Returns:
         The clip with the fault from `start` to its end; fewer frames when some were dropped.
@@ -53,7 +53,7 @@ def _bytes(values: NDArray[np.generic]) -> Image:
 
 
 def _tone(frames: Sequence[Frame], rng: Random, level: float) -> list[Frame]:
-    """One tone in place of the image, half of the time with sensor noise."""
+    """A uniform image, half of the time with sensor noise."""
     sigma = rng.uniform(0.5, 6.0) if rng.random() < 0.5 else 0.0
     return _each(lambda image: level + rng.normal(0.0, sigma, image.shape), frames)
 
@@ -69,7 +69,7 @@ def white(frames: Sequence[Frame], rng: Random) -> list[Frame]:
 
 
 def frozen(frames: Sequence[Frame], rng: Random) -> list[Frame]:
-    """The same image again and again; sometimes the noise of a later stage is on top."""
+    """The same image repeated, sometimes with noise added afterwards."""
     kept = frames[0].image.astype(np.float32)
     sigma = rng.uniform(0.2, 0.8) if rng.random() < 0.3 else 0.0
     return _each(lambda image: kept + rng.normal(0.0, sigma, kept.shape), frames)
@@ -91,7 +91,7 @@ def noise(frames: Sequence[Frame], rng: Random) -> list[Frame]:
 
 
 def blocked(frames: Sequence[Frame], rng: Random) -> list[Frame]:
-    """Half of the view covered by something flat, noisy or textured."""
+    """Half of the view covered by a flat, noisy or textured surface."""
     height, width = frames[0].image.shape[:2]
     covered = _half(height, width, rng)[..., None]
     cover = _cover(height, width, rng)
@@ -132,7 +132,7 @@ def _cover(height: int, width: int, rng: Random) -> NDArray[np.float32]:
 
 
 def scrambled(frames: Sequence[Frame], rng: Random) -> list[Frame]:
-    """Blocks exchanged or shifted, all or half of them, anew in each frame or always the same."""
+    """All or half of the blocks exchanged or shifted, differently in each frame or always the same."""
     size = int(rng.integers(8, 65))
     share = float(rng.choice([0.5, 1.0]))
     shifted, anew = rng.random() < 0.4, rng.random() < 0.5
@@ -165,7 +165,7 @@ def scrambled(frames: Sequence[Frame], rng: Random) -> list[Frame]:
 
 
 def dropped(frames: Sequence[Frame], rng: Random) -> list[Frame]:
-    """Frames that never came: a gap, many gaps, or others repeated in their place."""
+    """Missing frames: a gap, many gaps, or repeated frames in their place."""
     seconds = frames[1].time - frames[0].time
     which = rng.integers(3)
     if which == 0:

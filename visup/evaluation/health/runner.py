@@ -1,6 +1,6 @@
-"""`visup eval health`: faults put into sound video, and what the health behaviour says of it.
+"""`visup eval health`: faults injected into good video, and the reports of the health behaviour.
 
-Every clip is also run unharmed: what is reported of it is a false report.
+Every clip is also run without faults, where any report is false.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from visup.percepts.video.image_folder import VIDEO_SUFFIXES, images_in
 FAULTS = 100
 WITHIN_S = 1.0
 SOUND_S = (0.6, 1.4)
-"""A fault begins this long after the start of its clip: drawn from this range."""
+"""Range of the time before the fault, seconds."""
 FAULTY_S = 1.2
 UNTOLD = ("frames", "img1", "video", "clip")
-"""Names of files and folders that say nothing of what they show."""
+"""Generic names of files and folders."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class CameraFaultTrial:
     Attributes:
         source: The video.
         kind: A key of `EXPECTED`.
-        skip: Share of the video's spare frames that come before the clip, 0 to 1.
+        skip: Position of the clip in the video, 0 to 1.
         sound_s: Seconds before the fault.
-        seed: Of what is drawn for the fault.
+        seed: Random seed of the fault.
     """
 
     source: Path
@@ -54,14 +54,14 @@ class CameraFaultTrial:
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """What was reported in one trial.
+    """The result of one trial.
 
     Attributes:
         kind: The fault.
-        found: A fault was reported within a second of its start.
-        named: Its right name was among what was reported.
+        found: Whether a fault was reported within a second of its start.
+        named: Whether its expected status was reported.
         latency_s: From the start of the fault to the first report, seconds, or None.
-        early: A fault was reported before there was one.
+        early: Whether a fault was reported before it began.
     """
 
     kind: str
@@ -80,22 +80,22 @@ def evaluate_health(
     limit: int | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Put faults into video below a folder, and run it unharmed too.
+    """Inject faults into the videos below a folder, and run them without faults, too.
 
     Args:
-        folder: Video files and folders of images stand anywhere below it.
+        folder: Searched recursively for video files and folders of images.
         also: Further such folders.
-        faults: How many faults; they go round the kinds and the videos.
-        seed: Of the campaign.
-        limit: Most frames of each video when it is run unharmed, or None for all.
+        faults: Number of faults, distributed over kinds and videos.
+        seed: Random seed.
+        limit: Maximum frames of each video without faults, or None for all.
         progress: Shows what is being done.
 
     Returns:
         `items` by kind of fault, and `total`, with the keys `clips`, `found` (share reported within
         1 s), `named` (share of them with the right status), `latency_s` (median), `early` (reports
-        before the fault); `total` also has `spread` (standard error of the share found and named, over
-        `families` of videos, which fail together), `false_reports`, `hours`, `false_reports_per_hour`,
-        and `ms` (median time of a frame). `missed` lists the trials that were not found or not named.
+        before the fault); `total` also has `spread` (standard error of the share found and named, clustered
+        by `families` of videos), `false_reports`, `hours`, `false_reports_per_hour`, and `ms` (median time of
+        a frame). `missed` lists the trials that were not found or not named.
 
     Raises:
         SettingsError: There is no video below the folder.
@@ -127,7 +127,7 @@ def find_sources(folder: Path) -> list[Path]:
     """
     places = [folder, *sorted(folder.rglob("*"))]
     files = [p for p in places if p.suffix.lower() in VIDEO_SUFFIXES and p.is_file()]
-    # Truth stands beside what it is the truth of.
+    # Ground truth is next to its images.
     folders = [p for p in places if p.is_dir() and p.name not in ("masks", "gt")]
     found = files + [p for p in folders if len(images_in(p)) > 1]
     found = [p for p in found if _opens(p)]
@@ -139,7 +139,7 @@ def find_sources(folder: Path) -> list[Path]:
 
 
 def clip_name(source: Path) -> str:
-    """What the clip is called whose video or frames these are: files of all clips may have one name."""
+    """The name of the clip of a video or frames, since files of all clips may have the same name."""
     return source.parent.name if source.stem.lower() in UNTOLD else source.stem
 
 
@@ -168,7 +168,7 @@ def plan(sources: Sequence[Path], faults: int, seed: int) -> Iterator[CameraFaul
 
 
 def run_trial(trial: CameraFaultTrial) -> TrialResult:
-    """Inject one fault and tell how it was reported."""
+    """Inject one fault and evaluate the reports."""
     frames = _clip(trial)
     begin = frames[0].time + trial.sound_s
     start = next(n for n, f in enumerate(frames) if f.time >= begin)
@@ -186,7 +186,7 @@ def run_trial(trial: CameraFaultTrial) -> TrialResult:
 
 
 def _clip(trial: CameraFaultTrial) -> list[Frame]:
-    """The frames of a trial; a video that is too short is shown to and fro until it is long enough."""
+    """The frames of a trial; a short video is played to and fro until it is long enough."""
     with open_source(str(trial.source)) as source:
         length = round((trial.sound_s + FAULTY_S) * source.fps) + 1
         spare = max(0, (source.frame_count or length) - length)
@@ -195,9 +195,9 @@ def _clip(trial: CameraFaultTrial) -> list[Frame]:
 
 
 def to_and_fro(frames: Sequence[Frame], length: int) -> list[Frame]:
-    """So many frames of a clip of at least two, played backwards and forwards again after its end.
+    """Frames of a clip of at least two, played alternately forwards and backwards.
 
-    What moves goes on at its pace, so that a clip of a second can show what is told of a fault within one.
+    Motion continues at its pace, so that a clip of one second suffices for a trial.
     """
     step = frames[1].time - frames[0].time
     out = list(frames[:length])
@@ -209,7 +209,7 @@ def to_and_fro(frames: Sequence[Frame], length: int) -> list[Frame]:
 
 
 def statuses(frames: Iterator[Frame] | Sequence[Frame]) -> Iterator[tuple[Frame, HealthStatus]]:
-    """What the health behaviour reports of each frame."""
+    """The status of each frame by the health behaviour."""
     behaviour = HealthBehaviour()
     for frame in frames:
         nothing = Observation(frame.index, frame.time, frame.size)
@@ -218,7 +218,7 @@ def statuses(frames: Iterator[Frame] | Sequence[Frame]) -> Iterator[tuple[Frame,
 
 
 def _unharmed(sources: Sequence[Path], limit: int | None, progress: Progress) -> dict[str, Any]:
-    """False reports (each run of frames that are not well is one) and the time of a frame."""
+    """False reports (each run of frames with a fault counts as one) and the time per frame."""
     reports, seconds = 0, 0.0
     ms: list[float] = []
     for path in sources:

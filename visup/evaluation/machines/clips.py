@@ -1,4 +1,4 @@
-"""Clips of machines on disk: what a supervisor is told and shown of each, and what is true of it."""
+"""Clips of machines on disk: the brief for the supervisor, and the ground truth."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from visup.evaluation.missions.scores import TrueStage
 from visup.teaching.briefs import Showing, clip_video, read_showings
 
 TOLERANCE_S = 0.7
-"""No clip's times are held to be known better than so, seconds."""
+"""Least tolerance of annotated times, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Brief:
-    """All that a supervisor is told of a clip.
+    """The input of a supervisor for a clip.
 
     Attributes:
-        folder: Of the clip.
-        video: Its file.
-        family: Clips of one scene have the same.
+        folder: Folder of the clip.
+        video: Its video file.
+        family: Identifies clips of one scene.
         task: A file in the folder, or the name of a shipped task.
-        actors: Outlines of what plays a part in the task.
-        others: Outlines of things that play none.
-        fov_vertical_deg: Field of view, where it is told.
+        actors: Outlines of the actors of the task.
+        others: Outlines of other things.
+        fov_vertical_deg: Vertical field of view, if known.
     """
 
     folder: Path
@@ -41,12 +41,12 @@ class Brief:
 
     @property
     def shown(self) -> tuple[Showing, ...]:
-        """All that is outlined, actors first."""
+        """All outlines, actors first."""
         return (*self.actors, *self.others)
 
 
 def clip_folders(folder: Path) -> list[Path]:
-    """All folders with a brief, from this one downwards, by path.
+    """All folders with a brief, searched recursively, by path.
 
     Raises:
         SettingsError: There is none.
@@ -62,10 +62,10 @@ def clip_folders(folder: Path) -> list[Path]:
 
 
 def read_brief(folder: Path) -> Brief:
-    """What is told of a clip.
+    """Read the brief of a clip.
 
     Raises:
-        SettingsError: The brief or a video is missing, or the brief is not as it should be.
+        SettingsError: The brief or a video is missing, or the brief is not valid.
     """
     path = folder / "brief.json"
     shown, told = read_showings(path), read_json(path)
@@ -88,10 +88,10 @@ def read_brief(folder: Path) -> Brief:
 
 
 def read_truth(folder: Path) -> MachineTruth:
-    """What is true of a clip.
+    """Read the truth of a clip.
 
     Raises:
-        SettingsError: It is missing, or not as it should be.
+        SettingsError: It is missing or not valid.
     """
     path = folder / "truth.json"
     given = read_json(path)
@@ -104,7 +104,7 @@ def read_truth(folder: Path) -> MachineTruth:
 
 
 def parse_truth(given: Mapping[str, Any]) -> MachineTruth:
-    """What is true of a clip, from its `truth.json` as read; what is not there is not scored."""
+    """Parse a `truth.json`; missing parts are not scored."""
     stages = tuple(
         TrueStage(str(s["stage"]), float(s["from_s"]), float(s["to_s"]), str(s["outcome"]))
         for s in given.get("stages", ())
@@ -122,7 +122,7 @@ def parse_truth(given: Mapping[str, Any]) -> MachineTruth:
 
 
 def _true_boxes(given: Any) -> Iterator[TrueBoxes]:
-    """Boxes of one frame; an object that is out of view, hidden or not annotated has none."""
+    """Boxes by frame; objects that are out of view, hidden or not annotated have none."""
     for row in given:
         boxes = {n: tuple(map(float, b)) for n, b in row.items() if n != "frame" and _is_box(b)}
         yield TrueBoxes(int(row["frame"]), boxes)

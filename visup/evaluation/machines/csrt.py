@@ -1,7 +1,7 @@
-"""The baseline: OpenCV's CSRT tracker on each taught box, its boxes as regions, names as taught.
+"""The baseline: OpenCV's CSRT tracker on each taught box, with its boxes as regions and names as taught.
 
-A tracker begins on the frame on which its thing was outlined when that is a frame of the clip; else in the
-first frame, where the taught picture matches best (normalised correlation).
+A tracker starts on the frame in which its object was outlined if that is a frame of the clip; else in the
+first frame, at the best match of the taught picture (normalised correlation).
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from visup.testing import region_of
 
 SIMILARITY = 0.9
 LEAST_SIDE = 4
-"""A box that is narrower within the image is out of view, pixels."""
+"""Least width or height of a box within the image, pixels; smaller ones are out of view."""
 
 PixelBox = tuple[int, int, int, int]
 
 
 @dataclass(slots=True)
 class BoxTracker:
-    """One tracked thing.
+    """The tracker of one object.
 
     Attributes:
-        view: As it was taught.
-        starts: Frame in which it is begun.
-        outlined: Whether that is the frame in which it was outlined.
+        view: The taught view.
+        starts: Frame in which it starts.
+        outlined: Whether the object was outlined in that frame.
     """
 
     view: TaughtView
@@ -52,7 +52,7 @@ class BoxTracker:
     _tracker: cv2.Tracker | None = None
 
     def track(self, frame: Frame) -> PixelBox | None:
-        """Its box in the next frame, or None when it is not found."""
+        """Its box in the next frame, or None if lost."""
         image = frame.image
         if frame.index < self.starts:
             return None
@@ -66,7 +66,7 @@ class BoxTracker:
 
 
 def best_match(view: TaughtView, image: NDArray[np.uint8]) -> PixelBox:
-    """Where the taught picture matches best, (x, y, width, height) pixels."""
+    """The best match of the taught picture, (x, y, width, height) pixels."""
     x, y, w, h = view.bbox
     left, top = x - view.origin[0], y - view.origin[1]
     scale = image.shape[1] / view.frame_size[0]
@@ -80,10 +80,10 @@ def best_match(view: TaughtView, image: NDArray[np.uint8]) -> PixelBox:
 
 @dataclass(slots=True)
 class BoxRegions:
-    """A behaviour that reports tracked boxes as regions, each under the name that was taught.
+    """A behaviour that reports tracked boxes as regions with the taught names.
 
     Attributes:
-        trackers: One for each thing.
+        trackers: One for each object.
     """
 
     trackers: Sequence[BoxTracker]
@@ -109,7 +109,7 @@ class BoxRegions:
 
 
 def box_region(box: PixelBox, number: int, size: tuple[int, int]) -> Region | None:
-    """What shows of a box in an image of (width, height), or None when hardly any of it does."""
+    """The part of a box inside an image of (width, height), or None if too small."""
     x, y, w, h = box
     left, top, right, bottom = max(0, x), max(0, y), min(size[0], x + w), min(size[1], y + h)
     if min(right - left, bottom - top) < LEAST_SIDE:
@@ -119,7 +119,7 @@ def box_region(box: PixelBox, number: int, size: tuple[int, int]) -> Region | No
 
 
 def box_behaviour(brief: Brief) -> BoxRegions:
-    """The baseline's eyes for a clip."""
+    """The behaviour of the baseline for a clip."""
     own = brief.video.resolve()
     trackers = []
     for shown, view in zip(brief.shown, views_of(brief.shown), strict=True):

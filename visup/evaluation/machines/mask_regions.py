@@ -1,9 +1,8 @@
-"""Eyes that see the truth: regions from the masks of a world, named by the roles.
+"""Ideal perception: regions from the masks of a world, named by their roles.
 
-So what reasoning loses is told apart from what seeing loses. Only what shows in the mask is a region; an
-object that nothing shows of has none. Image motion is taken from the masks, too. What is seen and whose
-it is come in one report, as from a behaviour that finds what it was taught: such a region is an object's
-own, whatever it touches.
+It separates the errors of reasoning from those of perception. Only visible parts in the mask are regions;
+motion is computed from the masks, too. Regions and names are in one report, as from a detector of taught
+objects: such a region belongs to a single object, whatever it touches.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from visup.percepts.opencv_names import opencv_name
 from visup.testing import region_of
 
 LEAST_PX = 30
-"""An object of which less shows is not seen."""
+"""Least visible area of an object, pixels."""
 
 VELOCITY_SIGMA = 1.0
 SIMILARITY = 0.95
@@ -34,10 +33,10 @@ SIMILARITY = 0.95
 
 @dataclass(slots=True)
 class MaskRegions:
-    """A behaviour that reports what the masks of a world show, and which role it is.
+    """A behaviour that reports the masks of a world as regions with roles.
 
     Attributes:
-        mask: (H, W) uint8 of a frame, by its number.
+        mask: Returns the (H, W) uint8 mask of a frame number.
         labels: Role -> value in the masks.
         fps: Frames per second.
     """
@@ -76,12 +75,12 @@ class MaskRegions:
 
 
 def has_masks(folder: Path) -> bool:
-    """Whether a clip has masks to see by."""
+    """Whether a clip has masks."""
     return (folder / "masks").is_dir()
 
 
 def mask_behaviours(folder: Path) -> list[Behaviour]:
-    """What sees a world by its masks: each role's region by its name.
+    """Ideal perception of a world: the region of each role by its name.
 
     Raises:
         SettingsError: The truth cannot be read.
@@ -95,7 +94,7 @@ def mask_behaviours(folder: Path) -> list[Behaviour]:
 def role_behaviours(
     mask: Callable[[int], NDArray[np.uint8]], labels: Mapping[str, int], fps: float
 ) -> list[Behaviour]:
-    """What sees by masks: each role's region by its name; arguments as of `MaskRegions`."""
+    """Ideal perception from masks; arguments as for `MaskRegions`."""
     return [MaskRegions(mask, labels, fps)]
 
 

@@ -1,4 +1,4 @@
-"""`visup eval random`: worlds are drawn from a seed, rendered, watched, scored and thrown away."""
+"""`visup eval random`: random worlds are rendered, watched, scored and discarded."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from visup.evaluation.machines.runner import evaluate_machines
 from visup.evaluation.machines.scores import machine_total
 
 SEEDS_APART = 10_000
-"""Seeds of worlds that one seed of an evaluation has to itself."""
+"""Distance between the world seeds of two evaluation seeds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,11 @@ class RandomTrial:
     """One world and how it is watched.
 
     Attributes:
-        kind: Of world.
-        seed: Of the world.
-        eyes: Whether masks stand in for eyes.
-        baseline: Whether CSRT watches, too.
-        limit: Frames that are watched; all when None.
+        kind: Kind of world.
+        seed: Seed of the world.
+        eyes: Whether masks replace perception.
+        baseline: Whether to evaluate CSRT, too.
+        limit: Maximum frames; None for all.
     """
 
     kind: str
@@ -50,17 +50,17 @@ def evaluate_random(
     """Figures of `evaluate_machines` on random worlds.
 
     Args:
-        kinds: Which; all when empty. They are spread evenly over the count.
-        count: How many worlds.
-        seed: Of all of them.
-        eyes: Regions are made from the masks.
-        baseline: Whether CSRT watches, too.
-        limit: Frames of each world, for a quick look.
-        workers: Processes that share the work; as many as there are cores when None.
+        kinds: Kinds of worlds, evenly distributed; all if empty.
+        count: Number of worlds.
+        seed: Random seed.
+        eyes: Whether masks replace perception.
+        baseline: Whether to evaluate CSRT, too.
+        limit: Maximum frames of each world.
+        workers: Worker processes; None for one per core.
         progress: Shows what is being done.
 
     Returns:
-        `items` by kind, `total`, and `worlds` by name: what is said of each.
+        `items` by kind, `total`, and `worlds` by name: the result of each.
 
     Raises:
         SettingsError: There is no kind of a name.
@@ -83,13 +83,13 @@ def evaluate_random(
 def planned(
     kinds: Sequence[str], count: int, seed: int, like: RandomTrial
 ) -> tuple[RandomTrial, ...]:
-    """The worlds that are watched: kinds take turns, each world has a seed of its own.
+    """The planned trials: kinds in turn, each world with its own seed.
 
     Args:
-        kinds: Which; all when empty.
-        count: How many worlds.
-        seed: Of all of them.
-        like: How they are watched.
+        kinds: Kinds of worlds; all if empty.
+        count: Number of worlds.
+        seed: Random seed.
+        like: Template of the trials.
     """
     from visup.render.worlds.kinds.catalogue import known_kinds
 
@@ -107,10 +107,10 @@ def planned(
 
 
 def score(trial: RandomTrial) -> tuple[str, dict[str, Any]]:
-    """Render one world, watch it, throw it away.
+    """Render one world, watch it, and discard it.
 
     Returns:
-        Its name, and what `evaluate_machines` says of it with `kind`, `outcome` and the true `verdict_true`.
+        Its name, and its result of `evaluate_machines` with `kind`, `outcome` and the true `verdict_true`.
     """
     from visup.render.worlds.kinds.catalogue import random_world
     from visup.render.worlds.writer import write_world

@@ -1,4 +1,4 @@
-"""What a supervisor reports of a clip, taken down step by step: the agent calls it."""
+"""Records the reports of a supervisor for a clip; an observer."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from visup.rules.predicates.vocabulary import PREDICATES
 from visup.runs.wiring import final_verdict
 
 BRIDGED_S = 0.5
-"""A break of a contact or movement that is shorter is none: who tells times by eye sees none either."""
+"""Shorter breaks of a contact or movement are bridged, seconds: annotators do not notice them either."""
 
 SHORTEST_S = 0.3
-"""A contact or movement that is shorter is not told."""
+"""Shorter contacts and movements are ignored, seconds."""
 
 
 @dataclass(slots=True)
 class IntervalLog:
-    """When something held, from single moments.
+    """Intervals from single moments.
 
     Attributes:
-        spans: Who -> [begin, end] of each time that it held, seconds.
+        spans: Names -> [begin, end] of each interval, seconds.
     """
 
     spans: dict[tuple[str, ...], list[list[float]]] = field(default_factory=dict)
 
     def add(self, who: tuple[str, ...], now: float) -> None:
-        """Take down that it holds at a moment, no earlier than the last one."""
+        """Add a moment, not before the last one."""
         spans = self.spans.setdefault(who, [])
         if spans and now - spans[-1][1] <= BRIDGED_S:
             spans[-1][1] = now
@@ -47,17 +47,17 @@ class IntervalLog:
             spans.append([now, now])
 
     def intervals(self) -> tuple[Interval, ...]:
-        """All that lasted, by who and time."""
+        """All intervals that are long enough, by names and time."""
         found = ((who, a, b) for who, spans in sorted(self.spans.items()) for a, b in spans)
         return tuple(Interval(who, a, b) for who, a, b in found if b - a >= SHORTEST_S)
 
 
 @dataclass(slots=True)
 class MachineRecorder:
-    """What the supervisor said of one clip, frame by frame.
+    """The reports of the supervisor for one clip, frame by frame.
 
     Attributes:
-        others: Names of taught things that play no part in the task.
+        others: Names of taught things that are no actors.
     """
 
     others: Collection[str] = ()
@@ -72,7 +72,7 @@ class MachineRecorder:
     _times: list[float] = field(default_factory=list)
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Take down one step."""
+        """Add one step."""
         now = time.perf_counter()
         self._times.append(now - self._clock)
         mind = step.mind
@@ -97,14 +97,14 @@ class MachineRecorder:
         self._clock = time.perf_counter()
 
     def _note_interruption(self, mind: Mind) -> None:
-        """In which stage the task was interrupted: the one that was under way just before."""
+        """Record the stage in which the task was interrupted: the last active one."""
         task = mind.tasks[0] if mind.tasks else None
         if task and task.verdict is Verdict.INTERRUPTED and self.interrupted_in is None:
             before = self.last.tasks[0] if self.last and self.last.tasks else task
             self.interrupted_in = before.current or task.current or ""
 
     def report(self) -> MachineReport:
-        """All that was said."""
+        """The complete report."""
         verdict = final_verdict(self.last) if self.last else Verdict.UNKNOWN
         return MachineReport(
             verdict=verdict.value,
@@ -122,7 +122,7 @@ class MachineRecorder:
 
 
 def actor_objects(mind: Mind, others: Collection[str]) -> Iterator[tuple[str, int]]:
-    """Names of actors, and of taught things that are none, with the object that is believed to be each."""
+    """Names of actors and other taught things, with their objects."""
     bound: dict[str, int] = {}
     for task in mind.tasks:
         bound |= {b.actor: b.object_id for b in task.bindings if b.object_id in mind.objects}  # type: ignore[misc]  # an id that is known is not None
@@ -134,7 +134,7 @@ def actor_objects(mind: Mind, others: Collection[str]) -> Iterator[tuple[str, in
 
 
 def touching(mind: Mind, who: Mapping[str, int]) -> Iterator[tuple[str, str]]:
-    """Pairs of names, in order, whose objects are believed to be in contact."""
+    """Ordered pairs of names whose objects are believed to touch."""
     for (a, i), (b, j) in combinations(sorted(who.items()), 2):
         if mind.truth("in_contact", i, j) is Truth.TRUE:
             yield a, b
@@ -150,15 +150,15 @@ def moving(mind: Mind, who: Mapping[str, int]) -> Iterator[str]:
 
 
 def told_stages(events: Sequence[Event], unsafe: str | None = None) -> tuple[ReportedStage, ...]:
-    """Stages as events told them: when each was told to have begun, and how it went at last.
+    """The reported stages: beginning and final outcome of each.
 
     Args:
-        events: Of stages, by time.
-        unsafe: The stage in which the task was interrupted, or None when it was not.
+        events: Stage events by time.
+        unsafe: The stage in which the task was interrupted, or None.
 
     Returns:
-        One for each time that a stage was told to have begun; it is complete unless the last word on it
-        was that it fails, or makes no progress.
+        One for each reported beginning of a stage; it is complete unless it was last reported to fail or to
+        make no progress.
     """
     told: list[ReportedStage] = []
     for event in events:

@@ -1,8 +1,8 @@
 """`visup eval machines`: machines at work, taught from a brief, watched, and scored.
 
-The supervisor is given the brief and the video, as a user would give them; `truth.json` and masks are read by
-the scoring alone, but for `--eyes`, where masks stand in for eyes so that reasoning is measured by itself.
-The baseline has the same tasks, rules and scoring, and other eyes.
+The supervisor gets the brief and the video, as from a user; `truth.json` and masks are used only for scoring,
+except with `--eyes`, where masks replace perception to evaluate reasoning by itself. The baseline has the
+same tasks, rules and scoring, with different perception.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ def evaluate_machines(
     """Figures over all clips with a brief below a folder.
 
     Args:
-        folder: A clip, or a folder with clips anywhere below it.
-        eyes: Regions are made from the masks, named by the roles; clips without masks are left out.
-        baseline: Whether CSRT watches, too.
-        limit: Frames of each clip, for a quick look; all by default.
+        folder: A clip, or a folder searched recursively for clips.
+        eyes: Whether masks replace perception; clips without masks are skipped.
+        baseline: Whether to evaluate CSRT, too.
+        limit: Maximum frames of each clip; all by default.
         progress: Shows what is being done.
 
     Returns:
@@ -51,7 +51,7 @@ def evaluate_machines(
         each item has its own `baseline`.
 
     Raises:
-        SettingsError: There is no clip, or a brief or truth is not as it should be.
+        SettingsError: There is no clip, or a brief or truth is not valid.
     """
     folders = _with_masks(folder) if eyes else clip_folders(folder)
     items: dict[str, dict[str, Any]] = {}
@@ -80,9 +80,9 @@ def _with_masks(folder: Path) -> list[Path]:
 
 
 def clip_settings(brief: Brief) -> WatchSettings:
-    """What a supervisor is told of a clip: each actor of the task is the taught thing of its name.
+    """The settings for a clip: each actor of the task is the taught thing of its name.
 
-    What is taught beside the actors has no part in the task: it is let be.
+    Other taught things are bystanders.
     """
     wanted = {a for task in load_tasks(brief.task) for a in task_actors(task)}
     taught = [o.name for o in brief.actors if o.name in wanted]
@@ -106,12 +106,12 @@ def watch_taught(brief: Brief, limit: int | None = None) -> MachineReport:
 
 
 def watch_by_masks(brief: Brief, limit: int | None = None) -> MachineReport:
-    """Watch a world by its masks in place of eyes."""
+    """Watch a world with masks in place of perception."""
     return _watched_by(mask_behaviours(brief.folder), brief, limit)
 
 
 def watch_boxes(brief: Brief, limit: int | None = None) -> MachineReport:
-    """Watch a clip by tracked boxes: the baseline."""
+    """Watch a clip with the baseline."""
     return _watched_by([box_behaviour(brief)], brief, limit)
 
 

@@ -1,7 +1,7 @@
 """Figures of a supervised clip against its truth, as pure functions.
 
-The definitions are those of the data's README under `visup eval machines`. What was reported comes in as
-plain records (`MachineReport`), what is true as `MachineTruth`, and the two meet only here.
+The definitions are those of the data's README under `visup eval machines`. Reports (`MachineReport`) and
+truth (`MachineTruth`) are plain records and are compared only here.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ Box = tuple[float, ...]
 """(x, y, width, height), pixels."""
 
 Counts = tuple[int, int, int]
-"""Right, in excess, missed."""
+"""True positives, false positives, false negatives.
+
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A contact of two, or a movement of one: who, by name and in order; begin and end in seconds."""
+    """A contact of two, or a movement of one: ordered names; begin and end in seconds."""
 
     who: tuple[str, ...]
     from_s: float
@@ -34,7 +36,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class TrueBoxes:
-    """Boxes of one frame by actor; one that is not in view has none."""
+    """Boxes of one frame by actor, without actors out of view."""
 
     frame: int
     boxes: Mapping[str, Box]
@@ -42,15 +44,15 @@ class TrueBoxes:
 
 @dataclass(frozen=True, slots=True)
 class MachineTruth:
-    """What truly happens in a clip.
+    """The ground truth of a clip.
 
     Attributes:
-        stages: In their order.
-        accept: All verdicts that are right.
-        tolerance_s: How far off the begin of a stage may be told.
-        boxes: At some frames.
-        contacts: Who touches whom, or None when that is not told.
-        moves: Who moves, or None when that is not told.
+        stages: Stages in order.
+        accept: All correct verdicts.
+        tolerance_s: Tolerance of the beginning of a stage, seconds.
+        boxes: Boxes at some frames.
+        contacts: Contacts, or None if not annotated.
+        moves: Movements, or None if not annotated.
     """
 
     stages: tuple[TrueStage, ...]
@@ -63,7 +65,7 @@ class MachineTruth:
 
 @dataclass(frozen=True, slots=True)
 class ReportedStage:
-    """A stage as it was reported: name, when it was told to have begun, how it went at last."""
+    """A reported stage: name, reported beginning, final outcome."""
 
     stage: str
     time: float
@@ -72,7 +74,7 @@ class ReportedStage:
 
 @dataclass(frozen=True, slots=True)
 class ReportedAlert:
-    """An alert of severity warning or above: kind, the stage that it speaks of or '', when it opened."""
+    """An alert of severity warning or above: kind, its stage or '', time of opening."""
 
     kind: str
     stage: str
@@ -81,17 +83,17 @@ class ReportedAlert:
 
 @dataclass(frozen=True, slots=True)
 class MachineReport:
-    """What a supervisor reported of a clip.
+    """The reports of a supervisor for a clip.
 
     Attributes:
-        verdict: Final.
-        stages: By time.
-        boxes: Frame -> actor -> box of the region under its name.
-        contacts: Who touched whom.
-        moves: Who moved.
-        alerts: Grave ones.
-        seconds: Length of what was watched.
-        ms: Median of a frame.
+        verdict: Final verdict.
+        stages: Stages by time.
+        boxes: Frame -> actor -> box of its region.
+        contacts: Contacts.
+        moves: Movements.
+        alerts: Alerts of severity warning or above.
+        seconds: Length of the watched part.
+        ms: Median time per frame.
     """
 
     verdict: str
@@ -105,9 +107,9 @@ class MachineReport:
 
 
 def machine_scores(report: MachineReport, truth: MachineTruth) -> dict[str, Any]:
-    """Figures of one clip by the keys of the data's README, and the counts that they come from.
+    """Figures of one clip by the keys of the data's README, and the underlying counts.
 
-    What comes after the end of what was watched is not scored.
+    Truth after the end of the watched part is not scored.
     """
     end = report.seconds if report.seconds > 0.0 else float("inf")
     stages = [s for s in truth.stages if s.from_s <= end]
@@ -133,12 +135,12 @@ def machine_scores(report: MachineReport, truth: MachineTruth) -> dict[str, Any]
 
 
 def _begun(intervals: Sequence[Interval], end: float) -> list[Interval]:
-    """Those that begin before the end, none of them longer than that."""
+    """Intervals that begin before the end, cut at the end."""
     return [Interval(i.who, i.from_s, min(i.to_s, end)) for i in intervals if i.from_s < end]
 
 
 def figures_of(counted: Mapping[str, Any]) -> dict[str, Any]:
-    """The figures that follow from counts, of one clip or of all."""
+    """The figures from counts, of one clip or of all."""
     figures: dict[str, Any] = {}
     if sum(counted["stage_counts"]):
         names = ("stage_precision", "stage_recall", "stage_f1")
@@ -154,7 +156,7 @@ def figures_of(counted: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def machine_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Figures over all clips: counts are added up, so that each stage, box and interval weighs alike."""
+    """Figures over all clips from summed counts, so that each stage, box and interval has equal weight."""
     total: dict[str, Any] = {
         key: [sum(i.get(key, (0,) * width)[k] for i in items) for k in range(width)]
         for key, width in COUNTED.items()
@@ -173,15 +175,15 @@ COUNTED = {"stage_counts": 3, "actor_counts": 2, "contact_counts": 3, "move_coun
 def matched_stages(
     told: Sequence[ReportedStage], true: Sequence[TrueStage], tolerance_s: float
 ) -> Counts:
-    """Stages whose begin was told in time, in the right order, with the right outcome.
+    """Stages reported in time, in the correct order, with the correct outcome.
 
     Args:
-        told: By time.
-        true: In their order.
-        tolerance_s: How far off a begin may be told, seconds.
+        told: Reported stages by time.
+        true: True stages in order.
+        tolerance_s: Tolerance of the beginning, seconds.
 
     Returns:
-        Right, in excess, missed, of the longest row of stages that is right.
+        True positives, false positives and false negatives of the longest common subsequence.
     """
 
     def same(a: ReportedStage, b: TrueStage) -> bool:
@@ -197,7 +199,7 @@ B = TypeVar("B")
 
 
 def longest_common(first: Sequence[A], second: Sequence[B], same: Callable[[A, B], bool]) -> int:
-    """Length of the longest row of pairs that are the same, in the order of both."""
+    """Length of the longest common subsequence."""
     before = [0] * (len(second) + 1)
     for a in first:
         row = [0]
@@ -208,9 +210,9 @@ def longest_common(first: Sequence[A], second: Sequence[B], same: Callable[[A, B
 
 
 def matched_intervals(told: Sequence[Interval], true: Sequence[Interval]) -> Counts:
-    """Intervals of the same bodies whose begins and ends agree to a second, one to one.
+    """Intervals of the same objects whose begins and ends agree within a second, one to one.
 
-    Intervals of the same bodies are matched in their order.
+    Intervals of the same objects are matched in order.
     """
     right = 0
     for who in sorted({i.who for i in true}):
@@ -227,7 +229,7 @@ def _agree(a: tuple[float, float], b: tuple[float, float]) -> bool:
 def actor_counts(
     seen: Mapping[int, Mapping[str, Box]], true: Sequence[TrueBoxes]
 ) -> tuple[int, int]:
-    """Annotated boxes that a region under the actor's name covers, and all in frames that were watched."""
+    """Number of annotated boxes covered by a region with the actor's name, and of all in watched frames."""
     right = scored = 0
     for row in true:
         if row.frame not in seen:
@@ -248,12 +250,12 @@ def box_iou(a: Box, b: Box) -> float:
 
 
 def false_alerts(alerts: Sequence[ReportedAlert], truth: MachineTruth) -> int:
-    """How many grave alerts no stage accounts for that truly goes wrong."""
+    """Number of alerts not explained by a stage that truly goes wrong."""
     return sum(not _accounted(alert, truth) for alert in alerts)
 
 
 def _accounted(alert: ReportedAlert, truth: MachineTruth) -> bool:
-    """Whether a stage that goes wrong has begun, and the alert speaks of that stage or of what it breaks."""
+    """Whether a stage that goes wrong has begun, and the alert is about that stage or its violation."""
     for stage in truth.stages:
         begun = alert.time >= stage.from_s - truth.tolerance_s - 1e-9
         if stage.outcome not in BAD_OUTCOMES or not begun:

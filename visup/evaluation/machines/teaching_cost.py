@@ -1,8 +1,8 @@
-"""What it costs that things at rest are known: the time of a step with five of them, and without.
+"""The cost of taught objects at rest: the time of a step with five of them, and without.
 
-A desk with five things of random colours, noise of a sensor, a disc that passes. The same frames go to an
-agent that was taught the five and to one that was taught none, one after the other; the median of the ratios
-is told, since what else a machine does slows both alike. Times are processor time of the process.
+The scene is a desk with five objects of random colours, sensor noise, and a passing disc. The same frames are
+processed by an agent taught the five and by one taught none; the median of the ratios is reported, since
+other load slows both alike. Times are processor time of the process.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ BOXES = (
     (300, 60, 60, 120),
     (500, 350, 50, 50),
 )
-"""Where the things are: x, y, width, height, pixels."""
+"""Boxes of the objects: x, y, width, height, pixels."""
 NOISE, NOISES = 2.0, 24
-"""Grey values of the sensor's noise, and how many pictures of it there are."""
+"""Standard deviation of sensor noise in grey levels, and number of noise images."""
 WARM = 60
-"""Frames that are not measured: programs are compiled, things are found and come to rest."""
+"""Frames of warm-up that are not measured: compilation, and detection of the resting objects."""
 
 
 def evaluate_teaching(
     frames: int = 400, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
-    """The time of a step with and without five taught things at rest, and of teaching one.
+    """The time of a step with and without five taught objects at rest, and of teaching one.
 
     Args:
-        frames: How many are watched, the first `WARM` of them unmeasured.
-        seed: Of the desk and of the noise.
-        progress: Told what is done.
+        frames: Number of frames, including `WARM` frames of warm-up.
+        seed: Random seed.
+        progress: Shows what is being done.
 
     Returns:
         `total` with `ms` and `ms_taught` of a step (medians, processor time), `cost`, the median of
-        the ratios of each pair less one, and `teach_s`, the greatest time to teach one thing.
+        the ratios of each pair minus one, and `teach_s`, the greatest time to teach one object.
 
     Raises:
         SettingsError: There are too few frames.
@@ -90,7 +90,7 @@ def evaluate_teaching(
 
 
 def _paired(agents: Sequence[Agent], frames: Iterator[Frame]) -> Iterator[tuple[float, ...]]:
-    """Seconds that each agent takes for each frame, in turn who comes first."""
+    """Seconds of each agent for each frame, in alternating order."""
     for frame in frames:
         order = range(len(agents)) if frame.index % 2 else reversed(range(len(agents)))
         took = {k: _timed(agents[k], frame) for k in order}
@@ -117,7 +117,7 @@ def _views(desk: Image) -> Iterator[TaughtView]:
 
 
 def _desk(rng: np.random.Generator) -> Image:
-    """(H, W, 3) uint8: a table with some grain, and the five things."""
+    """(H, W, 3) uint8: a table with some grain, and the five objects."""
     grain = rng.integers(110, 150, (SIZE[1] // 8, SIZE[0] // 8, 3)).astype(np.uint8)
     desk = cv2.resize(grain, SIZE, interpolation=cv2.INTER_CUBIC)
     for x, y, w, h in BOXES:
@@ -127,7 +127,7 @@ def _desk(rng: np.random.Generator) -> Image:
 
 
 def _frames(desk: Image, count: int, rng: np.random.Generator) -> Iterator[Frame]:
-    """The desk with noise, and a disc that crosses it below the things again and again."""
+    """The desk with noise, and a disc that repeatedly crosses it below the objects."""
     noises = [rng.normal(0.0, NOISE, desk.shape) for _ in range(NOISES)]
     for n in range(count):
         picture = np.clip(desk + noises[n % NOISES], 0, 255).astype(np.uint8)

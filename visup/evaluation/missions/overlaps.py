@@ -1,4 +1,4 @@
-"""Believed objects laid over true masks: which object is which, rightly identified, in which pose."""
+"""Overlap of believed objects with true masks: correspondence, identity, pose."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ObjectOverlaps = Mapping[int, Mapping[str, tuple[int, dict[int, float]]]]
 def overlaps_of(
     mission: Path, labels: Mapping[str, int], record: MissionRecorder
 ) -> ObjectOverlaps:
-    """How the recorded objects overlap the true masks of a mission, frame by frame.
+    """The overlap of recorded objects with the true masks of a mission, frame by frame.
 
     Raises:
         SettingsError: A mask is missing or cannot be read.
@@ -74,7 +74,7 @@ def true_names(overlaps: ObjectOverlaps) -> dict[int, str]:
 def identity_counts(
     truths: MissionTruth, record: MissionRecorder, overlaps: ObjectOverlaps
 ) -> tuple[int, int]:
-    """Object-frames with the right first candidate, and all that are scored."""
+    """Number of scored object-frames with the correct first candidate, and of all scored ones."""
     entered = {
         name: min(
             (e.time for e in truths.events if e.kind == "entry" and name in e.objects), default=0.0
@@ -99,7 +99,7 @@ def identity_counts(
 def reported_poses(
     truths: MissionTruth, record: MissionRecorder, overlaps: ObjectOverlaps
 ) -> Poses:
-    """Poses told of true objects that are seen and rightly named, by frame and object."""
+    """Reported poses of visible, correctly identified objects, by frame and object."""
     found: dict[tuple[int, str], Pose] = {}
     for index, objects in overlaps.items():
         for name, (visible, ious) in objects.items():

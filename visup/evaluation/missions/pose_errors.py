@@ -1,4 +1,4 @@
-"""Poses that were told against the true ones: errors of view and of spin."""
+"""Errors of reported poses: view direction and rotation rate."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from visup.agent import Pose
 
 Poses = Mapping[tuple[int, str], Pose]
-"""(frame, true object) -> the pose told of it."""
+"""(frame, true object) -> reported pose."""
 
 SPIN_HALF_S = 0.5
-"""The true spin at a frame is that between so long before and after it."""
+"""The true rotation rate at a frame is measured over this time before and after, seconds."""
 
 
 def view_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
-    """Median angle between the direction told and the true one, degrees; None when none was told.
+    """Median angle between reported and true direction, degrees; None without reports.
 
-    The line of sight to an object is taken through the centre of its box, and symmetric views are not
-    forgiven, so the figure is an upper bound.
+    The line of sight is taken through the centre of the box, and symmetric views count as errors, so the
+    figure is an upper bound.
 
     Args:
-        truth: What `truth.json` holds.
-        poses: What was told.
+        truth: Content of `truth.json`.
+        poses: The reported poses.
     """
     width, height = truth["size"]
     fov = np.deg2rad(float(truth.get("fov_vertical_deg", 38.0)))
@@ -38,11 +38,11 @@ def view_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
 
 
 def spin_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
-    """Median difference between the spin told and the true one, degrees per second, or None.
+    """Median difference between reported and true rotation rate, degrees per second, or None.
 
     Args:
-        truth: What `truth.json` holds.
-        poses: What was told.
+        truth: Content of `truth.json`.
+        poses: The reported poses.
     """
     errors = []
     for (index, name), pose in poses.items():
@@ -53,10 +53,10 @@ def spin_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
 
 
 def true_spin(truth: Mapping[str, Any], index: int, name: str) -> float | None:
-    """How fast an object truly turns at a frame, degrees per second; None where that is not known.
+    """The true rotation rate of an object at a frame, degrees per second; None if not known.
 
     Args:
-        truth: What `truth.json` holds.
+        truth: Content of `truth.json`.
         index: Number of the frame.
         name: The object.
     """

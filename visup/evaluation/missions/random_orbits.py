@@ -1,8 +1,7 @@
-"""`visup eval orbits`: missions in orbit are drawn from a seed, rendered, supervised, scored and thrown away.
+"""`visup eval orbits`: random missions in orbit are rendered, supervised, scored and discarded.
 
-The models are all meshes made by code but those of `HIDDEN`: what comes by of these is nothing known, and
-is rightly named when it is told to be unknown. The arm is known by silhouettes from missions that are not
-scored.
+The models are all generated meshes except those of `HIDDEN`, which are correctly identified as unknown. The
+arm is known by silhouettes from missions that are not scored.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.runner import evaluate_missions, mission_total
 
 SEEDS_APART = 10_000
-"""Seeds of missions that one seed of an evaluation has to itself."""
+"""Distance between the mission seeds of two evaluation seeds."""
 
 SCENERY = ("sill", "slab", "payload_bay")
-"""Meshes that nobody looks for."""
+"""Meshes that are never identified."""
 
 _ARM_SEEDS = range(9_000_000, 9_000_024)
 _ARM_EVERY = 25
@@ -44,18 +43,18 @@ def evaluate_orbits(
     """Figures of `evaluate_missions` on random missions in orbit.
 
     Args:
-        count: How many missions.
-        seed: Of all of them.
-        width: Of the image, pixels; it is three quarters as high.
-        limit: Frames of each mission, for a quick look.
-        workers: Processes that share the work; as many as there are cores when None.
+        count: Number of missions.
+        seed: Random seed.
+        width: Image width, pixels; the height is three quarters of it.
+        limit: Maximum frames of each mission.
+        workers: Worker processes; None for one per core.
         progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {mission: {...}}}, the keys of `evaluate_missions` and the true verdict.
 
     Raises:
-        ExtraMissingError: What renders is not installed.
+        ExtraMissingError: The renderer is not installed.
     """
     seeds = [seed * SEEDS_APART + k for k in range(count)]
     items: dict[str, dict[str, Any]] = {}
@@ -70,11 +69,11 @@ def evaluate_orbits(
 
 
 def orbit_models(folder: Path, jobs: int = 1) -> Path:
-    """Build the database that random missions are supervised with.
+    """Build the model database for random missions.
 
     Args:
-        folder: Where it is written, and what it is built from besides.
-        jobs: Processes.
+        folder: Folder for the database and its sources.
+        jobs: Number of processes.
     """
     from visup.percepts.shape.building.database_builder import build_database
     from visup.render.meshes.spacecraft import MESHES, write_meshes
@@ -102,7 +101,7 @@ def _arm_masks() -> list[NDArray[np.bool_]]:
 def _scored(
     seeds: Sequence[int], models: Path, how: tuple[int, int | None], workers: int | None
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Names and figures of missions as they come."""
+    """Names and figures of missions in order of completion."""
     many = min(workers or os.cpu_count() or 1, len(seeds))
     if many <= 1:
         yield from (score(seed, models, *how) for seed in seeds)
@@ -115,7 +114,7 @@ def _scored(
 
 
 def _alone() -> None:
-    """One thread for each process: the processes share the cores already."""
+    """Limit each process to one thread: the processes share the cores already."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -124,16 +123,16 @@ def _alone() -> None:
 def score(
     seed: int, models: Path, width: int = 480, limit: int | None = None
 ) -> tuple[str, dict[str, Any]]:
-    """Render one mission, supervise it, throw it away.
+    """Render one mission, supervise it, and discard it.
 
     Args:
-        seed: Of the mission.
+        seed: Seed of the mission.
         models: Model database.
-        width: Of the image, pixels.
-        limit: Frames that are watched; all when None.
+        width: Image width, pixels.
+        limit: Maximum frames; None for all.
 
     Returns:
-        Its name, and what `evaluate_missions` says of it with `verdict_true`.
+        Its name, and its result of `evaluate_missions` with `verdict_true`.
     """
     from visup.render.orbits.random_orbit import random_orbit
     from visup.render.output.writer import write_mission

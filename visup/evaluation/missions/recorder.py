@@ -1,4 +1,4 @@
-"""What the supervisor reports of a mission, recorded frame by frame."""
+"""Records the reports of the supervisor for a mission, frame by frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from visup.evaluation.missions.scores import StageSample
 
 @dataclass(frozen=True, slots=True)
 class ObservedObject:
-    """An object as it was believed at one frame."""
+    """A believed object at one frame."""
 
     id: int
     name: str
@@ -21,7 +21,7 @@ class ObservedObject:
 
 @dataclass(slots=True)
 class MissionRecorder:
-    """What the supervisor said of one mission, frame by frame."""
+    """The reports of the supervisor for one mission."""
 
     seen: dict[int, tuple[ObservedObject, ...]] = field(default_factory=dict)
     events: list[tuple[str, tuple[int, ...], float]] = field(default_factory=list)
@@ -31,7 +31,7 @@ class MissionRecorder:
     seconds: float = 0.0
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Take down one step; the agent calls it."""
+        """Add one step; an observer."""
         self.seen[step.frame_index] = tuple(
             ObservedObject(b.id, b.name, b.region, b.pose)
             for b in step.mind.objects.values()
@@ -50,8 +50,8 @@ class MissionRecorder:
 def _sample(mind: Mind) -> StageSample:
     """The reported stage and its outcome so far.
 
-    A stage that is done while no other has begun counts as progressing: its outcome so far is good,
-    and in the truth a mission stays within its last stage until it ends.
+    A completed stage counts as progressing until the next begins: its outcome so far is good, and in the
+    truth a mission stays in its last stage until it ends.
     """
     task = mind.tasks[0] if mind.tasks else None
     done = [s.stage for s in task.stages if s.status is Status.DONE] if task else []

@@ -1,7 +1,7 @@
-"""`visup eval missions`: supervise missions whose truth is known, and score what was said.
+"""`visup eval missions`: supervises missions with known truth and scores the reports.
 
-The supervisor is given `mission.json` and the video, as `visup watch` would give them; `truth.json` and the
-masks are read afterwards, by the scoring alone.
+The supervisor gets `mission.json` and the video, as in `visup watch`; `truth.json` and the masks are read
+only afterwards for scoring.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ def evaluate_missions(
 
     Args:
         folder: A mission, or a folder of missions.
-        models: Model database; by default one is built from `../models/*.ply` beside `folder` and, for
-            each model that an actor stands for, from silhouettes in `../shapes/<model>`.
-        limit: Frames of each mission, for a quick look; all by default.
+        models: Model database; by default one is built from `../models/*.ply` next to `folder` and, for
+            each model of an actor, from silhouettes in `../shapes/<model>`.
+        limit: Maximum frames of each mission; all by default.
         progress: Shows what is being done.
 
     Returns:
@@ -73,7 +73,7 @@ def evaluate_missions(
 def mission_database(
     folder: Path, missions: Sequence[Path], scratch: Path, progress: Progress
 ) -> Path:
-    """A model database from the meshes and silhouettes that stand beside the missions."""
+    """A model database from the meshes and silhouettes next to the missions."""
     from visup.percepts.shape.building.database_builder import build_database, read_silhouettes
 
     beside = missions[0].resolve().parent.parent
@@ -106,7 +106,7 @@ def _evaluate(mission: Path, database: Path, limit: int | None) -> dict[str, Any
 
 
 def mission_settings(mission: Path, database: Path) -> WatchSettings:
-    """The settings with which a mission is watched, from its `mission.json`."""
+    """The settings of a mission from its `mission.json`."""
     told = read_json(mission / "mission.json")
     return WatchSettings(
         source=str(mission / "video.mp4"),
@@ -131,12 +131,12 @@ def _supervise(mission: Path, database: Path, limit: int | None) -> MissionRecor
 def report_scores(
     truths: MissionTruth, record: MissionRecorder, names: Mapping[int, str]
 ) -> dict[str, Any]:
-    """Figures of all that was said: events, stages, alerts, verdict.
+    """Figures of events, stages, alerts and verdict.
 
     Args:
-        truths: What truly happened.
-        record: What was said.
-        names: Believed object's id -> the true object that it stands for.
+        truths: The truth.
+        record: The reports.
+        names: Id of a believed object -> true object.
 
     Returns:
         By the keys of the data's README; counts of events as `event_counts`.
@@ -192,7 +192,7 @@ def _scores(
 
 
 def mission_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Figures over all missions: counts are added up, so that each frame and event weighs alike."""
+    """Figures over all missions from summed counts, so that each frame and event has equal weight."""
     right, excess, missed = (sum(i["event_counts"][k] for i in items) for k in range(3))
     precision, recall, f1 = precision_recall_f1(right, excess, missed)
     identified, scored = (sum(i["identity_counts"][k] for i in items) for k in range(2))

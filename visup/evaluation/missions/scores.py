@@ -1,8 +1,8 @@
 """Figures of a supervised mission against its truth, as pure functions.
 
 The definitions are those of the mission data's README: identity, events, stages, latency, alerts, verdict,
-view. What was reported comes in as plain records (`ReportedEvent`, `StageSample`), what is true as
-`MissionTruth`, and the two meet only here.
+view. Reports (`ReportedEvent`, `StageSample`) and truth (`MissionTruth`) are plain records and are compared
+only here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ CHANGE_MARGIN_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class TrueStage:
-    """A stage as it truly went: name, span in seconds, outcome."""
+    """A true stage: name, span in seconds, outcome."""
 
     stage: str
     from_s: float
@@ -30,7 +30,7 @@ class TrueStage:
 
 @dataclass(frozen=True, slots=True)
 class TrueEvent:
-    """An event that truly happened: kind, objects by name, time in seconds."""
+    """A true event: kind, objects by name, time in seconds."""
 
     kind: str
     objects: frozenset[str]
@@ -39,7 +39,7 @@ class TrueEvent:
 
 @dataclass(frozen=True, slots=True)
 class TrueAlert:
-    """An alert that is expected: kind, since when, objects by name (empty when any will do)."""
+    """An expected alert: kind, begin, objects by name (empty for any)."""
 
     kind: str
     from_s: float
@@ -48,7 +48,7 @@ class TrueAlert:
 
 @dataclass(frozen=True, slots=True)
 class MissionTruth:
-    """What truly happened in a mission."""
+    """The ground truth of a mission."""
 
     events: tuple[TrueEvent, ...]
     stages: tuple[TrueStage, ...]
@@ -59,9 +59,9 @@ class MissionTruth:
 
 @dataclass(frozen=True, slots=True)
 class ReportedEvent:
-    """An event or alert that was reported: kind, true names of its objects, time, gravity.
+    """A reported event or alert: kind, true names of its objects, time, severity.
 
-    An object that covers nothing true is named '?'.
+    An object without a true counterpart is named '?'.
     """
 
     kind: str
@@ -72,7 +72,7 @@ class ReportedEvent:
 
 @dataclass(frozen=True, slots=True)
 class StageSample:
-    """What was reported at one time: the current stage and its outcome so far, or None."""
+    """The report at one time: the current stage and its outcome so far, or None."""
 
     time: float
     stage: str | None
@@ -80,11 +80,11 @@ class StageSample:
 
 
 def parse_truth(truth: Mapping[str, object], fps: float) -> MissionTruth:
-    """Truth of a mission from its `truth.json`, as read.
+    """Parse the truth of a mission from its `truth.json`.
 
     Args:
         truth: The parsed file.
-        fps: Frames per second, which turns its frame numbers into seconds.
+        fps: Frames per second, to convert frame numbers to seconds.
     """
     given: Mapping[str, list[dict[str, object]]] = truth  # type: ignore[assignment]
     events = tuple(
@@ -113,10 +113,10 @@ def _objects(entry: Mapping[str, object]) -> frozenset[str]:
 def matched_events(
     told: Sequence[ReportedEvent], true: Sequence[TrueEvent]
 ) -> tuple[int, int, int]:
-    """How many events were right, told in excess, missed.
+    """Count correct, excess and missed events.
 
-    An event is right when its kind and objects agree and it is within a second; each true event counts
-    once, the nearest telling first. Entries in the first two seconds are not scored on either side.
+    An event is correct if kind and objects agree and it is within a second; each true event is matched once,
+    the nearest report first. Entries in the first two seconds are not scored on either side.
 
     Returns:
         (true positives, false positives, false negatives).
@@ -146,7 +146,7 @@ def _is_start(kind: str, time: float) -> bool:
 
 
 def precision_recall_f1(right: int, excess: int, missed: int) -> tuple[float, float, float]:
-    """Precision, recall and F1 of counts; 1 where nothing was told or nothing was there to tell."""
+    """Precision, recall and F1 of counts; 1 without reports or without truth."""
     precision = right / (right + excess) if right + excess else 1.0
     recall = right / (right + missed) if right + missed else 1.0
     both = precision + recall
@@ -154,7 +154,7 @@ def precision_recall_f1(right: int, excess: int, missed: int) -> tuple[float, fl
 
 
 def true_outcome(truths: MissionTruth, time: float) -> tuple[str, str] | None:
-    """The stage that is truly under way and its outcome so far; None outside the listed stages."""
+    """The true stage at a time and its outcome so far; None outside the listed stages."""
     for stage in truths.stages:
         if stage.from_s <= time < stage.to_s:
             turned = _turns_bad(stage, truths.alerts)
@@ -164,7 +164,7 @@ def true_outcome(truths: MissionTruth, time: float) -> tuple[str, str] | None:
 
 
 def _turns_bad(stage: TrueStage, alerts: Iterable[TrueAlert]) -> float | None:
-    """When a stage that goes wrong does so: the first alert within it; at its start if there is none."""
+    """When a stage goes wrong: at the first alert within it, or at its start if there is none."""
     if stage.outcome == "complete":
         return None
     within = [a.from_s for a in alerts if stage.from_s <= a.from_s < stage.to_s]
@@ -172,17 +172,17 @@ def _turns_bad(stage: TrueStage, alerts: Iterable[TrueAlert]) -> float | None:
 
 
 def changes(truths: MissionTruth) -> list[float]:
-    """Times at which the true (stage, outcome so far) changes, where scoring pauses."""
+    """Times at which the true (stage, outcome so far) changes, around which nothing is scored."""
     times = {t for s in truths.stages for t in (s.from_s, s.to_s)}
     turned = (_turns_bad(s, truths.alerts) for s in truths.stages)
     return sorted(times | {t for t in turned if t is not None})
 
 
 def stage_share(samples: Sequence[StageSample], truths: MissionTruth) -> float | None:
-    """Share of scored time in which the reported (stage, outcome so far) is the true one.
+    """Share of scored time with the correct (stage, outcome so far).
 
     Returns:
-        0 to 1, or None when no sample is scored.
+        0 to 1, or None without scored samples.
     """
     pauses = changes(truths)
     right = scored = 0
@@ -196,10 +196,10 @@ def stage_share(samples: Sequence[StageSample], truths: MissionTruth) -> float |
 
 
 def failing_latency(samples: Sequence[StageSample], truths: MissionTruth) -> float | None:
-    """Seconds from the true turn of a stage to the first report of it as failing, the worst of them.
+    """The greatest delay from a true failure of a stage to its first report as failing.
 
     Returns:
-        Seconds (negative when early), infinity when it was never reported, None when nothing fails.
+        Seconds (negative if early), infinity if never reported, None if nothing fails.
     """
     late = []
     for stage in truths.stages:
@@ -212,7 +212,7 @@ def failing_latency(samples: Sequence[StageSample], truths: MissionTruth) -> flo
 
 
 def scored_alerts(told: Sequence[ReportedEvent], true: Sequence[TrueAlert]) -> tuple[int, int]:
-    """How many expected alerts were found, and how many grave ones were told in excess.
+    """Number of expected alerts that were found, and of severe false ones.
 
     Returns:
         (found, false alerts).

@@ -1,5 +1,5 @@
 """Evaluation of segmentation and tracking on sequences with masks or boxes.
 
-Read `mask_scores` and `mot_scores` (the figures, pure functions), `runner` (walks the sequences), then
-`rendered_clips` (clips rendered for what shared footage lacks, each with a bar).
+Read `mask_scores` and `mot_scores` (the figures, pure functions), `runner` (evaluates sequences), then
+`rendered_clips` (rendered clips for cases missing in the shared footage, each with a bar).
 """

@@ -1,4 +1,4 @@
-"""Digests of what figures and examples follow from: code, and the files of a sequence."""
+"""Digests of code and of the files of a sequence, as cache keys."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from visup.evaluation.motion.runner import LabelledSequence
 
 
 def code_digest(rooms: Sequence[str]) -> bytes:
-    """A digest of some files, and of all code and data in some folders, of the package."""
+    """A digest of files and folders of the package, with their code and data."""
     digest = hashlib.sha256()
     package = Path(str(resources.files("visup")))
     for room in rooms:

@@ -1,7 +1,7 @@
-"""`visup eval crowds`: what a frame costs with one mover in view, and with forty.
+"""`visup eval crowds`: the cost of a frame with one to forty moving objects.
 
-Textured discs go their ways over a textured ground that a camera pans over. What is shown is drawn from a
-seed and is the same on every machine; times are those of the processor, for a machine is seldom quiet.
+Textured discs move over a textured background under a panning camera. The scene depends only on the seed;
+times are processor time, which depends less on the load of the machine.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from visup.percepts.motion.segmenter import MotionSegmenter
 MOVERS = (1, 5, 10, 20, 40)
 SIZE = (480, 854)  # height, width
 FPS = 25.0
-UNTIMED = 10  # frames at first, in which movers are found
-BAR = 1.5  # how much longer a frame may take with any number of movers than with one
+UNTIMED = 10  # initial frames, in which movers are detected
+BAR = 1.5  # limit of the time of a frame with any number of movers relative to one
 RADIUS = (16.0, 40.0)
-SPEED = 4.0  # standard deviation of a mover's step along x and y, pixels a frame
-PAN = (2.0, 0.6)  # of the camera, pixels a frame
+SPEED = 4.0  # standard deviation of a mover's velocity along x and y, pixels per frame
+PAN = (2.0, 0.6)  # of the camera, pixels per frame
 
 Image = NDArray[np.uint8]
 Doubles = NDArray[np.float64]
@@ -35,7 +35,7 @@ Doubles = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mover:
-    """A textured disc: (2,) where it is at first, (2,) its step from frame to frame, pixels; its radius."""
+    """A textured disc: (2,) initial position, (2,) velocity in pixels per frame; radius."""
 
     start: Doubles
     step: Doubles
@@ -46,16 +46,16 @@ class Mover:
 def evaluate_crowds(
     frames: int = 200, seed: int = 0, *, progress: Progress = silent
 ) -> dict[str, Any]:
-    """The time of a frame by how many things move in it.
+    """The time of a frame by the number of moving objects.
 
     Args:
-        frames: How many for each number of movers, `UNTIMED` of them before the clock runs.
-        seed: Of all that is drawn.
+        frames: Frames for each number of movers, including `UNTIMED` unmeasured ones.
+        seed: Random seed.
         progress: Shows what is being done.
 
     Returns:
-        `items` by number of movers: `ms`, median processor time of a frame; `ratio`, the same in runs of DIS
-        FAST; `regions`, how many are reported in the mean; `growth`, `ms` beside that of one mover.
+        `items` by number of movers: `ms`, median processor time of a frame; `ratio` to that of DIS FAST;
+        `regions`, mean number of reported regions; `growth`, `ms` relative to one mover.
         `total`: the greatest `growth` and `ratio`, and the `bar` of the former.
     """
     items: dict[str, dict[str, Any]] = {}
@@ -70,7 +70,7 @@ def evaluate_crowds(
 
 
 def crowd(movers: int, frames: int, seed: int) -> Iterator[Frame]:
-    """Frames in which so many things move, later ones in front, (480, 854, 3)."""
+    """Frames with a number of moving discs, later ones in front, (480, 854, 3)."""
     rng = np.random.default_rng((seed, movers))
     height, width = SIZE
     ground = _texture(rng, (height + 80, width + 80))
@@ -84,7 +84,7 @@ def crowd(movers: int, frames: int, seed: int) -> Iterator[Frame]:
 
 
 def _timed(shown: Iterator[Frame]) -> dict[str, Any]:
-    """What frames cost, and what is reported in them."""
+    """The cost of frames, and the number of reported regions."""
     segmenter = MotionSegmenter()
     engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     ms: list[float] = []
@@ -127,19 +127,19 @@ def _texture(rng: np.random.Generator, shape: tuple[int, int]) -> Image:
 
 
 def _seen(image: Image, at: Doubles, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """What of an image is seen through a window at (x, y), (h, w, 3)."""
+    """The window of an image at subpixel position (x, y), (h, w, 3)."""
     matrix = np.array([[1, 0, at[0]], [0, 1, at[1]]], dtype=np.float64)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], flags=flags), dtype=np.float32)
 
 
 def _there_and_back(way: Doubles, room: Doubles) -> Doubles:
-    """A place between 0 and (2,) room for a way of any length: at either end it turns."""
+    """A position reflected into 0 to (2,) room."""
     return room - np.abs(way % (2 * room) - room)
 
 
 def _draw(image: NDArray[np.float32], thing: Mover, n: int) -> None:
-    """Draw a mover where it is in a frame, in place; at the border of the image it turns."""
+    """Draw a mover at its position in a frame, in place; it is reflected at the image border."""
     at = _there_and_back(thing.start + thing.step * n, np.array(SIZE[::-1], dtype=np.float64))
     side = len(thing.skin)
     left, top = (np.floor(at).astype(int) - side // 2).tolist()

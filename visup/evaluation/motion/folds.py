@@ -1,7 +1,7 @@
-"""Figures on what was left out: folds of families, and choice by the rest.
+"""Cross-validation folds of families, and the choice of settings on the other folds.
 
-Two sequences of one family (the same scene, camera or film) never stand on both sides of a fold. All
-functions are pure; `visup.evaluation.cross_validation` measures what they judge.
+Sequences of one family (the same scene, camera or film) are never on both sides of a fold. All functions are
+pure; `visup.evaluation.cross_validation` does the measuring.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from visup.evaluation.families import Scores, family_of
 
 
 def dealt(names: Iterable[str], folds: int) -> dict[str, int]:
-    """The fold of each sequence: whole families, the largest first, each to the fold that has least so far.
+    """Assign whole families to folds, the largest first, each to the smallest fold so far.
 
     Args:
-        names: Of sequences.
-        folds: How many folds, at least 1.
+        names: Names of sequences.
+        folds: Number of folds, at least 1.
 
     Returns:
         Name -> number of its fold, from 0.
@@ -33,15 +33,15 @@ def dealt(names: Iterable[str], folds: int) -> dict[str, int]:
 
 
 def chosen(tried: Sequence[Scores], fold: Mapping[str, int]) -> dict[int, int]:
-    """Which of the tried settings each fold is scored with: the best on all other folds.
+    """The settings with which each fold is scored: the best on all other folds.
 
     Args:
-        tried: For each of the settings the figure of every sequence; the first are the defaults.
+        tried: Scores of every sequence for each of the settings; the first are the defaults.
         fold: The fold of each sequence.
 
     Returns:
-        Number of a fold -> place of its settings; the earlier among equals, and where nothing is left to
-        choose by, the defaults.
+        Number of a fold -> index of its settings; the earlier among equals, and the defaults without other
+        folds.
     """
     out = {}
     for number in sorted(set(fold.values())):
@@ -52,5 +52,5 @@ def chosen(tried: Sequence[Scores], fold: Mapping[str, int]) -> dict[int, int]:
 
 
 def gains(scores: Scores, before: Scores) -> dict[str, float]:
-    """How much higher each sequence's figure is than before; sequences that both have."""
+    """The gain of each sequence over an earlier score, for common sequences."""
     return {n: value - before[n] for n, value in scores.items() if n in before}

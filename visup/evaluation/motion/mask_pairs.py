@@ -1,4 +1,4 @@
-"""Which mask is the truth of which frame: by name, never by order, since truth may be sparse."""
+"""Matches masks to frames by name, never by order, since ground truth may be sparse."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 
 def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
-    """The masks of a sequence by the frames whose truth they are.
+    """The masks of a sequence by frame.
 
-    A mask belongs to the image of its name (`00012.png` to `00012.jpg`), or else to the one image whose last
-    number is its own (`mask_12.png` to `frame_0012.jpg`); in a video, to the frame of that number, from 0.
+    A mask belongs to the image of the same name (`00012.png` to `00012.jpg`), or else to the only image with
+    the same last number (`mask_12.png` to `frame_0012.jpg`); in a video, to the frame of that number, from 0.
 
     Args:
         source: A folder of images, or a video file.
-        masks: The mask files; frames without one have no truth.
+        masks: The mask files; frames without one have no ground truth.
 
     Returns:
         Index of a frame -> its mask.
@@ -49,6 +49,6 @@ def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
 
 
 def last_number(path: Path) -> int:
-    """The last number in a file's name; -1 where there is none."""
+    """The last number in a file name; -1 without one."""
     found = _NUMBER.search(path.stem)
     return int(found[1]) if found else -1

@@ -1,4 +1,4 @@
-"""The figures of `visup eval motion`, from masks alone: pure functions, no video, no segmenter."""
+"""The figures of `visup eval motion` from masks, as pure functions."""
 
 from __future__ import annotations
 
@@ -82,9 +82,9 @@ class PixelCounts:
     """Pixels over all frames of a sequence, as CDnet counts them (Goyette et al. 2012).
 
     Attributes:
-        right: Of objects, and within regions.
-        false: Within regions, and of no object.
-        missed: Of objects, and within no region.
+        right: True positives.
+        false: False positives.
+        missed: False negatives.
     """
 
     right: int = 0
@@ -92,7 +92,7 @@ class PixelCounts:
     missed: int = 0
 
     def with_frame(self, seen: Mask, true: Mask, scored: Mask) -> PixelCounts:
-        """With those of one more frame that are scored."""
+        """Add the scored pixels of a frame."""
         right = int(np.count_nonzero(seen & true & scored))
         return PixelCounts(
             self.right + right,
@@ -102,13 +102,13 @@ class PixelCounts:
 
     @property
     def f_measure(self) -> float:
-        """Harmonic mean of precision and recall, 0 to 1; 1 where nothing is to be found and nothing was."""
+        """Harmonic mean of precision and recall, 0 to 1; 1 without truth and detections."""
         pixels = 2 * self.right + self.false + self.missed
         return 2 * self.right / pixels if pixels else 1.0
 
 
 def has_ghost(regions: Iterable[Mask], objects: Sequence[Mask]) -> bool:
-    """Whether some region overlaps no object by a tenth of the region."""
+    """Whether any region overlaps all objects by less than a tenth of its area."""
     for region in regions:
         area = int(region.sum())
         best = max((int((region & o).sum()) for o in objects), default=0)
