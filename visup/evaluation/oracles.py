@@ -1,7 +1,7 @@
-"""Oracles and comparisons with them: kept with the tests and found in a source checkout.
+"""Loads oracles and comparisons with them from a source checkout.
 
-They stand in `tests/oracles/`, so that the installed package holds nothing that only a comparison
-runs. The commands of `visup eval` ask for them by name.
+They are in `tests/oracles/`, so that the installed package has no code for comparisons only. The commands of
+`visup eval` load them by name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def oracle(name: str) -> ModuleType:
     """A module of `tests/oracles/`.
 
     Args:
-        name: Of the module below it, such as `reasoning.rules`.
+        name: Name of the module below it, such as `reasoning.rules`.
 
     Raises:
         SettingsError: visup does not run from a source checkout.
@@ -39,7 +39,7 @@ def oracle(name: str) -> ModuleType:
 
 
 def evaluation_module(name: str) -> ModuleType:
-    """The module of an evaluation by its full name, wherever it stands.
+    """The module of an evaluation by its full name.
 
     Raises:
         SettingsError: It compares with oracles, and visup does not run from a source checkout.

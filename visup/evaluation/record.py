@@ -35,7 +35,7 @@ def write_record(path: Path, figures: Mapping[str, Any], settings: Mapping[str, 
 
 
 def machine() -> dict[str, Any]:
-    """What the figures were made on, without names of hosts or people."""
+    """The machine, without names of hosts or people."""
     return {
         "system": platform.system(),
         "architecture": platform.machine(),

@@ -148,7 +148,7 @@ class MaskOverlaps:
         return {i: self.iou((i,), (name,)) for i in self.regions}
 
     def covering(self, names: Iterable[str]) -> int | None:
-        """The region that covers some objects: best IoU, at least 0.5."""
+        """The region that best covers some objects, with IoU of at least 0.5."""
         names = set(names)
         best = max(((self.iou((i,), names), -i) for i in self.regions), default=(0.0, 0))
         return -best[1] if best[0] >= MATCH_IOU else None
@@ -194,16 +194,16 @@ def object_scores(
 ) -> dict[str, ObjectScore]:
     """J_object and id switches of each object of a mission.
 
-    An object is scored from 2 s after it first shows 500 pixels, where it shows as many. Its region
-    is the one that fits best over the sequence. Once objects are coupled their union counts as one:
-    it is compared with the regions that were theirs, or with the one region that fits it best.
+    An object is scored in frames with at least 500 visible pixels, from 2 s after the first of these. Its
+    region is the one that fits best over the sequence. Coupled objects count as one: their union is compared
+    with their former regions, or with the single region that fits it best.
 
     Args:
         frames: Overlaps of all frames.
         coupled: (frame, objects) of coupled events.
 
     Returns:
-        By object; objects that are never scored are left out.
+        Scores by object, without those that are never scored.
     """
     names = sorted({n for f in frames for n in f.objects})
     apart, joined = _periods(frames, names, coupled)
@@ -226,7 +226,7 @@ def _periods(
     names: Sequence[str],
     coupled: Sequence[tuple[int, frozenset[str]]],
 ) -> tuple[dict[str, list[MaskOverlaps]], dict[str, dict[frozenset[str], list[MaskOverlaps]]]]:
-    """Scored frames of each object: those in which it is by itself, those in which it is coupled."""
+    """Scored frames of each object: by itself, and coupled."""
     apart: dict[str, list[MaskOverlaps]] = {n: [] for n in names}
     joined: dict[str, dict[frozenset[str], list[MaskOverlaps]]] = {n: {} for n in names}
     entered: dict[str, float] = {}
@@ -258,10 +258,10 @@ def best_region(overlaps: Sequence[Mapping[int, float]]) -> int | None:
     """The region id that fits an object best over a sequence.
 
     Args:
-        overlaps: For each scored frame, IoU of the object with each region that is reported.
+        overlaps: For each scored frame, IoU of the object with each reported region.
 
     Returns:
-        The id with the highest sum, the smaller one among equals; None when there is none.
+        The id with the highest sum, the smaller one among equals; or None.
     """
     total: dict[int, float] = {}
     for frame in overlaps:
@@ -272,13 +272,13 @@ def best_region(overlaps: Sequence[Mapping[int, float]]) -> int | None:
 
 
 def id_switches(ids: Iterable[int | None]) -> int:
-    """How often the region that covers an object is another than the one before.
+    """Number of changes of the region that covers an object.
 
     Args:
-        ids: For each frame the region id, or None when no region covers the object.
+        ids: For each frame the region id, or None if no region covers the object.
 
     Returns:
-        The number of changes between frames with a region, gaps left out.
+        The number of changes between frames with a region, ignoring gaps.
     """
     known = [i for i in ids if i is not None]
     return sum(a != b for a, b in itertools.pairwise(known))

@@ -27,7 +27,7 @@ def read_truth(path: Path) -> dict[int, dict[int, Box]]:
         Frame number from 0 -> id -> (x, y, width, height), pixels; boxes not active left out.
 
     Raises:
-        SourceError: A line is not as it should be.
+        SourceError: A line is malformed.
     """
     out: dict[int, dict[int, Box]] = {}
     for number, line in enumerate(path.read_text().splitlines(), 1):
@@ -50,19 +50,19 @@ def read_truth(path: Path) -> dict[int, dict[int, Box]]:
 def truth_of_images(
     truth: Mapping[int, dict[int, Box]], images: Sequence[Path]
 ) -> dict[int, dict[int, Box]]:
-    """Truth by the place of each image among those that are watched, where their names have numbers.
+    """Truth by the index of each image, matched by the numbers in their names.
 
     Args:
         truth: Frame number from 0 -> id -> box.
-        images: The images, in the order in which they are watched.
+        images: The images in order.
 
     Raises:
-        SourceError: The truth tells of a frame of which there is no image.
+        SourceError: The truth has a frame without an image.
     """
     numbers = [last_number(image) - 1 for image in images]
     if min(numbers, default=0) < -1 or len(set(numbers)) < len(
         numbers
-    ):  # names that say nothing: by order
+    ):  # names without usable numbers: by order
         numbers = list(range(len(images)))
     places = {number: place for place, number in enumerate(numbers)}
     for frame in truth:
@@ -92,7 +92,7 @@ def mot_scores(true: Mapping[int, Boxes], seen: Mapping[int, Boxes]) -> dict[str
 
     Args:
         true: Frame -> id -> box.
-        seen: Frame -> region id -> box; its frames are the ones that are scored.
+        seen: Frame -> region id -> box; its frames are scored.
 
     Returns:
         `mota`, `idf1` and `id_switches`.
@@ -104,7 +104,7 @@ def mot_scores(true: Mapping[int, Boxes], seen: Mapping[int, Boxes]) -> dict[str
         import motmetrics
     except ImportError as e:
         raise ExtraMissingError("scoring MOT folders", "eval") from e
-    # The library's own use of numpy and pandas warns; that is not the user's concern.
+    # The library's own use of NumPy and pandas causes warnings.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         tally = motmetrics.MOTAccumulator(auto_id=True)

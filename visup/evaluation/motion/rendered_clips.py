@@ -1,7 +1,7 @@
-"""`visup eval clips`: rendered clips of what shared footage lacks, each with its bar.
+"""`visup eval clips`: rendered clips for cases missing in the shared footage, each with a bar.
 
-The scenarios stand in `visup/render/bench`. Their clips are rendered into a cache and anew when a scenario or
-the renderer has changed.
+The scenarios are in `visup/render/bench`. Their clips are cached, and rendered again when a scenario or the
+renderer has changed.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from visup.evaluation.figures import Progress, silent
 from visup.render.scenario.library import bench_names, shipped_scenario
 
 MARK = "made-of.txt"
-"""File of a cached clip that says what it was made of."""
+"""File of a cached clip with the digest of its scenario and renderer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """What a clip must reach.
+    """The bar of a clip.
 
     Attributes:
-        j_object: Least mean IoU of each object with its region, where it shows 500 pixels, from 2 s
-            after it first does.
-        id_switches: Most changes of an object's id.
-        ghost: Most frames that show a region where no object is, as a share.
+        j_object: Least mean IoU of each object with its region, in frames with 500 visible pixels, from 2 s
+            after the first of these.
+        id_switches: Maximum id changes per object.
+        ghost: Maximum share of frames with a region where no object is.
     """
 
     j_object: float = 0.80
@@ -52,17 +52,17 @@ def evaluate_clips(
     workers: int | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Render what is not yet rendered, score the segmenter on it, and compare with the bars.
+    """Render missing clips, score the segmenter on them, and compare with the bars.
 
     Args:
-        cache: Folder for the clips; made when missing.
-        names: Which clips; all when empty.
-        workers: Processes that share the work; as many as there are cores when None.
+        cache: Folder for the clips; created if missing.
+        names: Names of clips; all if empty.
+        workers: Worker processes; None for one per core.
         progress: Shows what is being done.
 
     Returns:
-        `items` by clip: what `evaluate_motion` says of it, `bar`, and `missed`, what it fell short of in
-        words. `total`: means, and how many clips `passed` of all `clips`.
+        `items` by clip: the result of `evaluate_motion`, `bar`, and `missed` bars as sentences. `total`:
+        means, and how many of all `clips` `passed`.
 
     Raises:
         SettingsError: There is no clip of a name.
@@ -83,14 +83,14 @@ def bar_of(name: str) -> Bar:
 
 
 def judged(figures: Mapping[str, Any], bar: Bar) -> dict[str, Any]:
-    """The figures of a clip with its bar and what was missed.
+    """Compare the figures of a clip with its bar.
 
     Args:
         figures: One item of `evaluate_motion`.
-        bar: What it must reach.
+        bar: Its bar.
 
     Returns:
-        The figures, `bar`, and `missed`: sentences, none when it passes.
+        The figures, `bar`, and `missed`: sentences, empty if passed.
     """
     objects: Mapping[str, Mapping[str, Any]] = figures.get("objects", {})
     missed = [
@@ -110,11 +110,11 @@ def judged(figures: Mapping[str, Any], bar: Bar) -> dict[str, Any]:
 
 
 def rendered(name: str, cache: Path) -> Path:
-    """The folder of a clip, rendered now if it is not there or no longer what it was made of.
+    """The folder of a clip, rendered if missing or outdated.
 
     Args:
         name: One of `bench_names`.
-        cache: Where clips are kept.
+        cache: Folder for clips.
 
     Returns:
         A mission folder.
@@ -132,7 +132,7 @@ def rendered(name: str, cache: Path) -> Path:
         if folder.exists():
             shutil.rmtree(folder)
         write_mission(shipped_scenario(f"bench/{name}"), folder)
-        # Last of all: a clip whose rendering was cut short has no mark.
+        # Last, so that a clip whose rendering was interrupted has no mark.
         mark.write_text(recipe, encoding="utf-8")
     except OSError as error:
         raise OutputError(
@@ -142,7 +142,7 @@ def rendered(name: str, cache: Path) -> Path:
 
 
 def _recipe(name: str) -> str:
-    """What a clip is made of: the digest of its scenario and of all code that renders."""
+    """The digest of a scenario and of all rendering code."""
     digest = hashlib.sha256()
     package = resources.files("visup.render")
     rooms = (package / room for room in ("imaging", "meshes", "scenario"))
@@ -156,7 +156,7 @@ def _recipe(name: str) -> str:
 def _scored(
     names: Sequence[str], cache: Path, workers: int
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Clips and their figures as they come."""
+    """Clips and their figures in order of completion."""
     if min(workers, len(names)) == 1:
         yield from ((name, _score(name, cache)) for name in names)
         return
@@ -168,7 +168,7 @@ def _scored(
 
 
 def _alone() -> None:
-    """One thread for each process: the processes share the cores already."""
+    """Limit each process to one thread: the processes share the cores already."""
     import cv2
 
     cv2.setNumThreads(1)

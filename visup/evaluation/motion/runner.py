@@ -1,6 +1,6 @@
-"""`visup eval motion`: segment sequences whose truth is known, and score the regions.
+"""`visup eval motion`: segments sequences with known truth, and scores the regions.
 
-The segmenter sees frames only; masks, boxes and `truth.json` are read by the scoring alone.
+The segmenter sees frames only; masks, boxes and `truth.json` are used only for scoring.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class LabelledSequence:
     """One sequence to score.
 
     Attributes:
-        name: Path below the folder that was named.
-        source: What to open as video.
-        masks: Index of a frame -> its mask; frames without truth have none, and MOT folders none at all.
+        name: Path below the given folder.
+        source: Video source.
+        masks: Index of a frame -> its mask, for frames with truth; empty for MOT folders.
         truth: `truth.json` of a mission, or None.
         boxes: MOT ground truth, or None.
     """
@@ -63,7 +63,7 @@ class LabelledSequence:
 
 @dataclass(slots=True)
 class SequenceMeasurements:
-    """What is gathered over the frames of one sequence."""
+    """Measurements over the frames of one sequence."""
 
     j: list[float] = field(default_factory=list)
     f: list[float] = field(default_factory=list)
@@ -88,18 +88,18 @@ def evaluate_motion(
         folder: Holds sequences (`<seq>/frames` with `<seq>/masks`), missions (`video.mp4`, `masks`,
             `truth.json`), MOT folders (`img1`, `gt`), or is one of these.
         every: Use every n-th frame only.
-        limit: Most frames of each sequence, or None for all.
+        limit: Maximum frames of each sequence, or None for all.
         progress: Shows what is being done.
 
     Returns:
-        `total` and `items` by name, with the keys J, F, f_measure (of pixels, as CDnet has it), J_object,
-        ghost, id_switches, mota, idf1, ms and ratio; a key is absent where there is no such truth. A
+        `total` and `items` by name, with the keys J, F, f_measure (of pixels, as in CDnet), J_object,
+        ghost, id_switches, mota, idf1, ms and ratio; a key is absent without such truth. A
         mission's item also has `objects`: J and id switches of each.
 
     Raises:
         SettingsError: There is nothing to score below the folder.
         SourceError: A sequence cannot be read.
-        ExtraMissingError: MOT folders are to be scored and `motmetrics` is not installed.
+        ExtraMissingError: There are MOT folders and `motmetrics` is not installed.
     """
     items: dict[str, dict[str, Any]] = {}
     for sequence in find_sequences(folder):
@@ -119,11 +119,11 @@ def score_sequence(
     """The figures of one sequence.
 
     Args:
-        sequence: What to segment and compare with.
+        sequence: The sequence.
         every: Use every n-th frame only.
-        limit: Most frames, before a variant leaves out some, or None for all.
-        settings: Of the segmenter; the defaults when None.
-        variant: How it is shown.
+        limit: Maximum frames before a variant leaves out some, or None for all.
+        settings: Settings of the segmenter; None for the defaults.
+        variant: The variant.
 
     Returns:
         As an item of `evaluate_motion`.
@@ -167,12 +167,12 @@ def find_sequences(folder: Path) -> list[LabelledSequence]:
 def labelled_frames(
     sequence: LabelledSequence, variant: Variant, limit: int | None = None
 ) -> Iterator[tuple[Frame, NDArray[np.uint8] | None]]:
-    """The frames of a sequence as a variant shows them, each with its mask, or None where it has none.
+    """The frames of a sequence under a variant, each with its mask or None.
 
     Args:
         sequence: Frames and masks.
-        variant: How it is shown.
-        limit: Most frames, before the variant leaves out some, or None for all.
+        variant: The variant.
+        limit: Maximum frames before the variant leaves out some, or None for all.
     """
     limit = None if limit is None else max(1, limit // variant.every)
     for frame, _ in _frames(sequence, variant.every, limit):
@@ -189,7 +189,7 @@ def _run(
     segmenter: MotionSegmenter,
     variant: Variant,
 ) -> SequenceMeasurements:
-    """Segment one sequence and gather what its scores need."""
+    """Segment one sequence and collect the measurements."""
     tally = SequenceMeasurements()
     names = _truth(sequence).get("labels", {})
     dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
@@ -219,7 +219,7 @@ def _run(
 def _frames(
     sequence: LabelledSequence, every: int, limit: int | None
 ) -> Iterator[tuple[Frame, bool]]:
-    """Frames, each with whether it is the last."""
+    """Frames with a flag for the last."""
     with open_source(str(sequence.source), every=every) as source:
         waiting: Frame | None = None
         for count, frame in enumerate(source):
@@ -259,7 +259,7 @@ def _tally_masks(
     *,
     inner: bool,
 ) -> None:
-    """J and F of a frame that is neither first nor last, the pixels of any, and whether it shows a ghost."""
+    """Add pixel counts and ghosts of a frame, and J and F unless it is the first or last."""
     scored = labels != UNSCORED
     true = (labels > 0) & scored
     seen = np.zeros(labels.shape, dtype=bool)
@@ -273,7 +273,7 @@ def _tally_masks(
         tally.j.append(j)
         tally.f.append(boundary_measure(seen & scored, true))
     values = [v for v in np.unique(labels).tolist() if v != 0]
-    # What is not scored may be an object: a region there is no ghost.
+    # Unscored pixels may be objects: a region there is no ghost.
     tally.ghosts.append(has_ghost(masks.values(), [labels == v for v in values]))
 
 
@@ -309,7 +309,7 @@ def _scores(sequence: LabelledSequence, tally: SequenceMeasurements) -> dict[str
 
 
 def _total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Means over the sequences that have a figure; id switches are summed."""
+    """Means over the sequences with a figure; id switches are summed."""
     out: dict[str, Any] = {}
     for key in KEYS:
         values = [item[key] for item in items if key in item]

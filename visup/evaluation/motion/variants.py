@@ -1,4 +1,4 @@
-"""The same footage shown otherwise: what ought to change nothing, and so tells how stable a figure is."""
+"""Variants of the same footage that should not change results, to measure their stability."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from visup.agent import Frame
 
 Image = NDArray[np.uint8]
 
-SMALLER = 0.75  # size of the smaller picture, as a share
-QUALITY = 50  # of JPEG: blocks can be seen, things can still be told
+SMALLER = 0.75  # scale of the smaller image
+QUALITY = 50  # JPEG: with visible blocks, but recognisable objects
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A way to show a video.
+    """A variant of a video.
 
     Attributes:
-        image: What is made of each picture, (H, W, 3) uint8.
-        labels: What is made of its mask, (H, W) uint8, so that it fits.
-        every: One frame in so many is shown.
+        image: Transforms each image, (H, W, 3) uint8.
+        labels: Transforms its mask, (H, W) uint8, accordingly.
+        every: Use every n-th frame.
     """
 
     image: Callable[[Image], Image] = lambda image: image
@@ -32,7 +32,7 @@ class Variant:
     every: int = 1
 
     def shown(self, frame: Frame) -> Frame:
-        """A frame as it is shown."""
+        """The transformed frame."""
         return replace(frame, image=self.image(frame.image))
 
 
@@ -63,4 +63,4 @@ VARIANTS: Mapping[str, Variant] = {
     "smaller": Variant(_smaller(cv2.INTER_AREA), _smaller(cv2.INTER_NEAREST)),
     "compressed": Variant(_compressed),
 }
-"""Ways to show a video, by name; the first is as it is."""
+"""Variants by name; the first is the identity."""

@@ -1,8 +1,7 @@
-"""Relations of plain boxes, frame after frame: RCC-8, QTC, direction, distance and approach.
+"""Relations of plain boxes over frames: RCC-8, QTC, direction, distance and approach.
 
-For whoever has boxes and no agent: `watch_boxes` takes the boxes of one frame and what was believed
-so far, and gives what is believed now. It is the same judgement, with the same noise thresholds, as
-an agent makes of its objects, whose motion is measured on outlines instead.
+For users without an agent: `watch_boxes` updates the beliefs with the boxes of one frame. The evaluation and
+its noise thresholds are those of an agent, which measures motion on outlines instead.
 
 >>> kept = Boxes()
 >>> for t in range(75):
@@ -45,17 +44,18 @@ APPROACH_NAMES = ("converging", "keeping_distance", "diverging")
 
 @dataclass(frozen=True, slots=True)
 class BoxSettings:
-    """How boxes are watched.
+    """Settings of `watch_boxes`.
 
     Attributes:
         judge: Thresholds.
-        diagonal: Image diagonal, pixels, that lengths in `judge` are shares of.
-        window_s: Length of the window over which lines are fitted.
-        samples: Most samples kept in the window.
-        bins: Most means of neighbouring samples to which lines are fitted.
-        fit_share: How much of a fit's own deviation counts where it exceeds what `noise_px` makes:
-            from so few means it is known to a third or so only. With 5 sigmas to enter, a trend
-            must exceed 5 deviations of the noise and 3 of its own fit.
+        diagonal: Image diagonal, pixels, unit of lengths in `judge`.
+        window_s: Length of the window for line fits, seconds.
+        samples: Maximum samples in the window.
+        bins: Maximum number of means of neighbouring samples for a line fit.
+        fit_share: Weight of a fit's own deviation where it exceeds that of `noise_px`, since from so few
+            means
+            it is known only to about a third. With 5 sigmas to enter, a trend must exceed 5 deviations of the
+            noise and 3 of its own fit.
     """
 
     judge: ThresholdSettings = field(default_factory=ThresholdSettings)
@@ -68,14 +68,14 @@ class BoxSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boxes:
-    """What is believed of boxes, and what it is judged by; immutable.
+    """The beliefs about boxes; immutable.
 
     Attributes:
         ids: (M,) increasing.
         time: Seconds of the last frame.
         times: Seconds of the samples.
-        samples: One row for each: gaps of the P pairs, then x and y of the M centres, pixels.
-        smooth: (M, 4) the boxes, smoothed; what states are judged by.
+        samples: One row each: gaps of the P pairs, then x and y of the M centres, pixels.
+        smooth: (M, 4) the smoothed boxes, from which states are derived.
         latch: (JUDGED + 1, P) states; the last row is the approach.
         gap: (P,) pixels, negative the depth of overlap.
         rate: (P,) approach rate: trend of the gap, pixels per second, negative when closing.
@@ -100,7 +100,7 @@ class Boxes:
         return from_signs(self.latch.state[ORDER])
 
     def rcc8_of(self, a: int, b: int) -> str | None:
-        """What a is to b in RCC-8, or None while unknown."""
+        """The RCC-8 relation of a to b, or None while unknown."""
         k, turned = self._pair(a, b)
         code = int(self.rcc8[k])
         return _name(RCC8, CONVERSE[code] if turned else code)
@@ -115,7 +115,7 @@ class Boxes:
         return text(*codes)
 
     def direction_of(self, a: int, b: int) -> str | None:
-        """Where a lies as seen from b, or None while unknown."""
+        """The direction of a as seen from b, or None while unknown."""
         k, turned = self._pair(a, b)
         code = int(self.latch.state[DIRECTION, k])
         return _name(DIRECTION_NAMES, DIRECTION_CONVERSE[code] if turned else code)
@@ -141,17 +141,17 @@ def watch_boxes(
     now: float,
     settings: BoxSettings | None = None,
 ) -> Boxes:
-    """One frame.
+    """Update the beliefs with one frame.
 
     Args:
-        before: What was believed so far; `Boxes()` to begin with.
-        ids: (M,) whose boxes these are, increasing.
-        boxes: (M, 4) float: x, y, width, height, pixels; NaN for what is known but not seen now.
+        before: The previous beliefs; `Boxes()` at first.
+        ids: (M,) ids of the boxes, increasing.
+        boxes: (M, 4) float: x, y, width, height, pixels; NaN for known but invisible objects.
         now: Seconds.
-        settings: How boxes are watched; for an image of 640 x 480 when left out.
+        settings: Settings; by default for an image of 640 x 480.
 
     Returns:
-        What is believed now.
+        The new beliefs.
     """
     s = settings or DEFAULT
     kept = before if ids == before.ids else _other(before, ids, now)
@@ -163,7 +163,7 @@ def watch_boxes(
     times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
     seconds = np.array(times)
     slope, sigma = _fit(seconds, np.stack(samples), s)
-    # What the noise of edges makes of a trend of one coordinate, and of a gap between two edges.
+    # Deviation of a trend due to edge noise, for one coordinate and for a gap between two edges.
     noise = slope_noise(seconds, s.judge.noise_px)
     velocity = slope[p:].reshape(2, m).T.copy()
     spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
@@ -188,7 +188,7 @@ def _lasts(judge: ThresholdSettings) -> Floats:
 def _window(
     kept: Boxes, row: Floats, now: float, s: BoxSettings
 ) -> tuple[tuple[float, ...], tuple[Floats, ...]]:
-    """Samples of the window with this one; those that come sooner than needed are left out."""
+    """Samples of the window including this one; samples that follow too closely are skipped."""
     begin = next(
         (k for k, t in enumerate(kept.times) if t > now - s.window_s - 1e-6), len(kept.times)
     )
@@ -207,7 +207,7 @@ def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats
 
 
 def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
-    """The same of other objects: what is new has no samples and no states."""
+    """The beliefs realigned to other objects; new ones have no samples and no states."""
     rows, numbers = reindexing(before.ids, ids)
     p, m = len(before.gap), len(before.ids)
     at = np.concatenate(

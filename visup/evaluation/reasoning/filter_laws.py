@@ -1,8 +1,8 @@
-"""The law of the layer that reads phases off what was seen.
+"""Measures the approximation error of the task filter of supervision.
 
-The task filter of supervision merges hypotheses that stand at the same node, although their monitors
-may differ, and follows a few of them. The certified posterior is that of the same model and the same
-evidence with each history followed by itself (`tests/oracles/unmerged_filter.py`).
+The filter merges hypotheses at the same node, although their monitors may differ, and keeps only a few. The
+reference posterior uses the same model and evidence without merging histories
+(`tests/oracles/unmerged_filter.py`).
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ recognition_tasks = oracle("recognition_tasks")
 unmerged_filter = oracle("unmerged_filter").unmerged_filter
 
 BOUND = 0.01
-"""So far the probability of a stage may be from the certified one on observations of a mission."""
+"""Maximum difference of stage probabilities from the reference on observations of a mission."""
 DRAWN_BOUND = 0.05
-"""The same on average for random grammars with observations that follow no course."""
+"""Maximum mean difference for random grammars with random observations."""
 STEPS = 40
 FRAME_S = 0.2
-SPELL_S = (0.4, 4.0)  # for so long one thing is seen of an action, at least and at most
+SPELL_S = (0.4, 4.0)  # range of the duration of one observed status of an action
 
 Recorded = Sequence[tuple[float, Observe]]
-"""Times in seconds, and what was seen of steps then."""
+"""Times in seconds, and observations of steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class FilterDistance:
-    """How far two posteriors of stages are from each other over time.
+    """The distance of two stage posteriors over time.
 
     Attributes:
         worst: Greatest difference of the probabilities of a stage.
         mean: Mean over steps of the greatest difference.
-        lost: What the certified filter dropped at most.
+        lost: Upper bound of the mass dropped by the reference filter.
     """
 
     worst: float
@@ -55,10 +55,10 @@ class FilterDistance:
 
 
 def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> FilterDistance:
-    """How far supervision is from the posterior with each history by itself.
+    """The distance of supervision from the reference posterior.
 
     Args:
-        model: The task as it is supervised.
+        model: The supervised task.
         recorded: Times and observations, the first where the task begins.
     """
     certified: TaskFilter[int, TaskHypothesis, Observe] = unmerged_filter(model)
@@ -73,12 +73,12 @@ def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> FilterD
 
 
 def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """The greatest difference of the probabilities of a stage, the end among them."""
+    """The greatest difference of stage probabilities, including the end."""
     return max(abs(one.get(k, 0.0) - other.get(k, 0.0)) for k in {*one, *other})
 
 
 def drawn_distance(seed: int) -> FilterDistance:
-    """How far supervision is from certified on a random grammar with observations of no course."""
+    """The distance of supervision from the reference on a random grammar with random observations."""
     rng = random.Random(seed)
     task = read(recognition_tasks.text_of(recognition_tasks.Draw(rng).rules()))
     keys = recognition_tasks.KEYS
@@ -90,11 +90,11 @@ def drawn_distance(seed: int) -> FilterDistance:
 
 
 Spells = Sequence[tuple[float, ActionStatus]]
-"""Since when each thing is seen of an action, seconds."""
+"""Start times of the observed statuses of an action, seconds."""
 
 
 def drawn_spells(rng: random.Random) -> Spells:
-    """What is seen of an action over time, one thing after the other."""
+    """A random sequence of observed statuses of an action."""
     found, now = [], 0.0
     while now < FRAME_S * STEPS:
         found.append((now, rng.choice(tuple(ActionStatus))))

@@ -1,7 +1,7 @@
-"""`visup eval reasoning`: rules and tasks on percepts made from the truth of missions.
+"""`visup eval reasoning`: rules and tasks on percepts simulated from the truth of missions.
 
-Seeing is left out, so that what is measured is reasoning alone: from percepts as wrong as told
-(`PerceptNoise`), who is who, what happened, how the task stands.
+Perception is replaced by simulation with known noise (`PerceptNoise`), to evaluate reasoning alone:
+identities, events, and the state of the task.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from visup.tasks import load_task
 from visup.tasks.supervision.supervise import task_reasoner
 
 SPIN_SPAN_S = 5.0
-"""Spin is scored over the last seconds of a mission."""
+"""Rotation is scored over this time at the end of a mission, seconds."""
 
 
 @dataclass(slots=True)
 class BeliefScorer:
-    """Takes down what is believed of one mission, frame by frame.
+    """Scores the beliefs about one mission, frame by frame.
 
     Attributes:
-        mission: With its truth.
-        truths: What truly happens.
+        mission: The mission with its truth.
+        truths: The parsed truth.
         who: Region id -> names of true objects.
-        said: Events, alerts, stages.
-        right: Object-frames with the right name, and
-        scored: all of them.
-        calibration: How sure it was, and whether rightly.
+        said: Recorded events, alerts, stages.
+        right: Number of object-frames with the correct name.
+        scored: Number of all scored object-frames.
+        calibration: Confidences with correctness.
         shows: (object, true name) -> frames in which its region showed that.
-        spins: (time, degrees per second) believed of each true object.
-        wrong: Frames at which a true object had not its name: (time, object, what was believed).
+        spins: (time, degrees per second) believed for each true object.
+        wrong: Frames with a wrong name: (time, object, belief).
     """
 
     mission: Mission
@@ -66,7 +66,7 @@ class BeliefScorer:
     wrong: list[tuple[float, str, str]] = field(default_factory=list)
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        """Take down one step; the agent calls it."""
+        """Add one step; an observer."""
         self.said(step, frame)
         for known in step.mind.objects.values():
             names = self.who.get(known.region.id, ())
@@ -89,19 +89,19 @@ class BeliefScorer:
                     self.spins.setdefault(name, []).append(spin)
 
     def names(self) -> dict[int, str]:
-        """Believed object's id -> the true object that it showed most often."""
+        """Id of a believed object -> true object that it showed most often."""
         ranked = sorted(self.shows.items(), key=lambda item: (item[1], item[0]))
         return {number: name for (number, name), _ in ranked}
 
     def _together(self, name: str, time: float) -> frozenset[str]:
-        """The true objects that are one body with this one now."""
+        """The true objects coupled to this one now, including itself."""
         for event in self.truths.events:
             if event.kind == "coupled" and name in event.objects and time >= event.time:
                 return event.objects
         return frozenset({name})
 
     def _scored(self, step: Step) -> Iterator[tuple[str, list[list[TrueMask]]]]:
-        """Objects that are scored in this frame, with the masks by which one may be covered."""
+        """The scored objects of this frame, with the masks that may match them."""
         here = self.mission.masks[step.frame_index]
         for name, mask in here.items():
             entered = [
@@ -115,14 +115,14 @@ class BeliefScorer:
 
 
 def covering(mind: Mind, masks: Sequence[Sequence[TrueMask]]) -> ObjectBelief | None:
-    """The object that is believed to be where a true one is.
+    """The believed object at the position of a true one.
 
     Args:
-        mind: The mind; objects out of sight count where they are believed to be.
-        masks: Of the true object; and of all that is one body with it.
+        mind: The mind; hidden objects count at their believed positions.
+        masks: Masks of the true object, and of all objects coupled to it.
 
     Returns:
-        The belief whose region lies best upon one of these, or None when none does by half.
+        The belief with the best IoU with one of these, or None if below 0.5.
     """
     scored = [
         (max(_iou(b, parts) for parts in masks), -b.id, b)
@@ -150,7 +150,7 @@ def _iou(belief: ObjectBelief, parts: Sequence[TrueMask]) -> float:
 
 
 def watch_mission(mission: Mission, noise: PerceptNoise, *, every: int = 1) -> BeliefScorer:
-    """Supervise one mission on percepts made from its truth."""
+    """Supervise one mission on simulated percepts."""
     behaviours, who = behaviours_of(mission, noise)
     watch = BeliefScorer(mission, parse_truth(mission.truth, mission.fps), who)
     rules = default_reasoners()
@@ -189,9 +189,9 @@ def run_scores(watch: BeliefScorer) -> dict[str, Any]:
 
 
 def _spin_errors(watch: BeliefScorer) -> list[float]:
-    """Relative error of the satellite's spin at the end of a mission, where it is believed.
+    """Relative errors of the satellite's believed rotation rate at the end of a mission.
 
-    What it is compared with is how the satellite truly turns then: what was caught turns as it is carried.
+    The reference is its true rotation then: a captured satellite turns with its carrier.
     """
     end = watch.said.last.time if watch.said.last else 0.0
     late = [(t, r) for t, r in watch.spins.get("satellite", []) if t > end - SPIN_SPAN_S]
@@ -217,15 +217,15 @@ def evaluate_reasoning(
     noise: PerceptNoise | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Figures over all missions below a folder, each seen with the noise of several seeds.
+    """Figures over all missions below a folder, each simulated with several noise seeds.
 
     Args:
         folder: A mission, or a folder of missions.
-        seeds: How many runs of each mission.
+        seeds: Number of runs of each mission.
         first: The first seed.
         every: Use every n-th frame.
-        jobs: Processes.
-        noise: How wrong percepts are; its seed is not used.
+        jobs: Number of processes.
+        noise: Noise of percepts; its seed is not used.
         progress: Shows what is being done.
 
     Returns:
@@ -237,7 +237,7 @@ def evaluate_reasoning(
     missions = mission_folders(folder)
     noise = noise or PerceptNoise()
     run = partial(_mission, every=every, noise=noise)
-    # No two runs share their chance.
+    # Each run has its own random seed.
     chances = [
         [seed * len(missions) + k for seed in range(first, first + seeds)]
         for k in range(len(missions))
@@ -261,7 +261,7 @@ def _mission(
 
 
 def _summed(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Figures of several runs as one: counts are added up."""
+    """Figures of several runs from summed counts."""
     total = mission_total([{k: v for k, v in r.items() if v is not None} for r in runs])
     calibration = Calibration()
     for run in runs:

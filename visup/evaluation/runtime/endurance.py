@@ -1,7 +1,7 @@
-"""Reasoning for a very long time: time of a step, memory that stays flat, minds that are kept.
+"""Very long reasoning: time of a step, bounded memory, size of stored minds.
 
-Scripted percepts without pictures: boxes that drift, meet, flicker, go over the border and come back
-under other ids, called by names that change. What is measured is the reasoners of rules/ alone.
+Scripted percepts without images: boxes that drift, meet, flicker, cross the border and return under other ids
+and names. Only the reasoners of rules/ are measured.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from visup.evaluation.runtime.scripted_observations import FPS, drifting_boxes
 from visup.rules.reasoners import default_reasoners
 
 SETTLED = 10_000
-"""Frames after which memory is to stay as it is."""
+"""Frames after which memory must not grow."""
 
 KEPT = 10_000
-"""Minds that are kept to learn what one takes."""
+"""Number of stored minds to measure the size of one."""
 
 
 def evaluate_endurance(
     frames: int, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
-    """Run a script with three objects for so many frames, and one with ten for a tenth of them.
+    """Run a script with three objects for some frames, and one with ten for a tenth of them.
 
     Args:
-        frames: How many.
-        seed: Of the script.
+        frames: Number of frames.
+        seed: Random seed.
         progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {}}: `ms` and `ms_ten` (median per step), `rss_mb` at the end and
-        `grown` (share by which it grew since frame 10,000 or the middle, whichever is earlier), and
-        `snapshot_kb` of one of 10,000 minds kept in a row.
+        `grown` (relative growth since frame 10,000 or the middle, whichever is earlier), and
+        `snapshot_kb` per mind of 10,000 consecutive ones.
     """
     settled = min(SETTLED, frames // 2)
     at_rest, last = 0.0, Mind()
@@ -72,7 +72,7 @@ def evaluate_endurance(
 
 
 def _thought(count: int, frames: int, seed: int, mind: Mind) -> Iterator[tuple[float, Mind]]:
-    """Seconds that each step took, and the mind after it."""
+    """Seconds of each step, and the mind after it."""
     rules = default_reasoners()
     reasoners: tuple[Reasoner, ...] = (*rules.update, *rules.cogitate)
     start = mind.time + 1.0 / FPS if mind.frame_index >= 0 else 0.0

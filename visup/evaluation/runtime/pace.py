@@ -1,8 +1,7 @@
-"""How fast an agent reasons: a step without perception, observers, replay, and minds that are kept.
+"""Speed of reasoning: steps without perception, observers, replay, and size of stored minds.
 
-Scripted observations, twenty rules, two tasks, the journal on. Times are processor time of the
-process, and of each figure the median as well as the lowest decile is told: what else a busy machine
-does makes steps slower, never faster.
+Scripted observations, twenty rules, two tasks, with journal. Times are processor time; the median and the
+lowest decile are reported, since other load makes steps slower, never faster.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ COUNTS = (3, 10)
 TASKS = ("dock", "inspect")
 LEAST_STEPS = 300
 WARM = 100
-"""Steps at the beginning that are not measured, while objects enter and windows fill."""
+"""Warm-up steps that are not measured, while objects enter and windows fill."""
 
 RULES = """
 rule near(a, b): info
@@ -72,7 +71,7 @@ rule was_apart(a, b): info
     when touching(a, b) since disconnected(a, b) within 20 s
     say "{a} came to {b}."
 """
-"""Of most operators one; with the nine that ship they are twenty."""
+"""One for most operators; with the nine shipped rules they are twenty."""
 
 
 def evaluate_pace(
@@ -81,19 +80,19 @@ def evaluate_pace(
     """Measure the pace of reasoning.
 
     Args:
-        steps: Of each script.
-        kept: Minds that are kept in a row.
+        steps: Steps of each script.
+        kept: Number of consecutive minds to store.
         progress: Shows what is being done.
 
     Returns:
         `items` for '3 objects' and '10 objects' with `ms` and `ms_low` (median and lowest decile of
         the processor time of a step with its journal), `think_ms` (median without the journal) and
-        `alerts` (open on average); `total` with `observers` (share by which a file and a webhook that
-        answers nobody lengthen a step), `replay_fps` (frames per second of processor time) and
-        `mind_kb` (resident memory of a kept mind, with the regions that it holds).
+        `alerts` (open on average); `total` with `observers` (relative cost of a file and an
+        unreachable webhook), `replay_fps` (frames per second of processor time) and
+        `mind_kb` (resident memory of a stored mind with its regions).
 
     Raises:
-        SettingsError: Too few steps to say anything.
+        SettingsError: There are too few steps.
     """
     if steps < LEAST_STEPS:
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
@@ -122,7 +121,7 @@ def _settings(place: Path) -> WatchSettings:
 
 
 def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> dict[str, float]:
-    """Cost of steps and of writing them down; the journal is left in the folder."""
+    """Cost of steps and of recording them; the journal is left in the folder."""
     folder.mkdir()
     journal = Journal(folder / JOURNAL)
     journal.note(settings=to_jsonable(settings))
@@ -146,7 +145,7 @@ def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> 
 
 
 def _replay_fps(folder: Path) -> float:
-    """Replay with one task and the rules that ship, as of a recorded mission."""
+    """Replay speed with one task and the shipped rules."""
     recording = Recording.open(folder)
     settings = replace(settings_for(recording, tasks=TASKS[:1]), rules=())
     begin = time.process_time()
@@ -155,7 +154,7 @@ def _replay_fps(folder: Path) -> float:
 
 
 def _observers(settings: WatchSettings, place: Path) -> float:
-    """Time of the cycle's own thread in observers, as a share of that of reasoning."""
+    """Time of the cycle's thread in observers, relative to that of reasoning."""
     sinks = Sinks([f"file:{place}", "webhook:http://127.0.0.1:9/"], "scripted")
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     agent = reasoning_agent(settings)

@@ -1,7 +1,7 @@
-"""Kills runs at random moments, goes on with them, and compares them with an unbroken one.
+"""Kills runs at random moments, resumes them, and compares them with an uninterrupted one.
 
-Each run is a process of its own that gets SIGKILL, so that nothing is tidied up. A quarter of the resumed
-runs are killed again; a third keep no states and look at all frames again.
+Each run is a separate process that gets SIGKILL, without cleanup. A quarter of the resumed runs are killed
+again; a third save no states and process all frames again.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ def evaluate_resume(
     """Kill runs and resume them.
 
     Args:
-        settings: What is watched; a synthetic clip of two squares that cross when left out.
-        kills: How many runs are killed.
-        seed: Of the moments.
-        state_every_s: Seconds between states, in the runs that keep them.
+        settings: Settings of the run; by default a synthetic clip of two crossing squares.
+        kills: Number of runs to kill.
+        seed: Random seed.
+        state_every_s: Seconds between states, in runs that save them.
         progress: Shows what is being done.
 
     Returns:
@@ -87,7 +87,7 @@ def evaluate_resume(
 
 
 def crossing(path: Path, seed: int) -> Path:
-    """A short clip of two textured squares that cross a textured ground, with sensor noise."""
+    """A short clip of two textured squares crossing a textured background, with sensor noise."""
     import cv2
 
     rng = np.random.default_rng(seed)
@@ -121,7 +121,7 @@ class _ResumeCounts:
 
 @dataclass(frozen=True, slots=True)
 class _UnbrokenRun:
-    """The run that killed ones are compared with: its settings, how long it took, its outcome."""
+    """The uninterrupted reference run: its settings, duration and outcome."""
 
     settings: WatchSettings
     seconds: float
@@ -142,7 +142,7 @@ def _trial(
     rng: np.random.Generator,
     counts: _ResumeCounts,
 ) -> Sequence[str]:
-    """Kill one run and go on with it to its end; what is wrong with it."""
+    """Kill one run and resume it to its end; returns the differences."""
     counts.kills += 1
     _kill(_begin(unbroken.settings, folder, every), float(rng.uniform(0.0, unbroken.seconds)))
     try:
@@ -173,7 +173,7 @@ def _trial(
 
 
 def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
-    """A process that begins a run; it has begun to record."""
+    """Start a run in a process; returns after recording has begun."""
     folder.mkdir()
     child = _forked(folder, lambda console: _supervise(settings, folder, every, console, False))
     until = time.monotonic() + LONGEST_START_S
@@ -183,7 +183,7 @@ def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
 
 
 def _resume(folder: Path, every: float) -> int | None:
-    """A process that goes on with a run, or None when the run is over."""
+    """Resume a run in a process, or return None if the run has ended."""
     try:
         past = interrupted_run(folder)
     except OutputError:
@@ -201,7 +201,7 @@ def _supervise(
 
 
 def _forked(folder: Path, run: Callable[[Console], None]) -> int:
-    """Run in a child whose standard output goes to a file; its process id."""
+    """Run a function in a child process with redirected output; returns its process id."""
     child = os.fork()
     if child:
         return child
@@ -233,7 +233,7 @@ def _wait(child: int) -> None:
 
 
 def _printed(folder: Path) -> list[str]:
-    """Events that were printed whole."""
+    """Completely printed events."""
     path = folder / "printed"
     lines = path.read_text().split("\n")[:-1] if path.exists() else []
     return [event_text(json.loads(line)) for line in lines]
@@ -245,7 +245,7 @@ def _missing(folder: Path) -> int:
 
 
 def _outcome(folder: Path) -> object:
-    """Events, verdict, alerts, and what was seen and believed at each frame."""
+    """Events, verdict, alerts, and observations and beliefs at each frame."""
     recording = Recording.open(folder / JOURNAL)
     facts = recording.facts()
     return (

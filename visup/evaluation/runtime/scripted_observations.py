@@ -1,7 +1,7 @@
-"""Scripted observations without images, for runs as long as one likes.
+"""Scripted observations without images, for runs of any length.
 
-`drifting_boxes` drift, meet, flicker, cross the image border and come back under other ids;
-`moving_ellipses` move to and fro, meet and part, each with its hypotheses and depth.
+`drifting_boxes` drift, meet, flicker, cross the image border and return under other ids; `moving_ellipses`
+oscillate, meet and separate, with hypotheses and depth.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ def drifting_boxes(count: int, frames: int, seed: int, start: float = 0.0) -> It
     """Observations of boxes that come and go.
 
     Args:
-        count: How many boxes there are; each in turn is out of the image for a while.
-        frames: How many observations.
-        seed: Of flicker, jitter and names.
-        start: Seconds of the first one.
+        count: Number of boxes; each in turn is out of the image for a while.
+        frames: Number of observations.
+        seed: Random seed.
+        start: Time of the first one, seconds.
     """
     rng = np.random.default_rng(seed)
     masks = [np.ones((40 + 4 * k, 60 + 6 * k), dtype=bool) for k in range(count)]
@@ -88,12 +88,12 @@ def _box_observation(
 
 
 def moving_ellipses(count: int, begin: int = 0, ahead_s: float = 0.0) -> Iterator[Observation]:
-    """What would be perceived of three ellipses that move to and fro, meet and part.
+    """Observations of three ellipses that oscillate, meet and separate.
 
     Args:
-        count: Frames.
-        begin: Number of the first.
-        ahead_s: By how much the scene is further on than its clock, seconds.
+        count: Number of frames.
+        begin: Number of the first frame.
+        ahead_s: Offset of the scene relative to its clock, seconds.
     """
     shapes = [_ellipse(20 + 6 * k, 14 + 4 * k) for k in range(ELLIPSES)]
     for index in range(begin, begin + count):

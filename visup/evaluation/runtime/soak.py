@@ -1,7 +1,7 @@
-"""A run of hours without a camera: scripted percepts, all reasoning, the journal on.
+"""A soak test without a camera: scripted percepts, all reasoning, with journal.
 
-What must stay flat is measured at the beginning and at the end: processor time of a step, and memory. The
-same percepts again must tell the same events, and sinks must cost the cycle next to nothing.
+Processor time of a step and memory are measured at the beginning and at the end and must not grow. The same
+percepts must give the same events, and sinks must cost the cycle almost nothing.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from visup.sinks import Sinks
 
 LEAST_FRAMES = 2000
 LIMITS = JournalLimits(segment_bytes=32 * 2**20, keep_bytes=128 * 2**20)
-PAIRS = 12  # blocks with and without sinks, in turn
+PAIRS = 12  # alternating blocks with and without sinks
 
 
 def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict
         nobody, by that without).
 
     Raises:
-        SettingsError: Too few frames to say anything.
+        SettingsError: There are too few frames.
     """
     if frames < LEAST_FRAMES:
         raise SettingsError(f"--frames is {frames}", expected=f"at least {LEAST_FRAMES}")
@@ -100,7 +100,7 @@ def _journal(folder: Path, limits: JournalLimits | None = None) -> Journal:
 def _long(
     folder: Path, frames: int, progress: Progress
 ) -> tuple[list[float], list[float], list[float]]:
-    """Costs of the steps of a long run, of a fresh run beside its last tenth, and memory."""
+    """Costs of the steps of a long run, of a fresh run during its last tenth, and memory."""
     long, fresh = _JournaledAgent(folder, LIMITS), None
     last_tenth = frames - frames // 10
     memory: list[float] = []
@@ -122,7 +122,7 @@ def _long(
 
 
 class _JournaledAgent:
-    """An agent with its journal, and what its steps cost, in milliseconds of processor time."""
+    """An agent with its journal, and the costs of its steps, milliseconds of processor time."""
 
     def __init__(self, folder: Path, limits: JournalLimits) -> None:
         folder.mkdir(exist_ok=True)
@@ -167,14 +167,14 @@ def _bytes_each(frames: int) -> float:
 
 
 def sinks_ratio(place: Path, frames: int, also: tuple[str, ...] = ()) -> float:
-    """Processor time of the cycle's own thread for a step with observers, by that without.
+    """Processor time of the cycle's thread for a step with observers, relative to that without.
 
     Args:
         place: A folder for their files.
-        frames: In all.
-        also: Sinks besides, as of `--sink`.
+        frames: Total number of frames.
+        also: Further sinks, as in `--sink`.
 
-    Short blocks with and without take turns, so that what else the machine does meets both alike.
+    Short blocks with and without alternate, so that other load affects both alike.
     """
     wanted = [f"file:{place / 'alerts.jsonl'}", "webhook:http://127.0.0.1:9/", *also]
     sinks = Sinks(wanted, "scripted")

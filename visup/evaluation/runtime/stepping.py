@@ -1,7 +1,7 @@
-"""`visup eval stepping`: what going back costs, what is kept for it, and whether it leads to the same.
+"""`visup eval stepping`: cost, memory and correctness of stepping back.
 
-Three ellipses that move, meet and part, all reasoning, one task. Every region owns its mask
-and outline, as regions that were seen do.
+Three ellipses that move, meet and separate, all reasoning, one task. Every region has its own mask and
+outline, like perceived regions.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ BACK_MS = 200.0
 KEPT_MB = 200.0
 KEPT_STEPS = 10_000
 LEAST_STEPS = 1000
-BLOCK = 50  # steps made in turn with and without a stepper
+BLOCK = 50  # steps made alternately with and without a stepper
 BLOCKS = 12
 VISITS = 30
 WARM = 100
-EVERY = 50  # steps between those whose digests are compared
+EVERY = 50  # interval of steps whose digests are compared
 
 
 def evaluate_stepping(
     steps: int = KEPT_STEPS, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
-    """Measure a long course.
+    """Measure a long timeline.
 
     Args:
-        steps: How many are made.
-        seed: Of the places from which one goes back.
+        steps: Number of steps.
+        seed: Random seed of the positions.
         progress: Shows what is being done.
 
     Returns:
@@ -59,7 +59,7 @@ def evaluate_stepping(
         a stepper, by that of the agent alone).
 
     Raises:
-        SettingsError: Too few steps to say anything.
+        SettingsError: There are too few steps.
     """
     if steps < LEAST_STEPS:
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
@@ -81,7 +81,7 @@ def evaluate_stepping(
 
 
 def _stepped(stepper: Stepper, steps: int, progress: Progress) -> tuple[dict[int, bytes], float]:
-    """Digests of every 50th step on the way to the last, and by how much memory grew meanwhile, MB."""
+    """Digests of every 50th step, and growth of memory, MB."""
     digests: dict[int, bytes] = {}
     stepper.step(WARM)
     gc.collect()
@@ -99,7 +99,7 @@ def _stepped(stepper: Stepper, steps: int, progress: Progress) -> tuple[dict[int
 def _visits(
     stepper: Stepper, places: NDArray[np.int64], digests: dict[int, bytes]
 ) -> tuple[dict[str, dict[str, float]], list[bool]]:
-    """Times of going back, looking and branching from these steps; whether the steps after are the same."""
+    """Times of going back, looking and branching from these steps; whether the following steps are equal."""
     back, look, branch, same = [], [], [], []
     for place in map(int, places):
         stepper.go(place)
@@ -134,7 +134,7 @@ def _agent() -> Any:
 
 
 def _own(observation: Observation) -> Observation:
-    """The same with masks and outlines that no other frame shares."""
+    """The same with masks and outlines of its own."""
 
     def owned(value: object) -> object:
         if not isinstance(value, Region):
@@ -149,7 +149,7 @@ def _own(observation: Observation) -> Observation:
 
 
 def _slower() -> float:
-    """Short blocks with and without take turns, so that what else the machine does meets both."""
+    """Short blocks with and without alternate, so that other load affects both."""
     agent, it = _agent(), _stepper((BLOCKS + 1) * BLOCK)
     frames: Iterator[Observation] = (_own(seen) for seen in moving_ellipses((BLOCKS + 1) * BLOCK))
     alone, stepped = [], []
@@ -167,7 +167,7 @@ def _slower() -> float:
 
 
 def _making() -> float:
-    """Processor time that a block of percepts takes to be made, which is not the stepper's."""
+    """Processor time for generating a block of percepts, to be subtracted."""
     taken = []
     for _ in range(5):
         begin = time.process_time()
@@ -178,7 +178,7 @@ def _making() -> float:
 
 
 def whole(mind: Mind) -> Mind:
-    """The same mind without where in memory its samples lie, which is no part of what is believed."""
+    """The same mind with its samples in canonical memory layout, which is no part of the beliefs."""
     kept = mind.recall(RELATIONS)
     return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
 

@@ -1,7 +1,7 @@
-"""Hours of traffic without a camera: lanes of cars come, pass and go; memory and journal must stay flat.
+"""Hours of simulated traffic on several lanes; memory and journal must not grow.
 
-The cars' outlines tremble as those of a segmenter do, since a journal packs what trembles less well. What
-seeing takes is not in it: pictures, tracks and models of the segmenter are bounded by tests of their own.
+The outlines of cars jitter like those of a segmenter, since this affects the compression of the journal.
+Perception is not included: the bounds of its memory have their own tests.
 """
 
 from __future__ import annotations
@@ -41,23 +41,23 @@ LANES = 3
 EVERY_S = 2.9
 """Seconds from car to car in a lane: some 3,700 an hour in all."""
 SPEED = 160.0
-"""Pixels a second; the next lane is a fifth faster."""
+"""Pixels per second; each further lane is a fifth faster."""
 CAR = (72, 40)
 TREMBLE = 12
-"""How many outlines a car has, drawn anew for each frame."""
+"""Number of outlines of a car, of which one is drawn for each frame."""
 BLOCKS = 20
-"""Memory is looked at so often; the median of each half counts."""
+"""Number of memory measurements; the median of each half counts."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrafficCosts:
-    """What a run of traffic cost.
+    """The costs of a run of traffic.
 
     Attributes:
-        memory: Megabytes, from block to block.
-        ms: Milliseconds of processor time for each step, from block to block.
-        journal_mb: Of the whole journal.
-        objects: How many cars have come.
+        memory: Megabytes, by block.
+        ms: Milliseconds of processor time per step, by block.
+        journal_mb: Size of the whole journal.
+        objects: Number of cars.
     """
 
     memory: Sequence[float]
@@ -70,13 +70,13 @@ def evaluate_traffic(hours: float, *, progress: Progress = silent) -> dict[str, 
     """Hours of three lanes of cars at 25 frames a second, with all reasoning and the journal.
 
     Args:
-        hours: Of traffic; it takes about a tenth of that.
+        hours: Hours of traffic; the run takes about a tenth of that.
         progress: Shows what is being done.
 
     Returns:
         `items` for the first and the second half with `ms` of a step and `rss_mb`; `total` with `grown`
-        (resident memory at the end by that at the half, less 1), `journal_mb_per_hour`, `objects_per_hour`,
-        `slower` (time of a step in the last block by that in the second).
+        (resident memory at the end relative to the middle, minus 1), `journal_mb_per_hour`,
+        `objects_per_hour`, `slower` (time of a step in the last block relative to the second).
     """
     with tempfile.TemporaryDirectory() as scratch:
         costs = _run(Path(scratch), int(hours * 3600 * FPS), progress)
@@ -122,7 +122,7 @@ def _present(mind: Mind) -> Iterator[int]:
 
 
 def traffic(frames: int) -> Iterator[Observation]:
-    """What would be perceived of three lanes of cars, each new car with a new number."""
+    """Observations of three lanes of cars, each new car with a new id."""
     rng = np.random.default_rng(0)
     masks = _outlines(rng)
     for index in range(frames):
@@ -138,7 +138,7 @@ Masks = list[NDArray[np.bool_]]
 
 
 def _outlines(rng: np.random.Generator) -> Masks:
-    """Some masks of one car whose edges tremble by a pixel."""
+    """Masks of one car with edges that jitter by a pixel."""
     width, height = CAR
     found = []
     for _ in range(TREMBLE):
@@ -152,7 +152,7 @@ def _outlines(rng: np.random.Generator) -> Masks:
 
 
 def _lane(lane: int, now: float, masks: Masks, rng: np.random.Generator) -> Iterator[Region]:
-    """The cars of a lane that are in the picture, the newest last."""
+    """The visible cars of a lane, the newest last."""
     speed = SPEED * (1 + 0.2 * lane)
     span = (SIZE[0] + CAR[0]) / speed
     first, last = int((now - span) // EVERY_S) + 1, int(now // EVERY_S)

@@ -1,6 +1,6 @@
-"""A service rehearsed: four cameras, everything that goes wrong in a night, and an account of every alert.
+"""Rehearsal of a service: four cameras, injected faults, and an account of every alert.
 
-Read `scene.py` (what is watched), `streams.py` (cameras that stall, drop and send garbage), `receiver.py` (a
-sink that goes down), `night.py` (what goes wrong, and when), `account.py` (what was lost or told twice),
-`costs.py` (what one camera takes), and `rehearsal.py`, which puts them together.
+Read `scene.py` (the scene), `streams.py` (cameras that stall, drop and send garbage), `receiver.py` (a sink
+that goes down), `night.py` (the faults and their timetable), `account.py` (lost and duplicate alerts),
+`costs.py` (load of one camera), and `rehearsal.py`, which combines them.
 """

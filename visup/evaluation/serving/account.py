@@ -1,7 +1,7 @@
-"""Every alert of all journals against every record that a sink took: what was lost, what came twice.
+"""Compares the alerts of all journals with the records received by a sink: losses and duplicates.
 
-A store on a small disk does not keep its runs for long, so that the account looks again and again: what a
-journal said once counts, though the journal be deleted meanwhile.
+A store on a small disk deletes runs soon, so the journals are read repeatedly: an alert once read counts even
+if its journal is deleted later.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from visup.sinks.delivery_log import DELIVERY
 MOST_SHOWN = 50
 
 Opening = tuple[int, float]
-"""Number of the alert, seconds when it opened."""
+"""Number of the alert, and time of opening, seconds."""
 
 Told = tuple[int, float, str]
 """The same with 'opened' or 'closed'."""
@@ -30,16 +30,16 @@ Told = tuple[int, float, str]
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What became of the alerts of one camera.
+    """The account of the alerts of one camera.
 
     Attributes:
-        alerts: That were in its journals.
-        lost: Openings and closings of which no record came.
-        twice: Records that came more than once.
-        resent: Of these, those that were sent again as nobody knew whether they had arrived.
-        unrecorded: Openings and closings that were told and are in no journal.
+        alerts: Number of alerts in its journals.
+        lost: Openings and closings without a received record.
+        twice: Records received more than once.
+        resent: Of these, those with the same delivery id, resent after an unknown outcome.
+        unrecorded: Received openings and closings that are in no journal.
         without_evidence: Alerts that never had a picture and a clip.
-        wrong: Some of what was lost, told twice or is in no journal.
+        wrong: Examples of lost, duplicate or unrecorded ones.
     """
 
     alerts: int
@@ -52,7 +52,7 @@ class Account:
 
 
 class Ledger:
-    """What the journals of a camera have said so far.
+    """The alerts read from the journals of a camera so far.
 
     Args:
         camera: Folder of its runs.
@@ -65,9 +65,9 @@ class Ledger:
         self._seen: dict[Path, float] = {}
 
     def look(self) -> None:
-        """Take note of what is in the store now."""
+        """Read the present content of the store."""
         for journal in sorted(self._camera.glob(f"*/{JOURNAL}")):
-            with suppress(OSError, VisupError):  # it is deleted at this moment, or just begun
+            with suppress(OSError, VisupError):  # just being deleted or begun
                 if journal.stat().st_size and self._is_new(journal, f"{journal}-wal"):
                     self._recorded.update(_recorded(journal.parent))
         for note in self._camera.glob(f"*/{EVIDENCE}/alert-*.json"):
@@ -77,10 +77,10 @@ class Ledger:
                     self._with_evidence.add(_opening(told))
 
     def account(self, taken: Iterable[Mapping[str, Any]]) -> Account:
-        """What became of the alerts of the camera.
+        """The account of the alerts of the camera.
 
         Args:
-            taken: Records that a sink took, of any camera.
+            taken: Records received by a sink, of any camera.
         """
         own = [
             r for r in taken if r.get("record") == "alert" and r.get("camera") == self._camera.name
@@ -106,7 +106,7 @@ class Ledger:
         )
 
     def _is_new(self, path: Path, *others: str) -> bool:
-        """Whether a file was written to since it was last looked at."""
+        """Whether a file was written to since it was last read."""
         when = max(p.stat().st_mtime for p in (path, *map(Path, others)) if p.exists())
         before = self._seen.get(path)
         self._seen[path] = when
@@ -118,7 +118,7 @@ def _opening(record: Mapping[str, Any]) -> Opening:
 
 
 def _recorded(run: Path) -> Iterator[Told]:
-    """What a journal says; an alert that was open when a run was followed is in two."""
+    """The openings and closings in a journal; an alert open across two runs is in both."""
     for alert in Recording.open(run).alerts().values():
         yield (*_opening(alert), "opened")
         if alert["closed"] is not None:

@@ -1,4 +1,4 @@
-"""What one camera takes of a processor: while nothing moves, and while something crosses all the time."""
+"""Processor load of one camera: in an idle scene, and with permanent motion."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from visup.runs.wiring import build_agent
 from visup.serving.site.form import CameraTable
 
 NOISE = 2.0
-"""Of each pixel, levels: that of a camera in a lit room."""
+"""Noise of each pixel, grey levels: that of a camera in a lit room."""
 
 SETTLE_S = 12.0
-"""Until nothing is new any more, seconds of the source."""
+"""Warm-up until the scene is known, seconds of the source."""
 
 WATCHED_S, BUSY_S = 60.0, 6.0
-"""Seconds of the source that are measured: where it rests, and where each frame is looked at."""
+"""Measured time, seconds of the source: idle, and busy."""
 
 
 def camera_costs(seed: int = 0) -> dict[str, float]:
-    """Shares of a processor that one camera takes, 640x480 pixels at 5 frames a second.
+    """Processor shares of one camera, 640x480 pixels at 5 frames per second.
 
-    Of each frame what is done is what the service does where there are as many cameras as cores, but for
-    decoding and the journal; time is that of the processor, so that other work on the machine counts little.
+    Frames are processed as by the service with as many cameras as cores, without decoding and journal;
+    processor time is measured, which depends little on other load.
 
     Args:
-        seed: Of the scene and the noise.
+        seed: Random seed.
 
     Returns:
         `idle_cpu`, `idle_cpu_without_rest`, `busy_cpu`.
@@ -51,7 +51,7 @@ def camera_costs(seed: int = 0) -> dict[str, float]:
 def _share(
     pictures: list[NDArray[np.uint8]], rest_s: float | None, watched_s: float, seed: int
 ) -> float:
-    """Seconds of a processor for a second of the source."""
+    """Processor seconds per second of the source."""
     agent = build_agent(WatchSettings(source="scene", rest_s=rest_s), live=True)
     ring, encoded = FrameRing(8.0, 2**25), FrameEncoder()
     noise = _noise(pictures[0].shape, seed)

@@ -1,4 +1,4 @@
-"""What goes wrong in a night, and when: kills, a file read again, a sink that is down, a full disk."""
+"""Injects faults by a timetable: kills, reloads, an unavailable sink, a full disk."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 SMALL_DISK = 4e9
-"""Bytes; only a disk that is no larger is filled."""
+"""Largest disk that may be filled, bytes."""
 
 PIECE = b"\0" * 2**20
 
 
 def pid_of(store: Path, camera: str) -> int:
-    """The process that has a journal of a camera open; 0 when there is none (Linux)."""
+    """Id of the process that has a journal of a camera open, or 0 (Linux)."""
     for folder in Path("/proc").glob("[0-9]*/fd"):
         with suppress(OSError):
             if any(f"{store}/{camera}/2" in str(fd.readlink()) for fd in folder.iterdir()):
@@ -32,11 +32,11 @@ class Kill:
     """A process that was killed.
 
     Attributes:
-        camera: Whose.
-        at: When, seconds of the clock.
-        restarts: Of the camera until then.
-        frames: That were told of when its process had been begun again; None before.
-        back_s: How long until the next frame was told of; None as long as none is.
+        camera: The camera.
+        at: Time of the kill, seconds.
+        restarts: Restarts of the camera before.
+        frames: Reported frames when its process had been restarted; None before.
+        back_s: Seconds until the next reported frame; None before.
     """
 
     camera: str
@@ -48,10 +48,10 @@ class Kill:
 
 @dataclass(slots=True)
 class Timetable:
-    """Things that are done again and again.
+    """Periodic actions.
 
     Attributes:
-        every: Seconds between two of each, and what is done.
+        every: Interval in seconds, and action.
     """
 
     every: Sequence[tuple[float, Callable[[], None]]]
@@ -68,15 +68,15 @@ class Timetable:
 
 
 class Killer:
-    """Kills a camera's process at random, and learns how long it is away.
+    """Kills camera processes at random, and measures the outages.
 
     Args:
-        store: Of the service.
-        cameras: Names.
-        seed: Of whom it meets.
+        store: Store of the service.
+        cameras: Names of the cameras.
+        seed: Random seed.
 
     Attributes:
-        kills: So far.
+        kills: The kills so far.
     """
 
     def __init__(self, store: Path, cameras: Sequence[str], seed: int) -> None:
@@ -85,7 +85,7 @@ class Killer:
         self._rng = random.Random(seed)  # dice, not secrets
 
     def strike(self, restarts: Mapping[str, float]) -> None:
-        """Kill one, given how often each was begun again."""
+        """Kill one, given the restarts of each."""
         camera = self._rng.choice(self._cameras)
         pid = pid_of(self._store, camera)
         if pid:
@@ -93,7 +93,7 @@ class Killer:
             self.kills.append(Kill(camera, time.monotonic(), restarts.get(camera, 0.0)))
 
     def look(self, restarts: Mapping[str, float], frames: Mapping[str, float]) -> None:
-        """Learn who is back: a frame more than when its process was begun again."""
+        """Detect recovered cameras: those with a new frame since the restart."""
         for kill in self.kills:
             now = frames.get(kill.camera, 0.0)
             if kill.back_s is not None or restarts.get(kill.camera, 0.0) <= kill.restarts:
@@ -105,13 +105,13 @@ class Killer:
 
 
 class Balloon:
-    """Takes all room of a small disk, for a while.
+    """Fills a small disk temporarily.
 
     Args:
-        folder: On the disk.
+        folder: A folder on the disk.
 
     Attributes:
-        filled: How often.
+        filled: Number of times.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -124,12 +124,12 @@ class Balloon:
         return shutil.disk_usage(self._file.parent).total <= SMALL_DISK
 
     def fill(self) -> None:
-        """Take all room."""
+        """Fill the disk."""
         self.filled += 1
         with suppress(OSError), self._file.open("wb", buffering=0) as file:
             while file.write(PIECE):
                 pass
 
     def empty(self) -> None:
-        """Give it back."""
+        """Free the space."""
         self._file.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""A server that takes records of alerts, and is down now and then."""
+"""A server that receives records of alerts, and can be made unavailable."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ LARGEST = 2**20
 
 
 class AlertReceiver:
-    """Takes records.
+    """Receives records.
 
     Attributes:
-        records: What was taken, in order.
-        down: Whether it refuses all.
-        refused: How many it has refused.
-        port: Where it listens.
+        records: Received records, in order.
+        down: Whether it refuses all requests.
+        refused: Number of refused requests.
+        port: Its port.
     """
 
     def __init__(self) -> None:
@@ -30,12 +30,12 @@ class AlertReceiver:
         threading.Thread(target=self._server.serve_forever, args=(0.2,), daemon=True).start()
 
     def close(self) -> None:
-        """Take no more."""
+        """Stop."""
         self._server.shutdown()
         self._server.server_close()
 
     def _take(self, body: bytes) -> int:
-        """The status of the answer."""
+        """Handle a record; returns the HTTP status."""
         if self.down:
             self.refused += 1
             return 503

@@ -1,4 +1,4 @@
-"""Rehearses a service: four cameras, two of them over the network with troubles, and all that goes wrong."""
+"""Rehearses a service: four cameras, two of them over a faulty network, with injected faults."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ from visup.evaluation.serving.streams import TroubledStream
 NAMES = ("file-1", "file-2", "stream-1", "stream-2")
 START_S = 300.0
 LEDGER_S, SO_FAR_S = 20.0, 60.0
-"""Seconds between two looks at the journals, and between two writings of the figures so far. What is deleted
-for lack of room is two minutes old at least."""
+"""Seconds between readings of the journals, and between savings of the figures so far. Evidence deleted for
+lack of space is at least two minutes old."""
 
 CALM_S = 30.0
-"""At the end nothing goes wrong any more, so that what waits can be told."""
+"""Time without faults at the end, seconds, in which pending alerts can be delivered."""
 
 DOWN_S, FULL_S = 20.0, 15.0
 LOOK_S = 0.2
@@ -64,11 +64,11 @@ def evaluate_serving(
     """Rehearse a service for some time.
 
     Args:
-        minutes: How long.
+        minutes: Duration.
         kill_every: Seconds between two kills.
         store: A folder for its runs, empty or new; on a small disk (at most 4 GB) that is filled at times.
-        seed: Of all that goes wrong.
-        so_far: A file that has the figures so far, written each minute.
+        seed: Random seed of the faults.
+        so_far: A file for the figures so far, written each minute.
         progress: Shows what is being done.
 
     Returns:
@@ -121,13 +121,13 @@ def prepare_store(store: Path) -> None:
 
 
 class Rehearsal:
-    """All that takes part.
+    """The service and its environment.
 
     Args:
-        folder: For the site file and the clips.
-        store: For the runs.
-        seed: Of all that goes wrong.
-        stack: Ends what was begun.
+        folder: Folder for the site file and the clips.
+        store: Folder for the runs.
+        seed: Random seed of the faults.
+        stack: Closes all resources.
         so_far: A file for the figures so far.
     """
 
@@ -157,7 +157,7 @@ class Rehearsal:
         self._ends: list[tuple[float, Any]] = []
 
     def rehearse(self, minutes: float, kill_every: float, progress: Progress) -> dict[str, Any]:
-        """From the first frame to the account."""
+        """Run from the first frame to the account."""
         with self._service() as process:
             self._wait_until_ready(process)
             begin = time.monotonic()
@@ -240,7 +240,7 @@ class Rehearsal:
         return Timetable(((kill_every, kill), (100.0, reload), (75.0, sink_down), (130.0, full)))
 
     def _books(self, begin: float) -> Timetable:
-        """What is done for the account alone."""
+        """The timetable of measurements."""
 
         def write() -> None:
             self._watched_s = time.monotonic() - begin
@@ -249,7 +249,7 @@ class Rehearsal:
         return Timetable(((LEDGER_S, self._look_into_journals), (SO_FAR_S, write)))
 
     def _keep(self, told: dict[str, Any]) -> dict[str, Any]:
-        """The figures so far, in a file: hours of them must not be lost with what comes after."""
+        """Save the figures so far, so that hours of work are not lost by a later fault."""
         if self._so_far:
             write_whole(self._so_far, json.dumps(told, indent=1).encode())
         return told
@@ -270,7 +270,7 @@ class Rehearsal:
         return {name: told.get(figure, 0.0) for name, told in self._figures.items()}
 
     def _look(self, pid: int) -> None:
-        """What the service tells of itself."""
+        """Read the metrics of the service."""
         with suppress(HTTPError):
             at = f"http://127.0.0.1:{self._monitoring}/metrics"
             page = urllib3.request("GET", at, timeout=5.0, retries=False).data.decode()
@@ -322,14 +322,14 @@ class Rehearsal:
 
 
 def failed(figures: Mapping[str, Any]) -> bool:
-    """Whether an alert was lost or told twice, or a camera did not come back in time."""
+    """Whether an alert was lost or duplicated, or a camera did not recover in time."""
     total = figures["total"]
     late = total["slowest_s"] > 10.0 or total["not_back"]
     return bool(total["lost"] or total["twice"] > total["resent"] or late)
 
 
 def _growth(memory: Sequence[tuple[float, float]]) -> float:
-    """From the second quarter to the last, as a share."""
+    """Relative growth from the second quarter to the last."""
     used = [mb for _, mb in memory]
     quarter = len(used) // 4
     if not quarter:
@@ -338,7 +338,7 @@ def _growth(memory: Sequence[tuple[float, float]]) -> float:
 
 
 def _by_minute(memory: Sequence[tuple[float, float]]) -> list[float]:
-    """Medians of all processes together, megabytes."""
+    """Medians per minute of the memory of all processes together, megabytes."""
     minutes: dict[int, list[float]] = {}
     for at, mb in memory:
         minutes.setdefault(int((at - memory[0][0]) / 60.0), []).append(mb)

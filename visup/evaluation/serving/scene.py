@@ -1,4 +1,4 @@
-"""What the cameras of a rehearsal see: something comes, stays for a while, goes; then nothing moves."""
+"""The scene of a rehearsal: an object arrives, stays for a while and leaves; then nothing moves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from visup.runs.evidence.frame_ring import jpeg_of
 SIZE = (640, 480)
 FPS = 10.0
 CROSSING, EMPTY = 60, 60
-"""Frames in which something crosses, and in which nothing does."""
+"""Frames with and without a crossing object."""
 
 SIDE = 90
 RULE = 'rule seen(a): warning\n    when in_view(a) > 0.5 s\n    say "{a} {is} seen."\n'
@@ -38,10 +38,10 @@ patience_s = 20.0
 
 
 def scene(seed: int) -> list[NDArray[np.uint8]]:
-    """One round of what a camera sees.
+    """One cycle of the scene.
 
     Args:
-        seed: Of the ground and of what crosses it.
+        seed: Random seed.
 
     Returns:
         Frames, (480, 640, 3) uint8 BGR.
@@ -77,5 +77,5 @@ def write_clip(path: Path, frames: list[NDArray[np.uint8]]) -> None:
 
 
 def jpegs(frames: list[NDArray[np.uint8]]) -> list[bytes]:
-    """A scene as a network camera sends it."""
+    """A scene as JPEG images."""
     return [jpeg_of(frame) for frame in frames]

@@ -1,4 +1,4 @@
-"""Network cameras on loopback (MJPEG over HTTP) that stall, drop and send garbage, each of a seed."""
+"""Network cameras on loopback (MJPEG over HTTP) that randomly stall, drop and send garbage."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from visup.evaluation.serving.scene import FPS
 
 BOUNDARY = "frame"
 TROUBLE_EVERY_S = 40.0
-"""Seconds between two troubles of a camera, on average."""
+"""Mean seconds between two faults of a camera."""
 
 STALL_S = (2.0, 8.0)
 
 
 class TroubledStream:
-    """A camera.
+    """A network camera with faults.
 
     Args:
-        pictures: JPEG, of one round of what it sees.
-        seed: Of its troubles.
+        pictures: JPEG images of one cycle of the scene.
+        seed: Random seed.
 
     Attributes:
-        url: Where it is.
-        troubles: How often something went wrong.
+        url: Its URL.
+        troubles: Number of faults.
     """
 
     def __init__(self, pictures: Sequence[bytes], seed: int) -> None:
@@ -43,7 +43,7 @@ class TroubledStream:
         threading.Thread(target=self._server.serve_forever, args=(0.2,), daemon=True).start()
 
     def close(self) -> None:
-        """End it."""
+        """Stop it."""
         self._over.set()
         self._server.shutdown()
         self._server.server_close()
@@ -52,7 +52,7 @@ class TroubledStream:
         return time.monotonic() + self._rng.expovariate(1.0 / TROUBLE_EVERY_S)
 
     def _send_to(self, out: Any) -> None:
-        """Send frames as time brings them, until the connection drops."""
+        """Send frames in real time until the connection drops."""
         while not self._over.wait(1.0 / FPS):
             number = int((time.monotonic() - self._begun) * FPS) % len(self._pictures)
             picture = self._pictures[number]

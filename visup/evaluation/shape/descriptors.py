@@ -1,4 +1,4 @@
-"""Descriptors of silhouettes by other methods, to know where the recognition of views stands.
+"""Other shape descriptors as baselines for the recognition of views.
 
 Zernike moments (mahotas) and elliptic Fourier descriptors (pyefd), both made invariant to rotation and
 scale, with the nearest neighbour by city-block distance. Needs the extra ``visup[eval]``.
@@ -20,7 +20,7 @@ FOURIER_ORDER = 16
 _AREA_SIDE = 60.0
 
 Descriptor = Callable[[NDArray[np.bool_]], NDArray[np.float64]]
-"""Takes a mask (H, W) bool, gives a vector."""
+"""Mask (H, W) bool -> vector."""
 
 
 def descriptors() -> dict[str, Descriptor]:
@@ -46,7 +46,7 @@ def descriptors() -> dict[str, Descriptor]:
     def fourier(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
         coefficients = pyefd.elliptic_fourier_descriptors(_outline(mask), order=FOURIER_ORDER)
         a, b, c, d = np.asarray(coefficients, dtype=np.float64).T
-        # Size and area of each harmonic's ellipse: they do not change with rotation or starting point.
+        # Size and area of each harmonic's ellipse are invariant to rotation and starting point.
         sizes = np.sqrt(a**2 + b**2 + c**2 + d**2)
         areas = np.sqrt(np.abs(a * d - b * c))
         return np.concatenate([sizes, areas]) / max(float(sizes[0]), 1e-9)
@@ -55,7 +55,7 @@ def descriptors() -> dict[str, Descriptor]:
 
 
 def nearest(vectors: NDArray[np.float64], query: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Numbers of all vectors (N, D), the nearest to a query (D,) first."""
+    """Indices of all vectors (N, D) by increasing distance from a query (D,)."""
     return np.argsort(np.abs(vectors - query).sum(axis=1), kind="stable")
 
 

@@ -1,7 +1,7 @@
-"""Shape retrieval against classes: leave one out over folders of silhouettes.
+"""Shape retrieval: leave-one-out over classes of silhouettes.
 
-Figures as the data's README defines them. The first line is the product as it is (shock graphs, then
-outlines and areas); the second, `graph_alone`, is the shock graph without these.
+Figures are defined in the data's README. The main figures are for the complete method (shock graphs, then
+outlines and areas); `graph_alone` is the shock graph only.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from visup.percepts.shape.silhouette.area_overlap import AreaIndex
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 RANKS = 10
-"""How many of the best matches the rank table counts."""
+"""Number of ranks in the rank table."""
 
 _PROCESSES = 2
 _ROWS = 20
@@ -41,7 +41,7 @@ _ROWS = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """Similarities of some queries with all shapes before them."""
+    """Similarities of some queries with all previous shapes."""
 
     rows: list[int]
     graphs: list[NDArray[np.float64]]
@@ -52,11 +52,11 @@ class _Rows:
 def evaluate_shapes(
     folder: Path, *, limit: int | None = None, progress: Progress = silent
 ) -> dict[str, Any]:
-    """Figures of leaving one out over `<class>/*.png` below a folder.
+    """Leave-one-out figures over `<class>/*.png` below a folder.
 
     Args:
-        folder: Folder of classes. Polarity of the pictures is found out.
-        limit: Shapes of each class, for a quick look; all by default.
+        folder: Folder of classes. The polarity of the images is detected.
+        limit: Maximum shapes of each class; all by default.
         progress: Shows what is being done.
 
     Returns:
@@ -85,7 +85,7 @@ def evaluate_shapes(
 
 
 def _listed(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Path]]:
-    """Classes and picture files, by name."""
+    """Classes and image files by name."""
     found = [
         (sub.name, file)
         for sub in sorted(p for p in folder.iterdir() if p.is_dir())
@@ -101,7 +101,7 @@ def _listed(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Pat
 
 
 def _shapes(files: Sequence[Path], progress: Progress) -> tuple[list[Shape], float]:
-    """Shapes of all pictures, and the milliseconds that one takes from mask to shock graph."""
+    """Shapes of all images, and milliseconds per shape from mask to shock graph."""
     progress(f"{len(files)} silhouettes")
     spent, shapes = [], []
     for file in files:
@@ -118,7 +118,7 @@ def _shapes(files: Sequence[Path], progress: Progress) -> tuple[list[Shape], flo
 def _similarities(
     shapes: list[Shape], progress: Progress
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Similarities of graphs of all pairs, what the second looks add, and milliseconds a pair."""
+    """Graph similarities of all pairs, the contribution of outlines and areas, and milliseconds per pair."""
     size = len(shapes)
     graphs, looks = np.eye(size), np.eye(size)
     begins = list(range(1, size, _ROWS))
@@ -136,7 +136,7 @@ def _similarities(
 
 
 class _Shared:
-    """What each process of the pool works on."""
+    """Data of each pool process."""
 
     shapes: list[Shape]
     index: ViewIndex
@@ -160,7 +160,7 @@ def _compare_rows(begin: int) -> _Rows:
 
 
 def _graph_row(i: int) -> NDArray[np.float64]:
-    """Similarities of one graph with all before it, each pair matched in its own order."""
+    """Similarities of one graph with all previous ones, each pair in order."""
     query = _Shared.shapes[i].graph
     _, similar = _Shared.index.bounds(query, np.arange(i))
     out = np.empty(i)
@@ -174,7 +174,7 @@ def _graph_row(i: int) -> NDArray[np.float64]:
 
 
 def _looks_row(i: int) -> NDArray[np.float64]:
-    """What outlines and areas give to the similarities of one shape with all before it."""
+    """The contribution of outlines and areas to the similarities of one shape with all previous ones."""
     query = _Shared.shapes[i]
     overlaps = _Shared.areas.overlaps(query.areas, np.arange(i))
     return compare_outlines_and_areas(query, _Shared.shapes[:i], overlaps).worth
@@ -183,7 +183,7 @@ def _looks_row(i: int) -> NDArray[np.float64]:
 def _pruning(
     shapes: list[Shape], both: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """For each query the share of the others that the index lets through, and 1 where it loses the best."""
+    """For each query the share of the others that passes the index, and 1 if the best is lost."""
     index = ViewIndex(shapes)
     everyone = np.arange(len(shapes))
     most = candidates_wanted(len(shapes) - 1)
@@ -199,12 +199,12 @@ def _pruning(
 def _figures(
     similarity: NDArray[np.float64], labels: NDArray[np.str_]
 ) -> dict[str, dict[str, Any]]:
-    """Figures for each class, and for all under the empty name."""
+    """Figures for each class, and for all under an empty name."""
     hits, bullseye = np.zeros((len(labels), RANKS), dtype=int), np.zeros(len(labels))
     for i, label in enumerate(labels):
         order = np.argsort(-similarity[i], kind="stable")
         size = int((labels == label).sum())
-        # The query itself is among its best matches; ties must not push it out.
+        # The query itself is among its best matches; ties must not displace it.
         others = order[order != i]
         ranked = labels[others[:RANKS]] == label
         hits[i, : len(ranked)] = ranked

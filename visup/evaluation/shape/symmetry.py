@@ -1,8 +1,8 @@
-"""Symmetries of a mesh: from which other directions it looks exactly alike.
+"""Symmetries of a mesh: other directions from which its silhouette is identical.
 
-A view direction can be told only up to the symmetries of the object. In parallel projection the silhouette
-from behind is besides the mirror image of the one from before, so that a mesh with a plane of symmetry
-looks from -Sd (S the reflection) exactly as it does from d, although no rotation takes one to the other.
+A view direction can be determined only up to the symmetries of the object. In parallel projection the
+silhouette from behind is also the mirror image of the one from the front, so that a mesh with a plane of
+symmetry looks the same from -Sd (S the reflection) and from d, although no rotation maps one to the other.
 """
 
 from __future__ import annotations
@@ -15,32 +15,31 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 POINTS = 20_000
-"""Points of the surface that moved points are compared with."""
+"""Surface points for comparison."""
 
 MOVED = 300
-"""Points of the surface that are moved."""
+"""Surface points that are transformed."""
 
 TOLERANCE = 0.008
-"""Mean distance, as a share of the mesh's radius, below which a moved surface is the same."""
+"""Mean distance, as a share of the mesh's radius, below which a transformed surface is the same."""
 
 FOLDS = (2, 3, 4, 5, 6, 8)
-"""Rotational symmetries that are looked for."""
+"""Orders of rotational symmetries to test."""
 
 _STEP_DEG = 5.0
 _ODD_DEG = (37.0, 73.0, 101.0)
 
 
 def silhouette_symmetries(mesh: Any, seed: int = 0) -> NDArray[np.float64]:
-    """Rotations of the view direction that leave a mesh's silhouette as it is.
+    """Rotations of the view direction that preserve a mesh's silhouette.
 
-    Looked for are rotations by a half, a third, ... an eighth turn about the mesh's own and its principal
-    axes, bodies of revolution about these, and reflections in planes through them; other symmetries
-    (of a polyhedron, say) are not found, which makes an error of direction read too large, never too
-    small.
+    Tested are rotations by a half, a third, ... an eighth turn about the mesh's own and its principal axes,
+    bodies of revolution about these, and reflections in planes through them; other symmetries (such as of a
+    polyhedron) are not found, which can only overestimate an error of direction.
 
     Args:
         mesh: A ``trimesh.Trimesh``.
-        seed: Of the points that are drawn from its surface.
+        seed: Random seed of the surface points.
 
     Returns:
         (S, 3, 3) float64 proper rotations of direction vectors, mesh frame; the identity is first.
@@ -56,7 +55,7 @@ def silhouette_symmetries(mesh: Any, seed: int = 0) -> NDArray[np.float64]:
 def angle_to(
     direction: NDArray[np.float64], true: NDArray[np.float64], symmetries: NDArray[np.float64]
 ) -> float:
-    """Angle between a direction and the nearest of those that look like the true one, degrees.
+    """Angle between a direction and the nearest one equivalent to the true one, degrees.
 
     Args:
         direction: (3,) unit vector.
@@ -68,7 +67,7 @@ def angle_to(
 
 
 def _surface(mesh: Any, seed: int) -> NDArray[np.float64]:
-    """Points evenly drawn from the surface, centred, of unit radius; (POINTS, 3)."""
+    """Points sampled uniformly from the surface, centred, of unit radius; (POINTS, 3)."""
     triangles = np.asarray(mesh.triangles, dtype=np.float64)
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(cross, axis=1)
@@ -81,16 +80,16 @@ def _surface(mesh: Any, seed: int) -> NDArray[np.float64]:
 
 
 class _SurfaceComparison:
-    """Whether a surface looks the same after a move."""
+    """Tests whether a surface is invariant under a transformation."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
         self._tree = cKDTree(points)
         self._few = points[:: POINTS // MOVED]
-        # Drawn points lie apart by themselves: what even a perfect symmetry cannot go below.
+        # Sampling distance of the points: the least distance even for a perfect symmetry.
         self._grain = float(self._tree.query(self._few, k=2)[0][:, 1].mean())
 
     def change(self, move: NDArray[np.float64]) -> float:
-        """Mean distance of the moved surface from itself."""
+        """Mean distance of the transformed surface from itself."""
         distance, _ = self._tree.query(self._few @ move.T)
         return float(distance.mean()) - self._grain
 
@@ -101,7 +100,7 @@ class _SurfaceComparison:
 def _symmetries_of(
     axis: NDArray[np.float64], axes: NDArray[np.float64], looks: _SurfaceComparison
 ) -> list[NDArray[np.float64]]:
-    """Turns about an axis, and reflections in planes that hold it or stand upright on it."""
+    """Rotations about an axis, and reflections in planes through it or perpendicular to it."""
     round_about = all(looks.same(_turn(axis, d)) for d in _ODD_DEG)
     upright = [_mirror(axis)] if looks.same(_mirror(axis)) else []
     mirrors = [_mirror(n) for n in _normals(axis, axes)]
@@ -110,7 +109,7 @@ def _symmetries_of(
         return [*turns, *upright, *mirrors]
     turns = [m for m in _fold_turns(axis) if looks.same(m)]
     changes = np.array([looks.change(m) for m in mirrors])
-    # Planes beside a plane of symmetry are nearly as good: only the best among neighbours is one.
+    # Planes next to a plane of symmetry are almost as good: only local minima count.
     least = (changes <= np.roll(changes, 1)) & (changes <= np.roll(changes, -1))
     return [*turns, *upright, *(mirrors[k] for k in np.flatnonzero(least & (changes < TOLERANCE)))]
 
@@ -129,7 +128,7 @@ def _mirror(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _normals(axis: NDArray[np.float64], axes: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Normals of planes through an axis, a step of 5 degrees apart, one of them a further axis."""
+    """Normals of planes through an axis in steps of 5 degrees, one of them a further axis."""
     others = axes - np.outer(axes @ axis, axis)
     side = others[int(np.argmax(np.linalg.norm(others, axis=1)))]
     side = side / np.linalg.norm(side)

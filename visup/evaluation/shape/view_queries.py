@@ -1,6 +1,6 @@
-"""Queries for the recognition of views: silhouettes of meshes, turned, scaled, damaged, cut.
+"""Queries for the recognition of views: silhouettes of meshes, rotated, scaled, damaged, cut.
 
-Four conditions, as the data's README names them: `clean`; `noise`, the outline displaced along its normal
+Four conditions, named as in the data's README: `clean`; `noise`, the outline displaced along its normal
 by 2 px (standard deviation) at a size of 200 px; `cut`, 15 % of the area beyond the image border; `both`.
 """
 
@@ -20,13 +20,13 @@ CONDITIONS = ("clean", "noise", "cut", "both")
 """Names of the conditions."""
 
 SIZES = (60.0, 300.0)
-"""Least and greatest longer side of a query, pixels."""
+"""Range of the longer side of a query, pixels."""
 
 NOISE = 0.01
 """Standard deviation of the outline's displacement, as a share of the longer side: 2 px at 200 px."""
 
 NOISE_LENGTH = 0.015
-"""Over how much of the longer side displacements are alike: 3 px at 200 px."""
+"""Correlation length of the displacement, as a share of the longer side: 3 px at 200 px."""
 
 CUT_SHARE = 0.15
 """Share of the area that lies beyond the border."""
@@ -37,12 +37,12 @@ _MARGIN = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Query:
-    """A silhouette whose object and direction are known.
+    """A silhouette with known object and direction.
 
     Attributes:
         name: The object.
         direction: (3,) unit vector from the object to the viewer, mesh frame.
-        masks: Condition -> (H, W) bool. Of cut ones, one side of the array is the image border.
+        masks: Condition -> (H, W) bool. For cut ones, one side of the array is the image border.
     """
 
     name: str
@@ -56,11 +56,11 @@ def draw_queries(name: str, mesh: Any, count: int, seed: int) -> list[Query]:
     Args:
         name: The object.
         mesh: A ``trimesh.Trimesh``.
-        count: How many.
-        seed: Of all that is drawn; with the name it gives the same queries again.
+        count: Number of queries.
+        seed: Random seed, combined with the name.
 
     Raises:
-        ExtraMissingError: What renders meshes is not installed.
+        ExtraMissingError: The mesh renderer is not installed.
     """
     rng = np.random.default_rng([seed, *name.encode()])
     directions = rng.normal(size=(count, 3))
@@ -83,7 +83,7 @@ def _conditions(mask: NDArray[np.bool_], rng: np.random.Generator) -> dict[str, 
 
 
 def turned_and_scaled(mask: NDArray[np.bool_], roll: float, size: float) -> NDArray[np.bool_]:
-    """A silhouette turned in the image plane and brought to a size.
+    """A silhouette rotated in the image plane and scaled to a size.
 
     Args:
         mask: (H, W) bool.
@@ -109,10 +109,10 @@ def turned_and_scaled(mask: NDArray[np.bool_], roll: float, size: float) -> NDAr
 def with_contour_noise(
     mask: NDArray[np.bool_], sigma: float, length: float, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """A silhouette whose outline is displaced along its normal at random.
+    """A silhouette with its outline randomly displaced along its normal.
 
-    The level at which the signed distance to the outline is cut is a smooth random field: outlines may
-    meet, parts thinner than the noise may break off or vanish, as they do in segmentation.
+    The signed distance to the outline is thresholded at a smooth random field: outlines may merge, parts
+    thinner than the noise may break off or vanish, as in segmentation.
 
     Args:
         mask: (H, W) bool.
@@ -121,7 +121,7 @@ def with_contour_noise(
         rng: Source of the noise.
 
     Returns:
-        Bool of the mask's size and a margin; the mask itself when noise would leave nothing.
+        Bool of the mask's size plus a margin; the mask itself if noise would leave nothing.
     """
     margin = int(np.ceil(4 * sigma)) + 2
     padded = np.pad(mask, margin)
@@ -135,15 +135,15 @@ def with_contour_noise(
 
 
 def cut_by_border(mask: NDArray[np.bool_], share: float, side: int) -> NDArray[np.bool_]:
-    """A silhouette of which a share lies beyond the image border.
+    """A silhouette cut by the image border.
 
     Args:
         mask: (H, W) bool.
-        share: Share of its area that is lost.
-        side: 0 to 3: quarter turns that bring the side that is cut to the left.
+        share: Share of its area that is cut off.
+        side: 0 to 3: quarter turns that bring the cut side to the left.
 
     Returns:
-        The mask without what is lost; one side of the array is the border.
+        The remaining mask; one side of the array is the border.
     """
     turned = np.rot90(mask, side)
     sums = np.cumsum(np.count_nonzero(turned, axis=0))

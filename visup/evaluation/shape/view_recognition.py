@@ -1,7 +1,7 @@
 """Recognition of views: silhouettes from unseen directions against a database of views of all models.
 
-Figures as the data's README defines them (`visup eval views`). The direction of a view is held against
-all directions from which the true object looks the same (`symmetry.py`).
+Figures are defined in the data's README (`visup eval views`). The direction of a view is compared with all
+directions from which the true object looks the same (`symmetry.py`).
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatc
 from visup.rules.identity.votes import VoteSettings
 
 STRANGER = VoteSettings().stranger
-"""Similarity above which a name gets more votes than that the object is none of the models."""
+"""Similarity above which a name gets more votes than "none of the models"."""
 
 TOP = 5
-"""Different objects that are looked at for `top5`."""
+"""Number of distinct objects for `top5`."""
 
 MESHES = (".ply", ".stl", ".obj", ".off", ".glb")
-"""Endings of the files that are read as meshes."""
+"""Suffixes of mesh files."""
 
 
 @dataclass(frozen=True, slots=True)
 class _QueryResult:
-    """What came of one query in one condition."""
+    """The result of one query in one condition."""
 
     name: str
     condition: str
@@ -52,11 +52,11 @@ class _QueryResult:
 
 
 class DrawnQueries(TypedDict, total=False):
-    """Silhouettes that are asked for.
+    """Settings of the queries.
 
     Attributes:
-        queries: How many of each mesh; 12 unless told.
-        seed: Of their directions, rolls, sizes and damage; 0 unless told.
+        queries: Queries per mesh; 12 by default.
+        seed: Random seed; 0 by default.
     """
 
     queries: int
@@ -77,10 +77,10 @@ def evaluate_views(
     Args:
         folder: Folder of mesh files.
         views: Views of each mesh in the database.
-        limit: Meshes of the folder, for a quick look; all by default.
-        machines: Whether the machines that are made by code (`render/meshes/machines.py`) are added.
+        limit: Maximum meshes of the folder; all by default.
+        machines: Whether to add the generated machines (`render/meshes/machines.py`).
         progress: Shows what is being done.
-        drawn: What is asked for.
+        drawn: Settings of the queries.
 
     Returns:
         {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
@@ -94,7 +94,7 @@ def evaluate_views(
 
     Raises:
         SettingsError: There are no meshes, or a number is out of range.
-        ExtraMissingError: What renders meshes, or the baselines, are not installed.
+        ExtraMissingError: The mesh renderer or the baselines are not installed.
     """
     queries, seed = drawn.get("queries", 12), drawn.get("seed", 0)
     if views < 1 or queries < 1:
@@ -130,7 +130,7 @@ def _listed(folder: Path, limit: int | None) -> list[Path]:
 
 
 def _machines(folder: Path) -> list[Path]:
-    """The machines that are made by code, as mesh files in a folder."""
+    """The generated machines as mesh files in a folder."""
     from visup.render.meshes.machines import MACHINES
     from visup.render.meshes.spacecraft import write_meshes
 
@@ -140,7 +140,7 @@ def _machines(folder: Path) -> list[Path]:
 def _asked(
     meshes: Sequence[Path], queries: int, seed: int, progress: Progress
 ) -> Iterator[tuple[Query, NDArray[np.float64]]]:
-    """All queries, each with the symmetries of its object."""
+    """All queries with the symmetries of their objects."""
     for path in meshes:
         progress(f"{path.stem}: {queries} queries")
         mesh = load_mesh(path)
@@ -199,7 +199,7 @@ def _figures(answers: Sequence[_QueryResult]) -> dict[str, Any]:
 def _baselines(
     others: dict[str, Descriptor], meshes: Sequence[Path], views: int, asked: Sequence[Query]
 ) -> dict[str, dict[str, float]]:
-    """Share of queries whose nearest view, by each other descriptor, is of the right object."""
+    """Share of queries whose nearest view, by each baseline descriptor, is of the right object."""
     seen = [
         (path.stem, v.mask)
         for path in meshes

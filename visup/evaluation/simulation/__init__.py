@@ -1,5 +1,5 @@
-"""Percepts simulated from the ground truth of missions, with the errors that real percepts have.
+"""Percepts simulated from the ground truth of missions, with realistic errors.
 
 Read `truth_masks` (masks with noisy outlines), `view_noise` and `hypotheses` (names, views, depth), then
-`percepts` (the behaviours that report all that).
+`percepts` (the behaviours that report them).
 """

@@ -1,10 +1,9 @@
-"""What is said of one region of which the truth is known: names, views, depth, with faults.
+"""Simulated hypotheses of one region with known truth: names, views, depth, with errors.
 
-Names are wrong in runs: what a silhouette is mistaken for, it is mistaken for again a moment later. What
-it may be mistaken for are the mission's other models and some that are not there; some of them far more
-often than others. Views are those of a database: directions spread over half the sphere, each standing
-for the opposite one too. As matching does, a few views of the right model are told at once, less similar the
-farther they are from the true direction (`view_noise.py`).
+Names are wrong in runs: a confusion tends to repeat a moment later. Confusions are with the mission's other
+models and some absent ones, with very different frequencies. Views are those of a database: directions spread
+over half the sphere, each also representing the opposite one. As in matching, several views of the right
+model are reported, with similarity decreasing with the distance from the true direction (`view_noise.py`).
 """
 
 from __future__ import annotations
@@ -22,27 +21,27 @@ from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
 ABSENT = ("antenna", "barrel", "chair", "drill", "engine", "funnel", "guitar", "hammer", "iron")
-"""Models that no mission of ours shows, for silhouettes to be mistaken for."""
+"""Models that are in no mission, for confusions."""
 
 VIEWS = 32
-"""Views of a model, as many as `visup models build` makes by default; each is seen from behind too."""
+"""Views per model, the default of `visup models build`; each also represents the opposite direction."""
 
-# Names that are wrong, and looks without a name, are chosen here: told views have only their own noise.
+# Wrong names and looks without a name are chosen here: views have only their own noise.
 _NOISE = ViewNoise(missing=0.0, wrong=0.0)
 _DIRECTIONS = half_sphere_directions(VIEWS)
-_PERSISTS = 0.7  # how often a wrong name stays the same within a run of wrong names
-_TOLD = 4  # names told each time
+_PERSISTS = 0.7  # probability that a wrong name persists within a run of wrong names
+_TOLD = 4  # names reported each time
 
 
 @dataclass(frozen=True, slots=True)
 class NamingNoise:
-    """How names and depths differ from the truth.
+    """Errors of names and depths.
 
     Attributes:
-        wrong: Share of times at which the first name is wrong.
-        run: Mean length of a run of wrong names, times.
-        listed: How often the right name is among the others while the first one is wrong.
-        depth: Standard deviation of depth, as a share of it.
+        wrong: Share of reports with a wrong first name.
+        run: Mean length of a run of wrong names, reports.
+        listed: Probability that the right name is among the others if the first one is wrong.
+        depth: Relative standard deviation of depth.
     """
 
     wrong: float
@@ -52,13 +51,13 @@ class NamingNoise:
 
 
 class HypothesisSource:
-    """Hypotheses and depths of one object, time after time.
+    """Simulated hypotheses and depths of one object over time.
 
     Args:
         mission: The mission.
         name: The object.
-        noise: How they differ from the truth.
-        rng: Source of chance.
+        noise: The errors.
+        rng: Random generator.
     """
 
     def __init__(
@@ -80,12 +79,12 @@ class HypothesisSource:
     def says(
         self, region: Region, index: int, *, alone: bool = True
     ) -> Iterator[Hypothesis | Depth]:
-        """What is said of the object's region in one frame.
+        """The hypotheses and depth of the object's region in one frame.
 
         Args:
             region: Its region.
             index: Number of the frame.
-            alone: Whether the region shows this object only; else it looks like nothing known.
+            alone: Whether the region shows only this object; otherwise it resembles no model.
         """
         similarity = 0.72 + 0.05 * self._rng.standard_normal()
         names = self._names(self._noise.wrong if alone else min(0.9, 2 * self._noise.wrong))
@@ -121,14 +120,14 @@ class HypothesisSource:
     def _hypotheses(
         self, region: Region, name: str, similarity: float, true: Mapping[str, Any]
     ) -> Iterator[Hypothesis]:
-        """Views of one model, best first; only the right one has several that are alike."""
+        """Views of one model, best first; only the right one has several similar ones."""
         if name != self.model:
             view = int(self._rng.integers(VIEWS))
             d, turn = _DIRECTIONS[view], float(self._rng.uniform(-np.pi, np.pi))
             direction = (float(d[0]), float(d[1]), float(d[2]))
             yield Hypothesis(region.id, name, view, similarity, turn, None, direction)
         elif "quat_xyzw" not in true:
-            # Only exemplars of silhouettes are known of it.
+            # Only silhouette exemplars of it are known.
             view = int(self._rng.integers(VIEWS))
             yield Hypothesis(region.id, name, view % 8, similarity)
         else:
@@ -138,7 +137,7 @@ class HypothesisSource:
                 yield replace(h, similarity=alike)
 
     def _seen(self, true: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Orientation (3, 3) in which it is seen: against the line of sight to it, not the optical axis."""
+        """Apparent orientation (3, 3): relative to the line of sight, not the optical axis."""
         from scipy.spatial.transform import Rotation
 
         box: Sequence[int] = true.get("bbox") or (0, 0, *self._size)
@@ -147,7 +146,7 @@ class HypothesisSource:
         focal = height / 2 / np.tan(self._fov / 2)
         ray = np.array([x + w / 2 - width / 2, y + h / 2 - height / 2, focal])
         turned = Rotation.from_quat(true["quat_xyzw"])
-        # Turned the shortest way to where the line of sight is the optical axis.
+        # Smallest rotation that takes the line of sight to the optical axis.
         across = np.cross(ray, [0.0, 0.0, 1.0])
         sine = float(np.linalg.norm(across))
         if sine < 1e-9:

@@ -1,11 +1,11 @@
-"""Percepts made from the truth of a mission, with the faults that real ones have.
+"""Percepts simulated from the truth of a mission, with realistic errors.
 
-What reasons is measured on these apart from what sees: outlines are off by pixels, regions are missing
-now and then, alone and in runs, and of the names told of a region the first one is often wrong, again in
-runs. Truth goes nowhere else: the agent is given these percepts as it would be given others.
+They separate the evaluation of reasoning from perception: outlines have errors of pixels, regions are missing
+at times, singly and in runs, and the first name of a region is often wrong, also in runs. The truth is used
+for nothing else: the agent processes these percepts like any others.
 
-Read next: `hypotheses.py` (what is reported of one region), then `reasoning/simulated_missions.py` (what is
-measured).
+Read next: `hypotheses.py` (reports about one region), then `reasoning/simulated_missions.py` (the
+evaluation).
 """
 
 from __future__ import annotations
@@ -39,28 +39,28 @@ CONFIDENCE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class PerceptNoise:
-    """How percepts differ from the truth.
+    """The errors of percepts.
 
     Attributes:
-        seed: Of all chance.
-        contour_px: Standard deviation of an outline's place along its normal.
-        contour_length_px: Distance along the outline over which its error is alike.
-        contour_tau_s: How long the lasting half of that error lasts.
+        seed: Random seed.
+        contour_px: Standard deviation of an outline along its normal, pixels.
+        contour_length_px: Correlation length of that error along the outline, pixels.
+        contour_tau_s: Time constant of the persistent half of that error, seconds.
         missing: Share of an object's frames without its region.
-        in_bursts: Share of these that come in runs; the others come alone.
-        burst_s: Mean length of such a run.
+        in_bursts: Share of these that occur in runs; the others are single.
+        burst_s: Mean length of such a run, seconds.
         velocity: Standard deviation of each component of a region's velocity, pixels per second.
         velocity_share: The same as a share of its speed, added.
-        velocity_tau_s: How long that error lasts.
-        wrong: Share of times at which the first name is wrong.
-        wrong_run_s: Mean length of a run of wrong names.
-        listed: How often the right name is among the others while the first one is wrong.
-        depth: Standard deviation of depth, as a share of it.
-        names_every_s: Least time between two times at which names are told.
-        least_px: An object of which less shows has no region.
-        fresh_id_s: After so long without a region, a tracker takes the next one for a new region.
-        merge_coupled: Whether the regions of coupled objects become one, as those of a camera do that
-            sees what moves alike as one.
+        velocity_tau_s: Time constant of that error, seconds.
+        wrong: Share of reports with a wrong first name.
+        wrong_run_s: Mean length of a run of wrong names, seconds.
+        listed: Probability that the right name is among the others if the first one is wrong.
+        depth: Relative standard deviation of depth.
+        names_every_s: Least time between two reports of names, seconds.
+        least_px: Least visible area of an object for a region, pixels.
+        fresh_id_s: Time without a region after which a tracker assigns a new id, seconds.
+        merge_coupled: Whether the regions of coupled objects merge, as in motion segmentation of objects that
+            move alike.
     """
 
     seed: int = 0
@@ -84,12 +84,12 @@ class PerceptNoise:
 
 
 class Dropouts:
-    """When an object's region is missing: alone, or in runs.
+    """Dropouts of an object's region, single or in runs.
 
     Args:
-        noise: How often.
+        noise: The errors.
         dt: Seconds between frames.
-        rng: Source of chance.
+        rng: Random generator.
     """
 
     def __init__(self, noise: PerceptNoise, dt: float, rng: np.random.Generator) -> None:
@@ -109,7 +109,7 @@ class Dropouts:
 
 @dataclass(slots=True)
 class _ObjectNoise:
-    """What is kept of one object, or of several that are one region."""
+    """The error state of one object, or of several with a merged region."""
 
     contour: ContourNoise
     gaps: Dropouts
@@ -121,7 +121,7 @@ class _ObjectNoise:
     def velocity(
         self, true: tuple[float, float] | None, noise: PerceptNoise, dt: float
     ) -> tuple[tuple[float, float], float]:
-        """A velocity that is not quite the true one, and its deviation; 0 when it is not known."""
+        """A noisy velocity and its standard deviation; 0 if not known."""
         keep = float(np.exp(-dt / noise.velocity_tau_s))
         x, y = np.sqrt(1 - keep**2) * self.rng.standard_normal(2) + keep * np.array(self.off)
         self.off = (float(x), float(y))
@@ -136,9 +136,9 @@ class SimulatedSegmenter:
     """A behaviour that reports the regions of a mission.
 
     Attributes:
-        mission: What is in view.
-        noise: How wrong it is seen.
-        who: Region id -> names of the true objects that it shows, filled as they are reported.
+        mission: The mission.
+        noise: The errors.
+        who: Region id -> names of the true objects that it shows, filled during reporting.
     """
 
     mission: Mission
@@ -175,7 +175,7 @@ class SimulatedSegmenter:
             if int(np.count_nonzero(mask)) < self.noise.least_px or kept.gaps.missing():
                 continue
             true = self.mission.masks[frame.index][names[0]].velocity
-            # Motion is what changed since the last frames: it is not known of what was not in them.
+            # Motion is measured between frames: it is unknown for regions missing in the last ones.
             known = true if frame.time - kept.last < 0.1 else None
             velocity, sigma = kept.velocity(known, self.noise, 1.0 / self.mission.fps)
             number = self._number(names, frame.time)
@@ -283,7 +283,7 @@ def frames_of(mission: Mission, *, every: int = 1) -> Iterator[Frame]:
 def observations_of(
     mission: Mission, noise: PerceptNoise, *, every: int = 1
 ) -> Iterator[tuple[Observation, dict[int, tuple[str, ...]]]]:
-    """What an agent would observe, each with the truth: region id -> names of true objects."""
+    """Simulated observations, each with the truth: region id -> names of true objects."""
     behaviours, who = behaviours_of(mission, noise)
     slots = ordered_slots(behaviours)
     for frame in frames_of(mission, every=every):

@@ -1,7 +1,7 @@
-"""The masks of a mission, ready to be seen with an outline that is not quite right.
+"""The true masks of a mission, prepared for outline noise.
 
-A mask is kept as the signed distance to its outline; adding a smooth random field to that before it is
-cut at zero moves the outline in and out. Nothing here knows what an object is called.
+A mask is stored as the signed distance to its outline; adding a smooth random field before thresholding at
+zero moves the outline in and out. Names of objects play no role here.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from visup.rules.geometry.regions import outline
 from visup.testing import region_of
 
 MARGIN = 8
-"""Pixels round a mask in which its outline may move."""
+"""Margin around a mask in which its outline may move, pixels."""
 
 LAG_S = 0.24
-"""Over how long true velocities are taken; those that a camera sees lag as well."""
+"""Time over which true velocities are measured, seconds; measured velocities of a camera lag likewise."""
 
-_STEP = 1 / 8  # of the signed distances that are kept, pixels
+_STEP = 1 / 8  # resolution of the stored signed distances, pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class TrueMask:
         at: (x, y) of the crop in the image, pixels.
         inside: (h, w) int8, signed distance to the outline, positive inside, in eighths of a pixel.
         visible_px: Pixels of the mask.
-        velocity: (vx, vy) pixels per second, or None when it is not known.
+        velocity: (vx, vy) pixels per second, or None if not known.
     """
 
     at: tuple[int, int]
@@ -54,10 +54,10 @@ class Mission:
     """A mission with its truth.
 
     Attributes:
-        name: Of its folder.
-        told: `mission.json`: what a supervisor is told.
-        truth: `truth.json`: what it is not told.
-        masks: By frame, then by object.
+        name: Name of its folder.
+        told: `mission.json`: the input of the supervisor.
+        truth: `truth.json`: the ground truth.
+        masks: Masks by frame and object.
     """
 
     name: str
@@ -81,8 +81,8 @@ def load_mission(folder: Path, *, every: int = 1) -> Mission:
     """Read a mission's truth and masks.
 
     Args:
-        folder: With `mission.json`, `truth.json` and `masks/`.
-        every: Read the masks of every n-th frame; the others show nothing.
+        folder: Folder with `mission.json`, `truth.json` and `masks/`.
+        every: Read the masks of every n-th frame only.
 
     Raises:
         SettingsError: A file is missing or cannot be read.
@@ -107,17 +107,17 @@ def moved_since(
     dt: float,
     size: tuple[int, int],
 ) -> dict[str, TrueMask]:
-    """Masks with the velocities at which their outlines have moved.
+    """Masks with the velocities of their outlines.
 
     Args:
-        before: The masks some time ago.
+        before: Earlier masks.
         now: The masks now.
         dt: Seconds between the two.
         size: (width, height) of the image, pixels.
 
     Returns:
-        The masks of now. What was not in sight before has no velocity; where another object hides a
-        part, the edge of that has no say.
+        The present masks. Objects not visible before have no velocity; edges of occlusion by another object
+        are ignored.
     """
     old = {name: _region(mask, size) for name, mask in before.items()}
     moved = {}
@@ -151,13 +151,13 @@ def _masks(path: Path, labels: Mapping[str, int]) -> dict[str, TrueMask]:
 
 
 def true_mask(mask: NDArray[np.bool_]) -> TrueMask | None:
-    """A whole-image mask (H, W) bool with the distance to its outline, or None when it is empty."""
+    """The distance representation of a whole-image mask (H, W) bool, or None if it is empty."""
     x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
     if w == 0:
         return None
     left, top = max(0, x - MARGIN), max(0, y - MARGIN)
     crop = mask[top : y + h + MARGIN, left : x + w + MARGIN].astype(np.uint8)
-    # The border of the image is no outline: what reaches it goes on beyond.
+    # The image border is no outline: objects continue beyond it.
     distance = cv2.distanceTransform(crop, cv2.DIST_L2, 5) - cv2.distanceTransform(
         1 - crop, cv2.DIST_L2, 5
     )
@@ -167,18 +167,17 @@ def true_mask(mask: NDArray[np.bool_]) -> TrueMask | None:
 
 
 class ContourNoise:
-    """A random field over the image that moves outlines: smooth in space, half of it lasting in time.
+    """A random field that displaces outlines: smooth in space, half of its variance persistent in time.
 
-    Measured on the outlines of visup's own segmenter against true ones, errors are alike over some ten
-    to twenty pixels of the outline; about half of their variance is new in each frame, and the rest
-    lasts for seconds.
+    As measured on the outlines of visup's own segmenter, errors are correlated over some ten to twenty pixels
+    of the outline; about half of their variance is new in each frame, and the rest persists for seconds.
 
     Args:
         sigma: Standard deviation, pixels.
-        length: Distance over which the field is alike, pixels.
-        tau_s: How long the lasting half lasts.
+        length: Correlation length, pixels.
+        tau_s: Time constant of the persistent half, seconds.
         size: (width, height) of the image, pixels.
-        rng: Source of chance.
+        rng: Random generator.
     """
 
     def __init__(
@@ -195,7 +194,7 @@ class ContourNoise:
         self._time: float | None = None
 
     def _fresh(self) -> NDArray[np.float32]:
-        """White noise smoothed over a cell's neighbours, of unit variance."""
+        """White noise smoothed over neighbouring cells, with unit variance."""
         white = self._rng.standard_normal(self._shape, dtype=np.float32)
         smooth = cv2.GaussianBlur(white, (0, 0), 1.0, borderType=cv2.BORDER_REFLECT_101)
         return np.asarray(smooth * np.float32(2 * np.sqrt(np.pi)))
@@ -209,14 +208,14 @@ class ContourNoise:
             shape: Its (height, width).
 
         Returns:
-            (height, width) float32, pixels by which an outline there is moved outwards.
+            (height, width) float32, outward displacement of outlines in pixels.
         """
         if self._time is not None:
             keep = np.float32(np.exp(-(time - self._time) / self._tau))
             self._lasting = keep * self._lasting + np.sqrt(1 - keep**2) * self._fresh()
         self._time = time
         field = np.sqrt(np.float32(0.5)) * (self._lasting + self._fresh())
-        # Each pixel takes its value from between the cells.
+        # Interpolates between the cells.
         grow = np.array([[1, 0, corner[0]], [0, 1, corner[1]]], dtype=np.float32) / self._cell
         grow[:, 2] += 1.0
         part = cv2.warpAffine(
@@ -230,5 +229,5 @@ class ContourNoise:
 
 
 def shaken(mask: TrueMask, shift: NDArray[Any]) -> NDArray[Any]:
-    """How far inside the moved outline each pixel of the crop lies, pixels; positive inside."""
+    """Signed distance of each pixel of the crop to the displaced outline, pixels; positive inside."""
     return np.asarray(mask.inside * np.float32(_STEP) + shift)

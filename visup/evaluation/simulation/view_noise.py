@@ -1,8 +1,8 @@
-"""View hypotheses made from true orientations, with the errors that matching makes.
+"""View hypotheses simulated from true orientations, with the errors of matching.
 
-A model is told by views from directions spread over half the sphere, each standing for the opposite one too
-(`half_sphere_directions`). A look offers the views whose directions are nearest to the true one, less
-similar the farther; at random one beside them comes first, or quite another does, or none at all.
+A model has views from directions spread over half the sphere, each also representing the opposite one
+(`half_sphere_directions`). A look reports the views nearest to the true direction with decreasing similarity;
+at random a neighbouring view comes first, or a completely different one, or there is none.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ViewNoise:
-    """How hypotheses differ from the truth.
+    """The errors of hypotheses.
 
     Attributes:
-        missing: Share of looks that give nothing.
+        missing: Share of looks without hypotheses.
         wrong: Share of looks whose first hypothesis is wrong: another model, or another view.
-        wrong_run: Looks for which one wrong hypothesis comes again, on average.
-        twin: Share of looks at which the mirror image is taken for the view: the opposite direction.
-        roll_deg: Standard deviation of the turn in the plane.
+        wrong_run: Mean number of looks for which a wrong hypothesis persists.
+        twin: Share of looks with the mirror image mistaken for the view: the opposite direction.
+        roll_deg: Standard deviation of the in-plane rotation.
         similarity: Similarity of a view seen from its own direction.
         fall: Loss of similarity at 20 degrees from it; it grows with the square of the angle.
         similarity_sigma: Standard deviation of each similarity.
@@ -46,14 +46,14 @@ class ViewNoise:
 
 
 class NoisyViews:
-    """Hypotheses for one object, look by look.
+    """Simulated hypotheses of one object, look by look.
 
     Args:
         name: The object's model.
         directions: (V, 3) unit vectors of the model's views, model frame; opposite ones are views too.
-        noise: How hypotheses differ from the truth.
-        rng: Source of chance.
-        others: Models that it may be mistaken for; with none, another view of its own is.
+        noise: The errors.
+        rng: Random generator.
+        others: Models for confusions; if empty, other views of its own.
     """
 
     def __init__(
@@ -99,10 +99,10 @@ class NoisyViews:
         )
 
     def _mistaken(self, right: Hypothesis, true: Floats) -> Hypothesis | None:
-        """A wrong hypothesis that is more similar than the right one; runs of them come again."""
+        """A wrong hypothesis that is more similar than the right one, persistent over runs."""
         noise, rng = self.noise, self.rng
         going_on = self._mistake is not None and rng.random() < 1.0 - 1.0 / noise.wrong_run
-        # As many looks are wrong on average, whatever the length of runs.
+        # Keeps the share of wrong looks independent of the length of runs.
         begin = noise.wrong / (noise.wrong_run * (1.0 - noise.wrong))
         if not going_on:
             self._mistake = None
@@ -125,7 +125,7 @@ class NoisyViews:
 
 
 def _twin(h: Hypothesis) -> Hypothesis:
-    """The same silhouette taken for its mirror image: seen from behind."""
+    """The mirror-image hypothesis: the view from behind."""
     if h.direction is None:
         return h
     x, y, z = h.direction

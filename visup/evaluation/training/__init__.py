@@ -1,6 +1,5 @@
-"""Training of what motion segmentation has learnt: `visup train motion`.
+"""Training of the motion segmentation model: `visup train motion`.
 
 Read `examples.py` (cues and truth of labelled sequences), `fitting.py` (an ensemble of perceptrons by
-gradient descent), `closed_loop.py` (both ensembles, the second on beliefs that the model itself held), then
-`runner.py`.
+gradient descent), `closed_loop.py` (both ensembles, the second on the model's own beliefs), then `runner.py`.
 """

@@ -1,7 +1,7 @@
-"""Both perceptrons from examples, the second in the loop: on contexts that follow from its own beliefs.
+"""Trains both perceptrons, the second in closed loop on contexts from the model's own beliefs.
 
-A model is always surer of what it was fitted to. Context made of such beliefs would teach it to trust them
-too far; so the beliefs that it learns from are those of models fitted to other families of sequences.
+A model is overconfident on its training data, and context made of such beliefs would teach it to trust them
+too much; so the beliefs for training are those of models fitted to other families of sequences.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ from visup.percepts.motion.foreground.perceptron import ForegroundModel, Percept
 Sequences = Mapping[str, Sequence[Example]]
 FOLDS = 3
 ROUNDS = 2
-MOST = 4000  # superpixels of a sequence that are learnt from
-RARE = 0.03  # share of what moves below which it gains no more weight
+MOST = 4000  # training superpixels per sequence
+RARE = 0.03  # share of moving superpixels below which their weight is not increased further
 GAIN = 0.35  # exponent of its share by which it does: at 0.5 the best J was had by believing 0.6
-WHOLE = 0.7  # share of a superpixel that must be scored
+WHOLE = 0.7  # share of a superpixel that must have ground truth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """The cues of all frames of a sequence that a perceptron is fitted to, (count, D) each."""
+    """Training cues of all frames of a sequence, (count, D) each."""
 
     cues: Sequence[Floats]
     examples: Sequence[Example]
 
 
 def train(sequences: Sequences, seed: int, progress: Progress = silent) -> ForegroundModel:
-    """A model from the examples of sequences.
+    """Train a model on examples.
 
     Args:
-        sequences: By name; families are told from the names.
-        seed: Of all that is drawn.
+        sequences: Examples by name of sequence; families are derived from the names.
+        seed: Random seed.
         progress: Shows what is being done.
     """
     names = sorted(sequences)
@@ -75,7 +75,7 @@ def train(sequences: Sequences, seed: int, progress: Progress = silent) -> Foreg
 def _crossed(
     judged: Mapping[str, Judged], fold: Mapping[str, int], seed: int
 ) -> dict[int, Perceptron]:
-    """For each fold a perceptron fitted to all others; to all where nothing else is left."""
+    """For each fold a perceptron fitted to all other folds, or to all if there are no others."""
     out = {}
     for number in sorted(set(fold.values())):
         rest = [n for n in judged if fold[n] != number] or list(judged)
@@ -86,7 +86,7 @@ def _crossed(
 def _contexts(
     examples: Sequence[Example], alone: Perceptron, judge: Callable[[Floats], Floats]
 ) -> Judged:
-    """The cues in context of a sequence whose beliefs follow a judge."""
+    """The context cues of a sequence with beliefs by a classifier."""
     belief, out = unbiased(), []
     for e in examples:
         odds = alone.log_odds(e.cues.values)
@@ -97,9 +97,9 @@ def _contexts(
 
 
 def _rows(judged: Mapping[str, Judged], names: Sequence[str], seed: int) -> Rows:
-    """Superpixels drawn from some sequences.
+    """Superpixels sampled from sequences.
 
-    Each sequence weighs the same; what moves, which J is about and which is rare, weighs more than its
+    All sequences have equal weight; moving superpixels, which determine J and are rare, have more than their
     share.
     """
     rng = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Examples to learn from: the cues of every frame of labelled sequences, with the truth where it is known."""
+"""Training examples: the cues of every frame of labelled sequences, with ground truth if available."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from visup.percepts.motion.segmenter import MotionSegmenter
 
 SEEING = ("features", "layers", "tracks", "foreground/cues.py", "foreground/_cues_jit.py")
 CODE = tuple(f"percepts/motion/{part}" for part in SEEING)
-SCORED = 0.1  # share of a frame that must be scored for it to be an example
+SCORED = 0.1  # share of a frame that must have ground truth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example:
-    """One frame to learn from.
+    """One training frame.
 
     Attributes:
-        cues: What it shows.
-        truth: (count,) float32, share of each superpixel that moves; None where there is no truth.
-        scored: (count,) float32, share of each superpixel that has a truth.
+        cues: Its cues.
+        truth: (count,) float32, moving share of each superpixel; None without ground truth.
+        scored: (count,) float32, share of each superpixel with ground truth.
     """
 
     cues: FrameCues
@@ -43,12 +43,12 @@ class Example:
 
 
 def collected(sequence: LabelledSequence, limit: int | None, cache: Path) -> list[Example]:
-    """The examples of one sequence, from the cache when they were collected before.
+    """The examples of one sequence, from the cache if available.
 
     Args:
         sequence: Frames and masks.
-        limit: Most frames, or None.
-        cache: Folder, made when missing.
+        limit: Maximum frames, or None.
+        cache: Folder, created if missing.
     """
     digest = hashlib.sha256(code_digest(CODE))
     digest.update(json.dumps((sequence.name, limit)).encode())
@@ -68,8 +68,8 @@ def _kept(file: Path, footage: Callable[[], Footage]) -> list[Example]:
 
 
 def _collect(footage: Footage) -> Iterator[Example]:
-    """The examples of a video as it is segmented."""
-    # Cues are the same whatever is believed of them.
+    """The examples of a video during segmentation."""
+    # Cues do not depend on the model.
     segmenter = MotionSegmenter(model=blank_model(len(NAMES), CUES_IN_CONTEXT))
     for frame, labels in footage:
         segmenter.step(frame)
@@ -82,7 +82,7 @@ def _collect(footage: Footage) -> Iterator[Example]:
 def _cell_truth(
     labels: NDArray[np.uint8] | None, cells: NDArray[np.int32], count: int
 ) -> tuple[Floats | None, Floats]:
-    """Share of each cell that moves, and that is scored, (count,) each; None where nothing is."""
+    """Moving share and scored share of each cell, (count,) each; the former is None without ground truth."""
     none = np.zeros(count, np.float32)
     if labels is None or np.mean(labels != UNSCORED) < SCORED:
         return None, none

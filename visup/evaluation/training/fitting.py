@@ -1,7 +1,7 @@
 """An ensemble of perceptrons fitted to examples: weighted cross entropy, by Adam on small batches.
 
-Some thirty lines in place of a library that trains: it is all that is asked of one here, and the same
-examples and seed give the same numbers.
+A minimal implementation instead of a training library: it suffices here, and the same examples and seed give
+the same numbers.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ MEMBERS = (
 HIDDEN = 12
 EPOCHS = 30
 BATCH = 2048
-RATE = 0.01  # at first; it falls to nothing along half a cosine
-DECAY = 1e-3  # weight of the squares of the parameters
-MEAN, SQUARE = 0.9, 0.999  # weights of the past in Adam's running moments
-LEAST = 1e-3  # deviation of a cue that never changes
+RATE = 0.01  # initial; cosine decay to zero
+DECAY = 1e-3  # L2 regularisation
+MEAN, SQUARE = 0.9, 0.999  # decay rates of Adam's moments
+LEAST = 1e-3  # least standard deviation of a cue
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """What a perceptron is fitted to.
+    """The training data of a perceptron.
 
     Attributes:
         cues: (N, D) float32.
-        moves: (N,) float32, 1 where something moves, else 0.
+        moves: (N,) float32, 1 for moving, else 0.
         weight: (N,) float32.
     """
 
@@ -42,14 +42,14 @@ class Rows:
 
 
 def fit_ensemble(rows: Rows, seed: int) -> Perceptron:
-    """Fit several perceptrons, and give one whose log odds are the mean of theirs.
+    """Fit several perceptrons, and combine them to one with the mean of their log odds.
 
-    Each errs otherwise on what none has seen; their mean errs less (Hansen and Salamon, Neural network
-    ensembles, 1990).
+    Their errors on unseen data differ, so that the mean has a smaller error (Hansen and Salamon, Neural
+    network ensembles, 1990).
 
     Args:
-        rows: At least one.
-        seed: Of their first parameters and of the order of rows.
+        rows: Training data, at least one row.
+        seed: Random seed of initialisation and shuffling.
     """
     members = [fit_perceptron(rows, seed * MEMBERS + k) for k in range(MEMBERS)]
     first = members[0]
@@ -67,8 +67,8 @@ def fit_perceptron(rows: Rows, seed: int) -> Perceptron:
     """Fit a perceptron.
 
     Args:
-        rows: At least one.
-        seed: Of its first parameters and of the order of rows.
+        rows: Training data, at least one row.
+        seed: Random seed of initialisation and shuffling.
     """
     rng = np.random.default_rng(seed)
     mean = rows.cues.mean(axis=0)
@@ -101,7 +101,7 @@ Parameters = list[NDArray[np.float64]]
 def _slope(
     parameters: Parameters, z: NDArray[np.float64], moves: Floats, weight: NDArray[np.float64]
 ) -> Parameters:
-    """Gradient of the mean weighted cross entropy, with that of the decay."""
+    """Gradient of the mean weighted cross entropy, including regularisation."""
     hidden, offset, out, bias = parameters
     active = np.tanh(z @ hidden + offset)
     share = 1 / (1 + np.exp(-np.clip(active @ out + bias, -30, 30)))
@@ -124,7 +124,7 @@ class _Adam:
         self._steps = 0
 
     def step(self, parameters: Parameters, slope: Parameters, rate: float) -> None:
-        """Change the parameters, in place."""
+        """Update the parameters in place."""
         self._steps += 1
         for p, m, s, g in zip(parameters, self._mean, self._square, slope, strict=True):
             m += (1 - MEAN) * (g - m)

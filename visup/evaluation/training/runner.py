@@ -1,4 +1,4 @@
-"""`visup train motion`: from folders of labelled sequences to the file that the segmenter reads."""
+"""`visup train motion`: trains the model file of the segmenter on folders of labelled sequences."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from visup.evaluation.training.closed_loop import train
 from visup.evaluation.training.examples import Example, collected
 from visup.percepts.motion.foreground.perceptron import write_model
 
-LIMIT = 250  # frames of a sequence that are learnt from
+LIMIT = 250  # training frames per sequence
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
-    """What is learnt from, and how.
+    """The plan of a training.
 
     Attributes:
-        cache: Folder for the cues of sequences; made when missing.
-        seed: Of all that is drawn.
-        limit: Most frames of each sequence.
+        cache: Folder for the cues of sequences; created if missing.
+        seed: Random seed.
+        limit: Maximum frames of each sequence.
     """
 
     cache: Path
@@ -37,13 +37,13 @@ def train_motion(
     """Train on all sequences with masks below some folders.
 
     Args:
-        folders: Hold sequences as `visup eval motion` reads them.
-        out: The file to be written.
-        plan: How.
+        folders: Folders of sequences as for `visup eval motion`.
+        out: The model file to write.
+        plan: The plan.
         progress: Shows what is being done.
 
     Raises:
-        SettingsError: There is nothing to learn from.
+        SettingsError: There are no training data.
         OutputError: The file cannot be written.
     """
     examples = known_or_error(gathered(found_below(folders), plan, progress))
@@ -56,7 +56,7 @@ def train_motion(
 
 
 def found_below(folders: Sequence[Path]) -> dict[str, LabelledSequence]:
-    """Sequences with masks below some folders, by the name of the folder and their own.
+    """Sequences with masks below folders, by the names of folder and sequence.
 
     Raises:
         SettingsError: There is nothing below one of them.
@@ -72,7 +72,7 @@ def found_below(folders: Sequence[Path]) -> dict[str, LabelledSequence]:
 def gathered(
     sequences: Mapping[str, LabelledSequence], plan: TrainingPlan, progress: Progress = silent
 ) -> dict[str, Sequence[Example]]:
-    """The examples of sequences, by the same names."""
+    """The examples of sequences by name."""
     out: dict[str, Sequence[Example]] = {}
     for name, sequence in sequences.items():
         progress(name)
@@ -83,10 +83,10 @@ def gathered(
 def known_or_error(
     examples: Mapping[str, Sequence[Example]],
 ) -> dict[str, Sequence[Example]]:
-    """Those sequences of which some frame has a truth.
+    """The sequences with ground truth.
 
     Raises:
-        SettingsError: None has.
+        SettingsError: There are none.
     """
     known = {n: found for n, found in examples.items() if any(e.truth is not None for e in found)}
     if not known:
