@@ -11,7 +11,7 @@ import typer
 from visup.commands.archives.lake_argument import LakePlace
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rich.table import Table
 
@@ -44,7 +44,7 @@ def calibrate(
     from visup.evaluation.archive.calibrating import read_truth, reliabilities, truth_by_run
     from visup.evaluation.archive.calibration_page import calibration_page
     from visup.report.page.shell import write_page
-    from visup.terminal.console import echo_json, make_console
+    from visup.terminal.console import echo_json
 
     opened = open_lake(lake)
     with open_database(opened) as database:
@@ -56,13 +56,8 @@ def calibrate(
     if as_json:
         echo_json([asdict(one) for one in found])
         return
-    console = make_console()
-    for one in found:
-        console.print(_summary(one), soft_wrap=True, markup=False)
-        console.print(_reliability_table(one))
-    for text in (fitted if fit else "", f"Page: {page}" if page else ""):
-        if text:
-            console.print(text, soft_wrap=True, markup=False)
+    notes = [fitted] if fit else []
+    _print_figures(found, notes + ([f"Page: {page}"] if page else []))
 
 
 def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
@@ -87,6 +82,18 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
         said = fault.strerror or str(fault)
         raise OutputError(f"the settings cannot be written ({said})", where=str(path)) from fault
     return f"{how} Fitted: {evidence:.3f}, written to {path}."
+
+
+def _print_figures(found: Sequence[Reliability], notes: Sequence[str]) -> None:
+    """Print a summary and a table of each kind of statement, then the notes."""
+    from visup.terminal.console import make_console
+
+    console = make_console()
+    for one in found:
+        console.print(_summary(one), soft_wrap=True, markup=False)
+        console.print(_reliability_table(one))
+    for text in notes:
+        console.print(text, soft_wrap=True, markup=False)
 
 
 def _summary(one: Reliability) -> str:
