@@ -1,7 +1,7 @@
-"""The colours of regions: a small palette of each, as tasks ask for that tell actors by colour.
+"""Colour palettes of regions, for tasks that identify actors by colour.
 
-A region's border belongs as much to what lies around it, and to how well it was segmented, so the
-mask is eroded first. What a palette is called, `rules/traits/colours.py` says.
+A region's border mixes with its surroundings and depends on the segmentation, so the mask is eroded first.
+Palettes are named in `rules/traits/colours.py`.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Observation, Percept, Region
 
 LIGHTNESS_STEP, CHROMA_STEP = 8.0, 10.0
-"""Widths of the bins into which L*, and a* and b*, are put: finer than words for colours are."""
+"""Bin widths of L*, and of a* and b*: finer than colour words."""
 
 ENTRIES = 12
-"""Entries of a palette at most."""
+"""Most entries of a palette."""
 
 SAMPLES = 600
-"""Pixels of a region that are looked at: shares are then right within some hundredths."""
+"""Sampled pixels of a region: shares are then accurate to a few hundredths."""
 
 ERODED = 0.04
-"""By how much a mask is eroded, shares of the square root of its area."""
+"""Erosion of a mask, as a share of the square root of its area."""
 
 Palette = tuple[tuple[float, float, float, float], ...]
 """(L*, a*, b*, share) of each entry, the greatest share first; shares sum to at most 1."""
@@ -45,7 +45,7 @@ class ColourBehaviour(Stateless):
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One palette for each region of which some pixels are in the image."""
+        """One palette for each region with pixels in the image."""
         for region in observation.of("region"):
             found = palette(frame.image, region)
             if found:
@@ -58,10 +58,10 @@ def palette(image: NDArray[np.uint8], region: Region) -> Palette:
 
     Args:
         image: (H, W, 3) uint8, BGR.
-        region: Its mask may reach beyond the image; that part is left out.
+        region: Its mask may reach beyond the image; that part is ignored.
 
     Returns:
-        At most `ENTRIES` colours in CIE L*a*b* (L* 0 to 100); empty when nothing of it is in the image.
+        At most `ENTRIES` colours in CIE L*a*b* (L* 0 to 100); empty when none of it is in the image.
 
     Example:
         >>> mask = np.ones((20, 20), bool)
@@ -77,7 +77,7 @@ def palette(image: NDArray[np.uint8], region: Region) -> Palette:
     steps = np.array([LIGHTNESS_STEP, CHROMA_STEP, CHROMA_STEP])
     middle = np.array(
         [0.5, 0.0, 0.0]
-    )  # bins of L* begin at black, those of a* and b* lie about grey
+    )  # bins of L* start at black, those of a* and b* are centred on grey
     bins, counts = np.unique(np.rint(lab / steps - middle), axis=0, return_counts=True)
     order = np.argsort(-counts, kind="stable")[:ENTRIES]
     return tuple(
@@ -87,7 +87,7 @@ def palette(image: NDArray[np.uint8], region: Region) -> Palette:
 
 
 def _pixels(image: NDArray[np.uint8], region: Region) -> NDArray[np.uint8]:
-    """(N, 3) evenly drawn pixels of a region, its border left out where enough is left."""
+    """(N, 3) evenly sampled pixels of a region, without its border where enough remains."""
     x, y, w, h = region.bbox
     left, top = max(0, x), max(0, y)
     right, bottom = min(image.shape[1], x + w), min(image.shape[0], y + h)

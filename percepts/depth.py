@@ -1,9 +1,9 @@
-"""Relative depth from size: how far a region must be for its model to look that big.
+"""Relative depth from size: the distance at which a model would appear as large as its region.
 
-The paper compares the area of a region with the dimensions of the model that it is believed to be
-(section 7.4). With a focal length of f pixels, a silhouette of `real` model units squared at depth d covers
-``real * (f / d) ** 2`` pixels. An error in the field of view scales all depths alike, so that nearer and
-farther, approaching and receding remain right.
+The paper compares the area of a region with the dimensions of its presumed model (section 7.4). With a focal
+length of f pixels, a silhouette of `real` model units squared at depth d covers ``real * (f / d) ** 2``
+pixels. An error in the field of view scales all depths alike, so nearer and farther, approaching and receding
+remain correct.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from visup.agent.model.records import Depth, Frame, Hypothesis, Observation, Per
 from visup.percepts.shape.database.model_database import ModelDatabase
 
 FOV_VERTICAL_DEG = 40.0
-"""Vertical field of view assumed when none is told."""
+"""Vertical field of view assumed by default."""
 
 NEAR_BEST = 0.08
-"""Views less similar than the best by more than this say nothing about size."""
+"""Views less similar than the best by more than this are ignored for the size."""
 
 LEAST_RELATIVE_SIGMA = 0.03
-"""Even a perfect match has its area from a finite set of views and a pixel grid."""
+"""Least relative error: even a perfect match is limited by the set of views and the pixel grid."""
 
 
 class DepthBehaviour(Stateless):
-    """Reports the depth of each whole region under each identity that it may have.
+    """Reports the depth of each uncut region under each of its possible identities.
 
     Args:
-        database: Tells the real area of views whose hypotheses carry no scale; may be None.
+        database: Source of real areas for hypotheses without a scale; may be None.
         fov_vertical_deg: Vertical field of view, degrees; 40 is assumed when None.
-        sizes_m: Model name -> its largest extent as someone has measured it, metres; it goes before the
-            size that the model has in the database.
+        sizes_m: Model name -> its measured largest extent, metres; takes precedence over the size of the
+            model in the database.
 
     Raises:
         SettingsError: The field of view is not between 0 and 180 degrees.
@@ -68,7 +68,7 @@ class DepthBehaviour(Stateless):
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One depth for each region that the border does not cut and each name it may have."""
+        """One depth for each region not cut by the border and each of its possible names."""
         focal = focal_px(frame.size[1], self.fov_vertical_deg)
         hypotheses: tuple[Hypothesis, ...] = observation.of("hypothesis")
         for region in observation.of("region"):
@@ -76,7 +76,7 @@ class DepthBehaviour(Stateless):
                 own = [h for h in hypotheses if h.region_id == region.id]
                 for depth in region_depths(region, own, focal, self._areas):
                     by = self._enlarged.get(depth.name, 1.0)
-                    if by != 1.0:  # what is twice as big looks the same from twice as far
+                    if by != 1.0:  # an object twice as large looks the same from twice the distance
                         depth = replace(depth, depth=depth.depth * by, sigma=depth.sigma * by)
                     yield Percept("depth", depth, frame.time, self.contract.name)
 
@@ -84,7 +84,7 @@ class DepthBehaviour(Stateless):
 def extents(database: ModelDatabase, names: Collection[str]) -> dict[str, float]:
     """The largest extent of some models over all their views, in model units.
 
-    Models whose size is not known, or that the database does not have, are left out.
+    Models of unknown size, or missing from the database, are left out.
     """
     found: dict[str, float] = {}
     for number, view in enumerate(database.views):
@@ -98,7 +98,7 @@ def extents(database: ModelDatabase, names: Collection[str]) -> dict[str, float]
 
 
 def focal_px(height: int, fov_vertical_deg: float) -> float:
-    """Focal length in pixels of an image of that height with that vertical field of view.
+    """Focal length in pixels, from the image height and the vertical field of view.
 
     Example:
         >>> focal_px(480, 90.0)
@@ -113,17 +113,17 @@ def region_depths(
     focal: float,
     areas: Mapping[tuple[str, int], float],
 ) -> list[Depth]:
-    """Depths of one region, one for each name whose size is known.
+    """Depths of one region, one for each name of known size.
 
     Args:
-        region: The region, whole.
-        hypotheses: What it may be.
+        region: The region, uncut.
+        hypotheses: Its hypotheses.
         focal: Focal length, pixels.
         areas: (name, view) -> real area, model units squared.
 
     Returns:
-        In the order in which the names first appear. Sigma joins how the best views of a name disagree
-        on size, weighted by similarity, with what the best one leaves unexplained.
+        In the order in which the names first appear. Sigma combines the disagreement of a name's best views
+        on size, weighted by similarity, with the best view's misfit.
     """
     by_name: dict[str, list[tuple[float, float]]] = {}
     for h in hypotheses:
@@ -138,7 +138,7 @@ def _scale(region: Region, area: float | None) -> float | None:
 
 
 def _depth(region_id: int, name: str, found: Sequence[tuple[float, float]]) -> Depth:
-    """The depth that the best view gives, and how sure it is; `found` holds (similarity, depth)."""
+    """The depth from the best view, and its sigma; `found` holds (similarity, depth)."""
     best, depth = max(found)
     near = [(s, d) for s, d in found if s >= best - NEAR_BEST]
     total = sum(s for s, _ in near)

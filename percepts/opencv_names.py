@@ -1,4 +1,4 @@
-"""File names that OpenCV can take: it dies of those that are not UTF-8, which it is given by a link."""
+"""File names that are safe for OpenCV, which crashes on names that are not UTF-8."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 
 
 def opencv_name(path: str | os.PathLike[str]) -> str:
-    """A name by which OpenCV opens, or writes, a file.
+    """A name by which OpenCV can open or write a file.
 
-    Names on disk are bytes. Where they are not UTF-8 (an old archive, a bare `LC_ALL=POSIX`), Python stands
-    in for them with surrogates, at which OpenCV's bindings end the process. A link of a plain name leads to
-    such a file; it lasts as long as the process.
+    Names on disk are bytes. Where they are not UTF-8 (an old archive, a bare `LC_ALL=POSIX`), Python
+    represents them with surrogates, on which OpenCV's bindings abort the process. Such a file is reached
+    through a link with a plain name, which lasts as long as the process.
 
     Args:
-        path: A file, there or to be written; or a URL.
+        path: A file, existing or to be written; or a URL.
     """
     name = os.fspath(path)
     try:

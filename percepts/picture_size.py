@@ -1,4 +1,4 @@
-"""How large a picture is, told by its header: before memory is taken for its pixels."""
+"""Picture sizes from headers, checked before memory is allocated for the pixels."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import warnings
 from io import BytesIO
 
 MOST_PIXELS = 2**26
-"""Pixels of a picture or frame, 67 million: twice those of a video of 8K. Beyond, decoding alone takes
-seconds and gigabytes."""
+"""Most pixels of a picture or frame, 67 million: twice an 8K frame. Beyond, decoding alone takes seconds and
+gigabytes."""
 _AT_MOST = f"visup decodes at most {MOST_PIXELS / 1e6:.0f} million"
 
 
@@ -15,7 +15,7 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
     """Width and height of a picture file in pixels, or None where its header cannot be read.
 
     Raises:
-        ValueError: They are so many that Pillow does not say how many.
+        ValueError: Pillow refuses the picture as too large to report its size.
     """
     from PIL import Image
 
@@ -27,15 +27,15 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
     except Image.DecompressionBombError as fault:
         raise ValueError(f"has far too many pixels; {_AT_MOST}") from fault
     except Exception:
-        # Pillow raises whatever its readers do; the picture's own decoder has the last word.
+        # Pillow's readers may raise anything; the picture's decoder decides.
         return None
 
 
 def check_picture_size(data: bytes) -> None:
-    """Refuse a picture that is too large to be decoded.
+    """Reject a picture that is too large to decode.
 
     Raises:
-        ValueError: It is; says how large.
+        ValueError: It is too large; the message says how large.
     """
     size = picture_size(data)
     if size is not None:
@@ -43,7 +43,7 @@ def check_picture_size(data: bytes) -> None:
 
 
 def check_pixels(width: float, height: float) -> None:
-    """Refuse a picture with too many pixels.
+    """Reject a picture with too many pixels.
 
     Raises:
         ValueError: They are too many.

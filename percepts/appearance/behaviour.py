@@ -1,4 +1,4 @@
-"""Taught things and what moves, as one behaviour: a region for each, and names for the taught ones."""
+"""Taught objects and other motion as one behaviour: a region for each, and names for the taught ones."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, ima
 from visup.percepts.motion.outlines.region_outline import RegionOutline
 from visup.percepts.taught.view import TaughtView
 
-SAME = 0.4  # overlap (IoU) at which what moves is a thing that is now known by name
+SAME = 0.4  # overlap (IoU) from which a moving region is a newly detected object
 
 
 class AppearanceBehaviour:
-    """Reports taught things, at rest and in motion, whatever else moves, and how the camera moved.
+    """Reports taught objects, at rest and in motion, other moving regions, and camera motion.
 
-    It takes the place of the behaviour that sees motion, which runs within it: a region that moves and
-    is mainly a taught thing is that thing, and not told twice.
+    Replaces the motion behaviour, which runs inside it: a moving region that is mainly a taught object is
+    reported once, as that object.
 
     Args:
-        taught: Views of things; several of one name add up.
-        motion: Finds what moves by itself.
+        taught: Views of objects; several of one name add up.
+        motion: Segments independent motion.
     """
 
     contract = Contract(
@@ -52,31 +52,31 @@ class AppearanceBehaviour:
         self._drawn: dict[str, tuple[Blob, RegionOutline | None]] = {}
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         return {"motion": self._motion.save(), "tracker": self._tracker.save()}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same settings remembered."""
+        """Restore the state of a behaviour with the same settings."""
         self._motion.load(state["motion"])
         self._tracker.load(state["tracker"])
 
     def missed(self, observation: Observation) -> None:
-        """Take note of regions reported since the state that was taken on: their ids are used."""
+        """Reserve the ids of regions reported since the restored state."""
         self._motion.missed(observation)
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """Report the things and the other moving regions of one frame.
+        """Report the taught objects and the other moving regions of one frame.
 
         Args:
             frame: The next frame.
-            observation: What was reported before of this frame; unless its health is OK beyond doubt,
-                nothing is reported.
-            directives: Those that seeing motion obeys.
+            observation: What was reported for this frame so far; nothing is reported unless its health is
+                fully OK.
+            directives: Those that motion segmentation obeys.
 
         Returns:
-            Percepts of kind 'camera', unless that is not known; of kind 'region', by id; then of kind
+            Percepts of kind 'camera', unless unknown; of kind 'region', by id; then of kind
             'hypothesis'.
         """
         moving = [p.value for p in self._motion.perceive(frame, observation, directives)]
@@ -88,8 +88,8 @@ class AppearanceBehaviour:
         if not image_is_trusted(observation):
             return []
         before = None if last is None else last.time
-        seen = [(t, self._outline(t, scene)) for t in tracks]
-        things = [(t, thing_region(t, o, scene, before)) for t, o in seen if o is not None]
+        outlined = [(t, self._outline(t, scene)) for t in tracks]
+        things = [(t, thing_region(t, o, scene, before)) for t, o in outlined if o is not None]
         known = {t.id for t in tracks}
         moving = [r for r in moving if r.id not in known]
         others = unexplained(moving, [r for _, r in things], frame.size)
@@ -116,7 +116,7 @@ class AppearanceBehaviour:
         return known[1]
 
     def _id_of(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:
-        """The id of a thing seen for the first time: that of the region that was seen to move there."""
+        """The id of a newly detected object: that of the region that moved there, if any."""
         known = {t.id for t in self._tracker.tracks}
         same = [r for r in moving if r.id not in known and shares(r, blob, scene) > SAME]
         return min((r.id for r in same), default=None) or self._motion.new_id()

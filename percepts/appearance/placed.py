@@ -1,4 +1,4 @@
-"""Objects that a task identifies by their place only are taught from the first picture."""
+"""Objects that a task identifies only by position are taught from the first picture."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from visup.percepts.taught.view import TaughtView, taught_view
 
 
 class PlacedBehaviour:
-    """Reports taught things, what moves, and the things at some places of the first sound picture.
+    """Reports taught objects, other motion, and the objects at given positions of the first valid picture.
 
-    Where nothing has an edge about a place, nothing is taught there: what moves from there may
-    still be found to have been there.
+    Nothing is taught at a position without an edge around it; what moves away from there may still be
+    found to have been there.
 
     Args:
         places: Name -> (x, y), pixels.
-        taught: Views of other things.
+        taught: Views of other objects.
     """
 
     contract = Contract(
@@ -38,23 +38,23 @@ class PlacedBehaviour:
         self._inner = AppearanceBehaviour(self._given)
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         return {"views": self._views, "inner": self._inner.save()}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same settings remembered."""
+        """Restore the state of a behaviour with the same settings."""
         self._views = state["views"]
         self._inner = AppearanceBehaviour((*self._given, *(self._views or ())))
         self._inner.load(state["inner"])
 
     def missed(self, observation: Observation) -> None:
-        """Take note of regions reported since the state that was taken on: their ids are used."""
+        """Reserve the ids of regions reported since the restored state."""
         self._inner.missed(observation)
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """Report the things and the other moving regions of one frame; see `AppearanceBehaviour`."""
+        """Report the objects and the other moving regions of one frame; see `AppearanceBehaviour`."""
         if self._views is None and image_is_sound(observation):
             self._views = tuple(self._shown(frame))
             self._inner = AppearanceBehaviour((*self._given, *self._views))
@@ -67,4 +67,4 @@ class PlacedBehaviour:
                 if outline is not None:
                     yield taught_view(name, frame.image, outline)
             except SettingsError:
-                continue  # too small a thing to be known again
+                continue  # too small to be recognised

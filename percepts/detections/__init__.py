@@ -1,9 +1,9 @@
 """Boxes from an external detector or tracker, in place of motion segmentation: a file, a network, or code.
 
 Read `boxes.py` (a box), `files.py` (MOT and COCO files), `yolo.py` and `network.py` (ONNX files of the YOLO
-family), `supervision.py` (the boxes of that library, in and out), `numbering.py` (the same thing keeps its
-number), `behaviour.py` (boxes as regions, their names as hypotheses) and `people.py` (people, by what OpenCV
-carries with it).
+family), `supervision.py` (conversion from and to that library), `numbering.py` (tracking by detection),
+`behaviour.py` (boxes as regions, their names as hypotheses) and `people.py` (OpenCV's bundled people
+detector).
 """
 
 from visup.percepts.detections.behaviour import (

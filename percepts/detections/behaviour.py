@@ -1,4 +1,4 @@
-"""Boxes of a detector as regions, and their names as hypotheses."""
+"""Detectors as behaviours: boxes as regions, and their names as hypotheses."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from visup.percepts.detections.network import YoloNetwork
 from visup.percepts.detections.numbering import BoxNumbering
 
 PAST_S = 0.4
-"""Velocities are those over so long a time."""
+"""Time over which velocities are measured, seconds."""
 
 VELOCITY_SIGMA = 4.0
-"""Deviation of a velocity, pixels per second: detectors' boxes jitter by a pixel or two."""
+"""Standard deviation of a velocity, pixels per second: detectors' boxes jitter by a pixel or two."""
 
 LEAST_SIDE = 2
-"""What shows of a box within the picture must be so wide and high, pixels."""
+"""Least width and height of the visible part of a box, pixels."""
 
 
 class DetectorBehaviour:
-    """A detector as a behaviour: its boxes are regions, and their names hypotheses.
+    """A detector as a behaviour: its boxes become regions, and their names hypotheses.
 
-    A plug-in is a subclass with a `find` of its own (and a `start`, where it must load something); boxes
-    without numbers are numbered.
+    A plug-in subclasses it with its own `find` (and `start`, if it must load something); boxes without
+    numbers are tracked.
 
     Args:
-        find: Gives the boxes of a frame; a subclass may define it instead.
+        find: Returns the boxes of a frame; a subclass may define it instead.
 
     Attributes:
-        names: All that things may be said to be, where that is known beforehand.
+        names: All possible names of objects, if known in advance.
     """
 
     contract = Contract("detections", gives=("region", "hypothesis"))
@@ -56,19 +56,19 @@ class DetectorBehaviour:
         return self._find(frame)
 
     def save(self) -> Mapping[str, Any]:
-        """Where things were a moment ago."""
+        """The recent positions of objects."""
         past = {track: list(map(list, rows)) for track, rows in self._past.items()}
         return {"past": past, "numbering": self._numbering.save()}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same detector remembered."""
+        """Restore the state of a behaviour with the same detector."""
         self._past = {int(k): [tuple(r) for r in rows] for k, rows in state["past"].items()}
         self._numbering.load(state["numbering"])
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One region for each box that shows in the picture, and what it is said to be."""
+        """One region for each box visible in the picture, and a hypothesis for its name."""
         source = self.contract.name
         for detection in self._numbering.number(frame.index, tuple(self.find(frame))):
             region = self._region(detection, frame)
@@ -101,7 +101,7 @@ class DetectorBehaviour:
         )
 
     def _velocity(self, detection: Detection, now: float) -> tuple[float, float]:
-        """Of the middle of a box, pixels per second."""
+        """Velocity of the centre of a box, pixels per second."""
         x, y, w, h = detection.box
         here = (now, x + w / 2, y + h / 2)
         past = [p for p in self._past.get(detection.track, []) if now - p[0] <= PAST_S]
@@ -113,7 +113,7 @@ class DetectorBehaviour:
 
 
 class DetectionsBehaviour(DetectorBehaviour):
-    """Reports the boxes that a file has for each frame; see `read_detections`.
+    """Reports the boxes of each frame from a file; see `read_detections`.
 
     Args:
         frames: Index of a frame -> its boxes.
@@ -126,7 +126,7 @@ class DetectionsBehaviour(DetectorBehaviour):
 
 
 class NetworkBehaviour(DetectorBehaviour):
-    """Reports what a network finds in each frame; see `YoloNetwork`.
+    """Reports the detections of a network in each frame; see `YoloNetwork`.
 
     Args:
         path: The ONNX file.

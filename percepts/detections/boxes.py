@@ -1,4 +1,4 @@
-"""A box in a frame, and how far two of them are one."""
+"""Boxes in frames, and their overlap."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class Detection:
     """One box in one frame.
 
     Attributes:
-        track: Number of the thing, the same from frame to frame, from 1; 0 where nobody has numbered it.
+        track: Track number, the same from frame to frame, from 1; 0 where unassigned.
         box: (x, y, width, height), pixels.
-        score: How sure the detector is, 0 to 1.
-        name: What it is said to be, or None.
+        score: Score of the detector, 0 to 1.
+        name: Name of its class, or None.
     """
 
     track: int

@@ -1,4 +1,4 @@
-"""Boxes from files: MOT Challenge text and COCO JSON, with the numbers of a tracker or without."""
+"""Boxes from files: MOT Challenge text and COCO JSON, with or without track numbers."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ EXPECTED = (
 )
 MOST_BYTES = 2**27
 MOST_COCO_VALUES, MOST_MOT_LINES = 12_000_000, 2_000_000
-"""About a million boxes and two: they take a gigabyte."""
+"""About one and two million boxes, which take a gigabyte."""
 FARTHEST, MOST_TRACKS = 1e6, 10**9
 """Pixels from the corner, and the highest number of a track."""
 SCORE = 6
-"""The last value of a line of MOT that is looked at, counted from 0."""
+"""Index of the last MOT column used, from 0."""
 
 
 Frames = Mapping[int, tuple[Detection, ...]]
@@ -32,16 +32,16 @@ Frames = Mapping[int, tuple[Detection, ...]]
 def read_detections(path: Path, images: Sequence[str] = ()) -> Frames:
     """The boxes of a file, by frame.
 
-    Boxes are numbered by the tracker that wrote them, or have no number (0) each.
+    Boxes carry the numbers of the tracker that wrote them, or all have none (0).
 
     Args:
         path: The file.
-        images: Names of the images that are watched, in order, where the source is a folder of images: those
-            of a COCO file are then known by their names.
+        images: Names of the watched images, in order, where the source is a folder of images; those of a
+            COCO file are then matched by name.
 
     Raises:
-        SettingsError: It cannot be read, is of neither form, tells of images that the source does not
-            have, or some of its boxes have numbers and some not.
+        SettingsError: The file cannot be read, has neither format, refers to images that the source does
+            not have, or numbers only some of its boxes.
     """
     try:
         text = read_text_file(path, MOST_BYTES)
@@ -56,8 +56,8 @@ def read_detections(path: Path, images: Sequence[str] = ()) -> Frames:
         what = f"the detections cannot be read ({fault.strerror})"
         raise SettingsError(what, where=str(path)) from fault
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, RecursionError) as fault:
-        said = f"no {fault}" if isinstance(fault, KeyError) else str(fault)
-        what = f"the detections cannot be used: {said}"
+        reason = f"no {fault}" if isinstance(fault, KeyError) else str(fault)
+        what = f"the detections cannot be used: {reason}"
         raise SettingsError(what, where=str(path), expected=EXPECTED) from fault
     numbered = {d.track > 0 for boxes in found.values() for d in boxes}
     if len(numbered) > 1:
@@ -89,14 +89,14 @@ def _mot(text: str) -> Iterator[tuple[int, Detection]]:
         x, y, w, h = (float(c) for c in cells[2:6])
         score = float(cells[SCORE]) if len(cells) > SCORE else 1.0
         sure = min(1.0, score) if score > 0 else 1.0
-        track = max(0, int(float(cells[1])))  # -1 where only a detector spoke
+        track = max(0, int(float(cells[1])))  # -1 in the output of a detector
         yield int(float(cells[0])) - 1, Detection(track, (x, y, w, h), sure)
 
 
-def _coco(told: Any, images: Sequence[str]) -> Iterator[tuple[int, Detection]]:
-    names = {c["id"]: str(c["name"]) for c in told.get("categories", ())}
-    order = _coco_frames({i["id"]: str(i.get("file_name", "")) for i in told["images"]}, images)
-    for row in told["annotations"]:
+def _coco(data: Any, images: Sequence[str]) -> Iterator[tuple[int, Detection]]:
+    names = {c["id"]: str(c["name"]) for c in data.get("categories", ())}
+    order = _coco_frames({i["id"]: str(i.get("file_name", "")) for i in data["images"]}, images)
+    for row in data["annotations"]:
         x, y, w, h = (float(v) for v in row["bbox"])
         score = min(1.0, max(0.0, float(row.get("score", 1.0))))
         name = names.get(row.get("category_id"))
@@ -105,17 +105,17 @@ def _coco(told: Any, images: Sequence[str]) -> Iterator[tuple[int, Detection]]:
 
 
 def _coco_frames(files: Mapping[Any, str], images: Sequence[str]) -> Mapping[Any, int]:
-    """Which frame each image of a COCO file is.
+    """The frame of each image of a COCO file.
 
-    By its frame number where visup wrote it (`clip.mp4#12`); else by its name, where images are watched; else
-    by its place in the order of ids, whatever these are.
+    By its frame number where visup wrote it (`clip.mp4#12`); else by its name, where images are watched;
+    else by its rank among the ids.
 
     Args:
         files: Id of an image -> its file name, empty where there is none.
-        images: Names of the images that are watched, in order; none where a video is.
+        images: Names of the watched images, in order; none for a video.
 
     Raises:
-        ValueError: An image is none of those that are watched.
+        ValueError: An image is not among the watched ones.
     """
     numbers = {n: re.search(r"#(\d+)$", file) for n, file in files.items()}
     if all(numbers.values()):

@@ -13,21 +13,21 @@ from visup.percepts.detections.boxes import Detection
 from visup.percepts.detections.yolo import decode_yolo, letterbox
 
 USUAL_SIDE = 640
-"""Where a network takes pictures of any size, it is given this one."""
+"""Input size for networks that accept any."""
 
 
 class YoloNetwork:
-    """Finds things in a frame by a network of the YOLO family; see `decode_yolo`.
+    """Detects objects in a frame by a network of the YOLO family; see `decode_yolo`.
 
     Args:
-        path: The ONNX file. Names of classes are read from its notes (`names`), where exporters write them.
+        path: The ONNX file. Class names are read from its metadata (`names`), where exporters write them.
 
     Attributes:
-        names: Of the classes; empty where the file does not tell them.
+        names: Class names; empty where the file has none.
 
     Raises:
         ExtraMissingError: onnxruntime is not installed.
-        SettingsError: The file cannot be read, or its network takes no pictures.
+        SettingsError: The file cannot be read, or its network does not take images.
     """
 
     def __init__(self, path: Path) -> None:
@@ -38,12 +38,12 @@ class YoloNetwork:
         if not path.is_file():
             raise SettingsError("there is no such file", where=str(path))
         options = onnxruntime.SessionOptions()
-        options.log_severity_level = 4  # what is wrong is told below
+        options.log_severity_level = 4  # errors are reported below
         try:
             self._session: Any = onnxruntime.InferenceSession(
                 str(path), options, providers=["CPUExecutionProvider"]
             )
-        except Exception as fault:  # onnxruntime has no class of its own for a damaged file
+        except Exception as fault:  # onnxruntime has no exception class for damaged files
             raise SettingsError(
                 "the network cannot be read", where=str(path), expected="an ONNX file"
             ) from fault
@@ -52,10 +52,10 @@ class YoloNetwork:
         self.names = _names(self._session.get_modelmeta().custom_metadata_map)
 
     def __call__(self, frame: Frame) -> tuple[Detection, ...]:
-        """What is found in a frame.
+        """The detections of a frame.
 
         Raises:
-            SettingsError: What the network gives is no layout that is known.
+            SettingsError: The output has no known layout.
         """
         blob, fitted = letterbox(frame.image, self.size)
         (output, *_) = self._session.run(None, {self._input: blob})
@@ -69,7 +69,7 @@ class YoloNetwork:
             ) from fault
 
     def _taken(self) -> tuple[str, tuple[int, int]]:
-        """The name of the input, and the (width, height) that it takes."""
+        """The name and (width, height) of the input."""
         (first, *_) = self._session.get_inputs()
         shape = list(first.shape)
         if len(shape) != 4 or shape[1] not in (3, "channels") or "float" not in first.type:
@@ -83,11 +83,11 @@ class YoloNetwork:
 
 
 def _names(notes: Mapping[str, str]) -> tuple[str, ...]:
-    """Names of classes, which exporters write as `{0: 'person', 1: 'bicycle'}`."""
+    """Class names, which exporters write as `{0: 'person', 1: 'bicycle'}`."""
     try:
-        told = ast.literal_eval(notes.get("names", ""))
+        names = ast.literal_eval(notes.get("names", ""))
     except (ValueError, SyntaxError, MemoryError, RecursionError):
         return ()
-    if isinstance(told, dict):
-        told = [told.get(n) for n in range(len(told))]
-    return tuple(str(n) for n in told) if isinstance(told, list | tuple) else ()
+    if isinstance(names, dict):
+        names = [names.get(n) for n in range(len(names))]
+    return tuple(str(n) for n in names) if isinstance(names, list | tuple) else ()

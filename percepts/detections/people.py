@@ -1,8 +1,8 @@
-"""People who stand or walk, by the detector included in OpenCV, without any download.
+"""Standing and walking people, by the detector included in OpenCV, without a download.
 
-Histograms of oriented gradients, weighed by the linear machine that was learnt from the pictures of Dalal and
-Triggs, "Histograms of Oriented Gradients for Human Detection" (2005). It knows people seen whole, upright and
-roughly from the side; neither hands nor who sits or is half hidden.
+Histograms of oriented gradients with the linear SVM trained on the pictures of Dalal and Triggs, "Histograms
+of Oriented Gradients for Human Detection" (2005). It detects whole people, upright and roughly from the side;
+not hands, nor people who sit or are half hidden.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from visup.percepts.detections.behaviour import DetectorBehaviour
 from visup.percepts.detections.boxes import Box, Detection
 
 WINDOW = (64, 128)
-"""Width and height of what it looks at, pixels; a person fills some three quarters of the height."""
+"""Width and height of the detection window, pixels; a person fills some three quarters of its height."""
 
 PERSON_PX = 96.0
 
 LARGEST_PX = 1600
-"""Pictures are not made wider or higher than that to be looked at, which bounds the time of a frame."""
+"""Most width and height of an enlarged picture, which bounds the time per frame."""
 
 MARGIN = (0.15, 0.06)
-"""What a box found leaves round the person on each side, shares of its width and height."""
+"""Margin of a detected box around the person, shares of its width and height."""
 
 
 class PeopleBehaviour(DetectorBehaviour):
     """Boxes of people, called `person`.
 
     Args:
-        settings: What to look for.
+        settings: Settings.
     """
 
     contract = Contract("people", gives=("region", "hypothesis"), cost_ms=1000)
     names = ("person",)
 
     class Settings(BaseModel):
-        """What can be set by `--set people.NAME=VALUE`."""
+        """Settings of `--set people.NAME=VALUE`."""
 
         least_px: float = Field(
             default=60.0, ge=24, description="height of the smallest person, pixels"
@@ -71,7 +71,7 @@ class PeopleBehaviour(DetectorBehaviour):
 
 
 def person_in(box: Box, scale: float) -> Box:
-    """The person in a box that was found in a picture of another scale, without the margin round it."""
+    """The person inside a box detected at another scale, without its margin."""
     x, y, w, h = (value / scale for value in box)
     across, along = MARGIN
     return (x + across * w, y + along * h, (1 - 2 * across) * w, (1 - 2 * along) * h)

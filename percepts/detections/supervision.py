@@ -1,4 +1,4 @@
-"""Boxes from and to `supervision.Detections`, which trackers, annotators and counters share."""
+"""Conversion from and to `supervision.Detections`, which trackers, annotators and counters share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class SupervisionDetections(Protocol):
-    """What is read of `supervision.Detections`: rows of one length, None where nothing is known."""
+    """The part of `supervision.Detections` in use: rows of one length, None where unknown."""
 
     @property
     def xyxy(self) -> Any: ...  # noqa: D102
@@ -38,8 +38,8 @@ def from_supervision(found: SupervisionDetections) -> tuple[Detection, ...]:
     """Boxes of one frame.
 
     Args:
-        found: `supervision.Detections`; where a tracker has numbered them, these numbers are kept (from 0
-            there, from 1 here).
+        found: `supervision.Detections`; the numbers of a tracker are kept (from 0 there, from 1 here).
+
 
     Returns:
         The boxes, in the same order, with names where `data["class_name"]` has them.
@@ -62,14 +62,14 @@ def from_supervision(found: SupervisionDetections) -> tuple[Detection, ...]:
 
 
 def to_supervision(mind: Mind) -> Any:
-    """What is in view, as `supervision.Detections` for its annotators, counters and zones.
+    """The visible objects, as `supervision.Detections` for its annotators, counters and zones.
 
     Args:
-        mind: What is believed after a step (`step.mind`).
+        mind: The mind after a step (`step.mind`).
 
     Returns:
         Boxes with masks, `tracker_id` (the ids of the objects), `confidence` (of the name) and
-        `data["class_name"]`; `class_id` numbers the names in the order of the alphabet.
+        `data["class_name"]`; `class_id` numbers the names alphabetically.
 
     Raises:
         SettingsError: supervision is not installed.

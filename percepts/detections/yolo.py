@@ -1,4 +1,4 @@
-"""Networks of the YOLO family: a frame as they take it, and boxes from the arrays that they give."""
+"""Networks of the YOLO family: preparing a frame as input, and decoding boxes from the output."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from visup.percepts.detections.boxes import Detection
 
 GREY = 114
-"""What fills the picture up to the size of the network: the grey that these networks were trained with."""
+"""Padding around the picture: the grey that these networks were trained with."""
 
 LEAST_SCORE, MOST_OVERLAP = 0.25, 0.45
-"""Boxes below the first are left out; of two of a class that overlap by more than the second, the lesser."""
+"""Least score of a box, and most overlap of two boxes of a class (non-maximum suppression)."""
 
 CHOSEN_COLUMNS = 6
 
 
 class Layout(Enum):
-    """What the columns of a candidate are."""
+    """The meaning of a candidate's columns."""
 
     CLASSES = "middle and size, a score for each class"
     ANYTHING = "middle and size, a score that there is anything, a score for each class"
@@ -30,12 +30,12 @@ class Layout(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Letterbox:
-    """How a picture was fitted into the square of a network.
+    """The fit of a picture into the input of a network.
 
     Attributes:
-        scale: Pixels of the network for one of the picture.
-        left: Empty pixels at its left,
-        top: and at its top.
+        scale: Pixels of the network per pixel of the picture.
+        left: Padding at the left, pixels.
+        top: Padding at the top, pixels.
     """
 
     scale: float
@@ -51,14 +51,14 @@ class Letterbox:
 def letterbox(
     image: NDArray[np.uint8], size: tuple[int, int]
 ) -> tuple[NDArray[np.float32], Letterbox]:
-    """A picture as these networks take it: fitted whole, the rest grey, RGB, 0 to 1.
+    """A picture as network input: scaled to fit, padded with grey, RGB, 0 to 1.
 
     Args:
         image: (H, W, 3) uint8 BGR.
-        size: (width, height) that the network takes.
+        size: (width, height) of the network's input.
 
     Returns:
-        (1, 3, height, width) float32, and how it was fitted.
+        (1, 3, height, width) float32, and the fit.
     """
     import cv2
 
@@ -80,29 +80,29 @@ def decode_yolo(
     least_score: float = LEAST_SCORE,
     most_overlap: float = MOST_OVERLAP,
 ) -> tuple[Detection, ...]:
-    """Boxes from what a network gives for one picture.
+    """Decode the boxes of one picture from a network's output.
 
-    The layouts that are known, with C classes and N candidates:
+    Known layouts, with C classes and N candidates:
 
-    - (1, 4 + C, N): v8, v9, v11, v12: middle and size, then a score for each class.
-    - (1, N, 5 + C): v3, v5, v6, v7 and YOLOX with its grid decoded: a score that there is anything besides.
-    - (1, N, 6): v10, v26 and others that choose by themselves: corners, score, class.
+    - (1, 4 + C, N): v8, v9, v11, v12: centre and size, then a score for each class.
+    - (1, N, 5 + C): v3, v5, v6, v7 and YOLOX with its grid decoded: also an objectness score.
+    - (1, N, 6): v10, v26 and others without suppression: corners, score, class.
 
-    Which it is, is told by the shape, and by the number of names where they are known; without names the
-    longer side is taken for the candidates, and rows for the older layout.
+    The layout is inferred from the shape, and from the number of names where known; without names the longer
+    side is taken for the candidates, and rows for the older layout.
 
     Args:
         output: The array, with or without the leading 1.
-        names: Of the classes, where they are known.
-        fitted: How the picture was fitted into the network; as `letterbox` gives it.
-        least_score: Boxes below are left out.
-        most_overlap: Of two boxes of one class that overlap by more, the lesser is left out.
+        names: Class names, where known.
+        fitted: The fit of the picture, from `letterbox`.
+        least_score: Boxes below are dropped.
+        most_overlap: Of two boxes of one class that overlap more, the lower-scored is dropped.
 
     Returns:
-        The boxes without numbers, pixels of the picture, the surest first.
+        The boxes without numbers, picture pixels, highest score first.
 
     Raises:
-        ValueError: The array has a shape that no layout has.
+        ValueError: The array's shape fits no known layout.
     """
     rows, layout = _rows(np.asarray(output, np.float32), len(names))
     if layout is Layout.CHOSEN:
@@ -111,13 +111,13 @@ def decode_yolo(
         keep = keep[np.argsort(-scores[keep], kind="stable")]
     else:
         corners, scores, classes = _scored(rows, layout)
-        keep = _not_twice(corners, scores, classes, least_score, most_overlap)
+        keep = _suppressed(corners, scores, classes, least_score, most_overlap)
     corners = fitted.back(corners)
     return tuple(_detection(corners[k], float(scores[k]), int(classes[k]), names) for k in keep)
 
 
 def _rows(output: NDArray[np.float32], classes: int) -> tuple[NDArray[np.float32], Layout]:
-    """Candidates as rows, and what their columns are."""
+    """Candidates as rows, and their layout."""
     if output.ndim == 3 and output.shape[0] == 1:
         output = output[0]
     if output.ndim != 2 or (output.shape[1] < 5 and output.shape[0] < 5):
@@ -135,7 +135,7 @@ def _rows(output: NDArray[np.float32], classes: int) -> tuple[NDArray[np.float32
 
 
 def _chosen(output: NDArray[np.float32]) -> bool:
-    """Whether rows are corners, a score and the number of a class; scores alone are hardly ever whole."""
+    """Whether rows are corners, a score and a class number, which unlike a score is an integer."""
     if output.shape[1] != CHOSEN_COLUMNS:
         return False
     ordered = (output[:, 2] >= output[:, 0]) & (output[:, 3] >= output[:, 1])
@@ -146,7 +146,7 @@ def _chosen(output: NDArray[np.float32]) -> bool:
 def _scored(
     rows: NDArray[np.float32], layout: Layout
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    """Corners, scores and classes of candidates that are told by their middles."""
+    """Corners, scores and classes of candidates given by their centres."""
     middle, half = rows[:, :2], rows[:, 2:4] / 2
     corners = np.hstack([middle - half, middle + half]).astype(np.float32)
     of_each = rows[:, 4:] if layout is Layout.CLASSES else rows[:, 5:] * rows[:, 4:5]
@@ -154,14 +154,14 @@ def _scored(
     return corners, of_each[np.arange(len(rows)), best], best
 
 
-def _not_twice(
+def _suppressed(
     corners: NDArray[np.float32],
     scores: NDArray[np.float32],
     classes: NDArray[np.int64],
     least: float,
     most: float,
 ) -> NDArray[np.int64]:
-    """Places of the candidates that are left, the surest first."""
+    """Indices of the remaining candidates, highest score first."""
     import cv2
 
     boxes = np.hstack([corners[:, :2], corners[:, 2:] - corners[:, :2]])

@@ -1,8 +1,8 @@
-"""Health of the camera's image: what must never be taken for motion (dark, frozen, noisy, ...).
+"""The health behaviour: image faults that must not be taken for motion (dark, frozen, noisy, ...).
 
-The tests are conservative. A black sky with stars is not dark, a nearly still scene with sensor
-noise is not frozen, a white cloud is not saturation: each fault must fill the image, or come from
-one frame to the next as nothing in a scene does, and it must last.
+The tests are conservative. A black sky with stars is not dark, a nearly still scene with sensor noise is not
+frozen, a white cloud is not saturation: each fault must fill the image, or appear between two frames as
+nothing in a scene does, and it must last.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from visup.percepts.health.settings import HealthSettings
 from visup.percepts.health.standstill import StandstillDetector
 
 OK = Health(HealthStatus.OK)
-USUAL = 25  # sound images that say what is usual
+USUAL = 25  # number of sound images that define what is usual
 FEWEST = 4
 SUSPECTED = 0.5
 
@@ -57,11 +57,11 @@ class HealthBehaviour:
         self._harmed = False
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         return saved_attributes(self, "_settings")
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same settings remembered."""
+        """Restore the state of a behaviour with the same settings."""
         vars(self).update(state)
 
     def perceive(
@@ -69,20 +69,20 @@ class HealthBehaviour:
     ) -> Iterable[Percept]:
         """Report the health of one frame; one percept of kind 'health'.
 
-        Its confidence is below 1 while a fault shows that has not lasted long enough to be told:
-        such a frame should not be learnt from.
+        Its confidence is below 1 while a fault has not lasted long enough to be reported; such a frame
+        should not be learned from.
         """
-        health = self._judge(frame)
+        health = self._assess(frame)
         suspected = health is OK and self._fault_since is not None
         confidence = SUSPECTED if suspected else 1.0
         return [Percept("health", health, frame.time, self.contract.name, confidence)]
 
-    def _judge(self, frame: Frame) -> Health:
+    def _assess(self, frame: Frame) -> Health:
         picture = measure_quality(frame.image)
         repeat = self._repeats.compare(frame.image, picture.small)
-        # An image that is all dark repeats itself too, and no frame is missing for that.
-        told = None if self._harmed else repeat
-        missing = self._arrivals.arrive(frame.index, frame.time, told)
+        # A dark image repeats itself too, without missing frames.
+        usable = None if self._harmed else repeat
+        missing = self._arrivals.arrive(frame.index, frame.time, usable)
         frozen = self._frozen(frame.time, repeat.same)
         health = _of_picture(picture, self._usual, self._settings)
         self._harmed = health is not OK
@@ -113,7 +113,7 @@ class HealthBehaviour:
         return Health(HealthStatus.BLOCKED, "A large part of the view is covered.")
 
     def _lasting(self, health: Health, now: float) -> Health:
-        """Only faults that last are told; recovery is told at once."""
+        """Report only faults that last, but recovery at once."""
         if health is OK:
             self._fault_since = None
             return health
@@ -121,7 +121,7 @@ class HealthBehaviour:
         return health if now - self._fault_since >= self._settings.lasting_s else OK
 
     def _frozen(self, now: float, same: bool) -> bool:
-        """The very same image again and again from a source that did change before."""
+        """Whether a source that changed before has repeated one image for long enough."""
         if not same:
             self._same_since = None
             return False
@@ -132,7 +132,7 @@ class HealthBehaviour:
 def _of_picture(
     picture: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings
 ) -> Health:
-    """What one image shows, in the light of those before it."""
+    """The health of one image, compared with what is usual."""
     known = len(usual) >= FEWEST
     if _dark(picture, usual, settings, known):
         return Health(HealthStatus.DARK, "The image is dark.")
@@ -140,7 +140,7 @@ def _of_picture(
         return Health(HealthStatus.SATURATED, "The image is saturated.")
     if known and picture.spread < settings.flat and _most(usual, "spread") > 4 * settings.flat:
         return Health(HealthStatus.BLOCKED, "The whole view is covered.")
-    # Noise has no straight steps, but small blocks have as many specks as noise.
+    # Noise has no straight steps, but small blocks have as many impulses as noise.
     if _broken(picture, usual, settings, known):
         return Health(HealthStatus.SCRAMBLED, "The image is broken into blocks.")
     if _noisy(picture, usual, settings, known):

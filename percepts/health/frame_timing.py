@@ -1,4 +1,4 @@
-"""Whether frames come as they should: gaps in their numbers or times, repeats in their place."""
+"""Frame timing: gaps in frame numbers or times, and repeats in place of missing frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from visup.percepts.health.repeated_frames import Repeat
 
 WINDOW_S = 1.0
 MOST = 128
-ENOUGH = 6  # intervals before anything is said of what is usual
+ENOUGH = 6  # fewest intervals to estimate the usual one
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +20,12 @@ class Arrival:
 
     Attributes:
         time: Seconds.
-        step: Frames since the one before, by number.
-        wait: Seconds since the one before.
-        repeated: Its image is that of the one before.
-        stale: How many frames before this one only repeated another while what moves went on, if this
-            one is new.
-        sure: What moves is clearly further than one usual step after them.
+        step: Frames since the previous one, by number.
+        wait: Seconds since the previous one.
+        repeated: Its image is that of the previous one.
+        stale: Number of preceding frames that only repeated another while motion went on, if this one
+            is new.
+        sure: Motion is clearly further than one usual step after them.
     """
 
     time: float
@@ -41,8 +41,8 @@ class ArrivalMonitor:
 
     Args:
         lost: Share of frames that must be missing within a second; twice that for repeats.
-        gap: Frames missing in a row that are told at once.
-        frozen_s: Repeats that go on for this long are another fault, seconds.
+        gap: Frames missing in a row that are reported at once.
+        frozen_s: Repeats that last this long are another fault, seconds.
     """
 
     def __init__(self, lost: float, gap: int, frozen_s: float) -> None:
@@ -56,16 +56,16 @@ class ArrivalMonitor:
         self._last: tuple[int, float] | None = None
 
     def arrive(self, index: int, time: float, repeat: Repeat | None) -> int:
-        """Take in a frame.
+        """Add a frame.
 
         Args:
             index: Its number.
             time: Seconds.
-            repeat: What its image is to those before; None when a fault of the image leaves that
-                untold.
+            repeat: Comparison of its image with earlier ones; None when a fault of the image prevents it.
+
 
         Returns:
-            How many frames are missing of late, when that is too many; else 0.
+            How many frames were recently missing, when too many; else 0.
         """
         last, self._last = self._last, (index, time)
         if last is None:
@@ -84,12 +84,12 @@ class ArrivalMonitor:
             self._steps.append(new.step)
             self._waits.append(new.wait)
         if len(self._repeats) < ENOUGH:
-            # Until the window has filled, the first frames are all that tells of habits.
+            # Until the window has filled, the first frames alone define the usual rate.
             self._repeats.append(new.repeated)
         return missing
 
     def _stale(self, repeat: Repeat | None, wait: float) -> int:
-        """Length of the run of repeats that ends with this frame, if something went on meanwhile."""
+        """Length of the run of repeats that ends with this frame, if motion continued during it."""
         if repeat is None:
             self._run, self._run_s = 0, 0.0
             return 0
@@ -102,26 +102,26 @@ class ArrivalMonitor:
             return 0
         step = max(1.0, float(np.median(self._steps)))
         wait = float(np.quantile(self._waits, 0.75))
-        # Many cameras repeat frames always, for want of light or to fill a rate.
+        # Many cameras repeat frames all the time, in low light or to fill a rate.
         habit = float(np.mean(self._repeats)) > 0.04
         gaps = [max(a.step / step, a.wait / wait) - 1.0 for a in self._recent]
         total = sum(g for g in gaps if g > 0.6) - self._early(wait, step)
-        stale = 0 if habit else self._stale_of_late()
+        stale = 0 if habit else self._recent_stale()
         due = WINDOW_S / wait
         if max(gaps, default=0.0) > self._gap - 0.4:
             return round(total)
-        # Numbers do not lie; an image may repeat another for a frame or two by chance.
+        # Frame numbers are reliable; an image may repeat another for a frame or two by chance.
         sure = total >= max(3.0, self._lost * due)
-        told = sure or total + stale >= max(3.0, 2.0 * self._lost * due)
-        return round(total + stale) if told else 0
+        too_many = sure or total + stale >= max(3.0, 2.0 * self._lost * due)
+        return round(total + stale) if too_many else 0
 
     def _early(self, wait: float, step: float) -> float:
-        """Frames that came before their time: those that came late are not missing for them."""
+        """Frames that came early; they compensate for late ones, which are not missing."""
         shares = [a.wait / wait for a in self._recent if a.step <= step]
         return sum(1.0 - share for share in shares if share < 0.4)
 
-    def _stale_of_late(self) -> int:
-        """Frames that others stand in place of; a single pause must be caught up with to be one."""
+    def _recent_stale(self) -> int:
+        """Recent frames replaced by repeats; a single run counts only if motion caught up after it."""
         runs = [a for a in self._recent if a.stale]
         believed = len(runs) > 1 or any(a.sure for a in runs)
         return sum(a.stale for a in runs) if believed else 0

@@ -1,10 +1,9 @@
-"""What the change from frame to frame is made of: white noise alone, or what a scene leaves.
+"""Detection of a frozen image under fresh noise, from the spatial statistics of change.
 
-Motion, light and codecs change neighbouring pixels alike; noise that a later stage puts on an image
-changes each by itself, so that means of n pixels change by a part of 1 / n of the variance. When the
-changes of a picture, which never were white, are white all over from one moment on, and stay so
-against the image of that moment, then that image stands still under fresh noise, however little
-moved before.
+Motion, light and codecs change neighbouring pixels together; noise added by a later stage changes each pixel
+independently, so that means of n pixels change by 1 / n of the variance. When the changes of a picture, which
+were never white, become white everywhere at one moment, and stay so relative to the image of that moment,
+then that image is frozen under fresh noise, however little moved before.
 """
 
 from __future__ import annotations
@@ -18,25 +17,25 @@ import numpy as np
 
 from visup.percepts.health.image_quality import ImageQuality
 from visup.percepts.health.quantiles import quantiles
-from visup.percepts.health.standstill import AFTER_S, FEWEST, KEPT_S, MOST, per_cell
+from visup.percepts.health.standstill import AFTER_S, FEWEST, HISTORY_S, MOST, per_cell
 
-WHITE = (0.8, 1.25)  # median over the cells of what white noise shows; 1 but for rounding
-UNEVEN = 1.6  # the same that few of its cells exceed
-LIVE = 2.5  # median over the cells of what a scene shows, at least
-FAINT = 2.5  # grey levels of change up to which noise would not hide what moves
-STIRRED = 0.9  # share of the cells in which something changes at all
+WHITE = (0.8, 1.25)  # range of the median over the cells for white noise; ideally 1
+UNEVEN = 1.6  # the same exceeded by few of its cells
+LIVE = 2.5  # least median over the cells for a live scene
+FAINT = 2.5  # change up to which noise would not hide motion, grey levels
+STIRRED = 0.9  # least share of cells that change at all
 
 
 @dataclass(frozen=True, slots=True)
 class ChangeStatistics:
-    """What the change between two images is made of.
+    """Spatial statistics of the change between two images.
 
     Attributes:
-        middle: Variance of means of pixels, times their number, as a share of that of pixels: the
-            median over the cells. 1 for white noise.
-        most: The same, which one cell in twenty exceeds.
+        middle: Variance of means of pixels, times their number, relative to that of pixels: median over
+            the cells. 1 for white noise.
+        most: The same, 95th percentile over the cells.
         level: Root mean square over the image, grey levels.
-        stirred: Share of the cells in which something changed.
+        stirred: Share of the cells that changed.
     """
 
     middle: float
@@ -46,7 +45,7 @@ class ChangeStatistics:
 
     @property
     def is_white(self) -> bool:
-        """Whether it is faint noise of each pixel by itself, all over."""
+        """Whether it is faint noise, independent in each pixel, everywhere."""
         return (
             WHITE[0] < self.middle < WHITE[1]
             and self.most < UNEVEN
@@ -59,28 +58,28 @@ NOTHING = ChangeStatistics(0.0, 0.0, 0.0, 0.0)
 
 
 class NoiseOnlyDetector:
-    """Since when an image stands still under fresh noise."""
+    """Detects that an image is frozen under fresh noise."""
 
     def __init__(self) -> None:
         self._last: ImageQuality | None = None
-        self._first: ImageQuality | None = None  # of those under noise alone
+        self._first: ImageQuality | None = None  # of those that change by noise alone
         self._since = 0.0
         self._before: deque[tuple[float, float]] = deque(maxlen=MOST)
 
     def forget(self) -> None:
-        """Start afresh: what came before says nothing about what comes."""
+        """Reset the history."""
         self._last = self._first = None
         self._before.clear()
 
     def update(self, picture: ImageQuality, now: float) -> bool:
-        """Take in a frame.
+        """Add a frame.
 
         Args:
             picture: The frame.
             now: Seconds.
 
         Returns:
-            Whether it has stood still under noise for long enough, and was live before.
+            Whether it has been still under noise for long enough, and was live before.
         """
         if self._last is not None and self._last.grey.shape != picture.grey.shape:
             self.forget()
@@ -93,13 +92,13 @@ class NoiseOnlyDetector:
             if change.stirred > 0:
                 self._before.append((now, change.middle))
         self._last = picture
-        live = [middle for time, middle in self._before if self._since - time < KEPT_S]
+        live = [middle for time, middle in self._before if self._since - time < HISTORY_S]
         long = now - self._since >= AFTER_S
         return stands and long and len(live) >= FEWEST and median(live) > LIVE
 
 
 def change_statistics(before: ImageQuality | None, now: ImageQuality) -> ChangeStatistics:
-    """What the change from one picture to another of the same size is made of."""
+    """Statistics of the change between two pictures of the same size."""
     if before is None or now.factor < 2:
         return NOTHING
     coarse = per_cell(np.square(now.small - before.small))

@@ -1,4 +1,4 @@
-"""What one image shows by itself: its tones, noise, and straight steps as broken blocks have."""
+"""Quality of a single image: its tones, noise, and straight steps as in broken blocks."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 Grey = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
-SMALL = 160  # pixels along the longer side of the small image, at most
-STRIP, EVERY = 8, 32  # noise is measured on strips of so many lines out of so many
+SMALL = 160  # most pixels along the longer side of the small image
+STRIP, EVERY = 8, 32  # noise is measured on strips of 8 in every 32 lines
 IMPULSE = 60  # grey levels by which a pixel must differ from the median around it
 STEP = 10  # grey levels of a step
-RUN = 8  # pixels along which a step must go straight
+RUN = 8  # least length of a straight step, pixels
 DOWN = np.ones((RUN, 1), dtype=np.uint8)
 LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageQuality:
-    """An image, and what was measured on it.
+    """An image and its measurements.
 
     Attributes:
         grey: (H, W) uint8.
         small: (h, w) float32, means of `factor` x `factor` pixels of `grey`.
-        factor: Pixels of the image along one pixel of the small image.
+        factor: Side of a pixel of the small image, pixels of `grey`.
         low: Grey level that 3 % of the small image do not exceed.
         high: Grey level that 0.1 % of the small image exceed.
         spread: Grey levels between the darkest and the brightest half percent.
@@ -57,7 +57,7 @@ def measure_quality(image: NDArray[np.uint8]) -> ImageQuality:
         image: (H, W), (H, W, 1) or (H, W, 3) uint8, BGR.
 
     Returns:
-        What it shows.
+        Its measurements.
     """
     colour = image.ndim == 3 and image.shape[2] == 3
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)) if colour else image
@@ -65,7 +65,7 @@ def measure_quality(image: NDArray[np.uint8]) -> ImageQuality:
     factor = max(1, -(-max(grey.shape) // SMALL))
     small = shrunk(grey, factor)
     low, high, darkest, brightest = _levels(small, (0.03, 0.999, 0.005, 0.995))
-    # Grey averages the noise of three channels; one of them shows it whole.
+    # Grey averages the noise of three channels; a single channel shows it in full.
     strips = _strips(image[..., 1] if colour else grey)
     steps, edges = _steps(grey)
     return ImageQuality(
@@ -90,9 +90,9 @@ def _levels(small: Floats, shares: Sequence[float]) -> list[float]:
 
 
 def shrunk(grey: Grey, factor: int) -> Floats:
-    """Means of squares of pixels; what does not fill a square at the border is left out."""
+    """Means of squares of pixels; incomplete squares at the border are dropped."""
     rows, columns = (max(1, n // factor) for n in grey.shape)
-    # Means are kept finer than whole grey levels: slow change is less than one.
+    # Means are not rounded: slow change is less than a grey level.
     part = grey[: rows * factor, : columns * factor].astype(np.float32)
     if factor == 1:
         return part
@@ -101,7 +101,7 @@ def shrunk(grey: Grey, factor: int) -> Floats:
 
 
 def _strips(channel: Grey) -> Grey:
-    """Some lines of an image, in strips: noise is everywhere, a quarter of it tells enough."""
+    """Some lines of an image, in strips: a quarter of it is enough to measure noise."""
     height, width = channel.shape
     count = height // EVERY
     if count == 0:
@@ -111,7 +111,7 @@ def _strips(channel: Grey) -> Grey:
 
 
 def _noise(strips: Grey) -> float:
-    """Noise by Immerkaer's kernel, which does not see slopes; the low quartile spares texture."""
+    """Noise by Immerkaer's kernel, which is blind to slopes; the low quartile avoids texture."""
     response = cv2.convertScaleAbs(cv2.filter2D(strips, cv2.CV_16S, LAPLACE))
     counts = np.cumsum(cv2.calcHist([response], [0], None, [256], [0, 256]).ravel())
     at = int(np.searchsorted(counts, 0.25 * counts[-1]))
@@ -119,8 +119,8 @@ def _noise(strips: Grey) -> float:
 
 
 def _impulses(strips: Grey) -> float:
-    apart = cv2.absdiff(strips, cv2.medianBlur(strips, 3))
-    return float(np.count_nonzero(apart > IMPULSE)) / max(1, strips.size)
+    difference = cv2.absdiff(strips, cv2.medianBlur(strips, 3))
+    return float(np.count_nonzero(difference > IMPULSE)) / max(1, strips.size)
 
 
 def _steps(grey: Grey) -> tuple[float, float]:
@@ -131,11 +131,11 @@ def _steps(grey: Grey) -> tuple[float, float]:
             continue
         step = cv2.absdiff(image[:, 1:], image[:, :-1])
         edges += cv2.countNonZero(cv2.threshold(step, STEP - 1, 1, cv2.THRESH_BINARY)[1])
-        beside = cv2.max(step[:, 2:], step[:, :-2])
-        # An image seen through a lens rises over several pixels; a cut between blocks does not.
-        alone = cv2.subtract(step[:, 1:-1], cv2.add(beside, beside))
-        mask = cv2.threshold(alone, STEP - 1, 1, cv2.THRESH_BINARY)[1]
+        neighbours = cv2.max(step[:, 2:], step[:, :-2])
+        # Optical edges rise over several pixels; edges between blocks do not.
+        isolated = cv2.subtract(step[:, 1:-1], cv2.add(neighbours, neighbours))
+        mask = cv2.threshold(isolated, STEP - 1, 1, cv2.THRESH_BINARY)[1]
         lines = cv2.reduce(cv2.erode(mask, DOWN), 0, cv2.REDUCE_SUM, dtype=cv2.CV_32S)
-        # One line alone is the edge of something straight; broken blocks have many.
+        # A single line is the edge of a straight object; broken blocks have many.
         straight += int(lines.sum()) - int(lines.max())
     return straight / grey.size, edges / grey.size

@@ -1,4 +1,4 @@
-"""Quantiles of few numbers; NumPy's own take longer to begin than these to end."""
+"""Quantiles of few numbers, without the overhead of NumPy's."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 
 def quantiles(values: NDArray[np.floating[Any]], *shares: float) -> list[float]:
-    """What shares of numbers lie below, between two of them in proportion.
+    """Quantiles, linearly interpolated.
 
     Args:
-        values: One or more, of any shape.
+        values: At least one, of any shape.
         shares: 0 to 1.
 
     >>> quantiles(np.array([3.0, 1.0, 2.0]), 0.5, 0.75)

@@ -1,9 +1,9 @@
-"""Whether an image only repeats the one before, and whether what moves went on meanwhile.
+"""Repeated frames: whether an image repeats the previous one while motion went on.
 
-That images hardly differ does not say that frames are missing: what moves may rest, and where a codec
-skips what stands still nothing differs at all. Lost frames leave two marks. The repeat is a repeat all
-over, not only where most changes; and the first new image catches up: it shows the motion of all the
-frames that did not come. What has rested starts anew, from nothing.
+Nearly equal images do not imply missing frames: objects may rest, and where a codec skips still parts nothing
+differs at all. Lost frames leave two marks. The repeat is a repeat everywhere, not only where most changes;
+and the first new image catches up: it shows the motion of all missing frames. An object that rested starts
+from zero.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from visup.percepts.health.standstill import Floats, per_cell
 
 MOST = 25
 ENOUGH = 6
-LIVELY = 1.5  # grey levels of change where most changes, from which near repeats are told
-NEARLY = 0.1  # share of the usual change that no cell of a near repeat reaches
-CODED = 1.0  # grey levels that coding the same image anew changes in any cell, at most
-FLOOR = 0.3  # grey levels of change that are not motion, beyond those of the whole image
-FLOOR_MOST = 1.2  # the whole image changes by more only when the camera moves
-# A mover that has rested starts at less than 0.8 of its usual pace in 19 of 20 pauses of real and rendered
-# clips; after lost frames it is past that in three of four, since a step that was lost is made up for.
+LIVELY = 1.5  # peak change from which near repeats can be detected, grey levels
+NEARLY = 0.1  # all cells of a near repeat change by less than this share of the usual
+CODED = 1.0  # most change of a cell by recoding the same image, grey levels
+FLOOR = 0.3  # change that is not motion, beyond that of the whole image, grey levels
+FLOOR_MOST = 1.2  # bound of the latter: the whole image changes by more only when the camera moves
+# A mover that rested starts at less than 0.8 of its usual pace in 19 of 20 pauses of real and rendered clips;
+# after lost frames it exceeds that in three of four, since the lost step is made up for.
 RESUMED = 0.8
-GAIN = 0.4  # of the usual change for each lost frame; less than 1, for change saturates
+GAIN = 0.4  # share of the usual change per lost frame; below 1, since change saturates
 GAIN_MOST = 2.0
-CALM = 0.1  # share of the cells that is calmest
-RESTLESS = 0.01  # grey levels that these always change by where noise never rests
+CALM = 0.1  # share of the cells counted as the calmest
+RESTLESS = 0.01  # change of these from which there is always noise, grey levels
 
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """What one image is to those before it.
+    """An image compared with the previous ones.
 
     Attributes:
-        same: It is the very same as the one before, of a source that did change.
-        near: It is so, or differs by no more than coding although images usually differ by much.
-        resumes: It is new, and what moves is where it would be had it gone on during the repeats
-            before, at least as far as one usual step.
+        same: It equals the previous one, from a source that has changed.
+        near: It is the same, or differs no more than by coding although images usually differ much.
+        resumes: It is new, and motion is where it would be had it continued during the repeats, at least
+            one usual step on.
         catches_up: It is new, and clearly further than one usual step.
     """
 
@@ -54,12 +54,12 @@ class Repeat:
 
 
 class RepeatDetector:
-    """Compares each image with the one before."""
+    """Compares each image with the previous one."""
 
     def __init__(self) -> None:
         self._image: NDArray[np.uint8] | None = None
         self._small: Floats | None = None
-        self._held: Floats | None = None  # what is repeated
+        self._held: Floats | None = None  # the repeated image
         self._run = 0
         self._exact = True
         self._peaks: deque[float] = deque(maxlen=MOST)
@@ -68,14 +68,14 @@ class RepeatDetector:
         self.was_lively = False
 
     def compare(self, image: NDArray[np.uint8], small: Floats) -> Repeat:
-        """Take in an image.
+        """Add an image.
 
         Args:
             image: (H, W, 3) uint8.
-            small: (h, w) float32, the same made small.
+            small: (h, w) float32, the same, reduced.
 
         Returns:
-            What it is to those before. Nothing holds before the source has changed at all.
+            The comparison; all False until the source has first changed.
         """
         before, self._image = self._image, image
         smaller, self._small = self._small, small
@@ -104,7 +104,7 @@ class RepeatDetector:
         return usual > LIVELY and float(change.max()) < min(CODED, NEARLY * usual)
 
     def _resumed(self, small: Floats) -> Repeat:
-        """A new image, held against the one that was repeated before it."""
+        """Compare a new image with the one repeated before it."""
         if self._held is None or len(self._motions) < ENOUGH:
             return Repeat()
         usual = median(self._motions)
@@ -120,6 +120,6 @@ class RepeatDetector:
 
 
 def _motion(change: Floats) -> float:
-    """Change summed over all that moves: it grows with the way, though that of a cell does not."""
+    """Change summed over all moving parts: it grows with displacement, unlike that of a cell."""
     floor = FLOOR + min(quantiles(change, 0.5)[0], FLOOR_MOST)
     return float(np.maximum(change - floor, 0.0).sum())

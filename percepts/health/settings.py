@@ -9,23 +9,23 @@ from dataclasses import dataclass
 class HealthSettings:
     """Thresholds of `HealthBehaviour`.
 
-    Grey levels are those of 8 bits. "Usual" is what the last second without a fault showed.
+    Grey levels are 8-bit. "Usual" refers to the last second without a fault.
 
     Attributes:
-        dark: What is brightest in a dark image does not exceed this grey level.
-        bright: What is darkest in a saturated image exceeds this grey level.
-        flat: Grey levels between the darkest and the brightest of an image that shows nothing.
-        noisy: Standard deviation of pixel noise, grey levels, that is always too much.
-        rather_noisy: The same, when it is also three times what is usual.
-        impulses: Share of pixels that stick out, always too much.
-        rather_impulses: The same, when it is also three times what is usual.
-        broken: Share of pixels on straight steps, always too much.
-        rather_broken: The same beyond 1.7 times what is usual.
+        dark: The brightest part of a dark image does not exceed this grey level.
+        bright: The darkest part of a saturated image exceeds this grey level.
+        flat: Grey levels between the darkest and the brightest part of a blank image.
+        noisy: Standard deviation of pixel noise, grey levels, that is always too high.
+        rather_noisy: The same, if also three times the usual.
+        impulses: Share of outlier pixels that is always too high.
+        rather_impulses: The same, if also three times the usual.
+        broken: Share of pixels on straight steps that is always too high.
+        rather_broken: The same, beyond 1.7 times the usual.
         covered: Share of the view that must be covered to be blocked.
         lost: Share of frames that must be missing within a second; twice that when others are
             repeated in their place.
         gap: Frames that are missing in a row.
-        same_s: How long an image must be the very same before it is called frozen, seconds.
+        same_s: How long an image must be unchanged to be frozen, seconds.
         lasting_s: How long other faults must last before they are reported, seconds.
     """
 

@@ -1,7 +1,7 @@
-"""How parts of the image change with time: which stand still at once, which were covered.
+"""Standstill detection: parts of the image that stop or are covered at one moment.
 
-A scene never stops, and is never covered, from one frame to the next in many places at once; a
-camera that freezes does, and so does a cover. What follows slowly is left alone.
+A scene never stops, and is never covered, between two frames in many places at once; a freezing camera or a
+cover does that. Gradual change is ignored.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 CELL = 10  # pixels of the small image along a cell
-LAG_S = 0.2  # slow motion is seen over this time
-AFTER_S = 0.42  # how long what is new must have stood
-KEPT_S = 1.0
-MOST = 48  # looks that are kept, whatever the frame rate
-FEWEST = 3  # looks before the change
-SETTLED = 1.0  # grey levels that what stands may differ by in all, beyond noise
-JUMP = 1.0  # grey levels; keyframes of codecs stir a dark scene by less
+LAG_S = 0.2  # time over which slow motion shows, seconds
+AFTER_S = 0.42  # how long the new state must have lasted, seconds
+HISTORY_S = 1.0
+MOST = 48  # most frames in the history, whatever the rate
+FEWEST = 3  # fewest frames before the change
+SETTLED = 1.0  # most total difference of a still part beyond noise, grey levels
+JUMP = 1.0  # least jump, grey levels; codec keyframes change a dark scene by less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellChange:
-    """One frame as cells see it.
+    """Change of one frame by cell.
 
     Attributes:
         time: Seconds.
         small: (h, w) float32, the small image.
-        change: (rows, columns) float32, mean change of each cell since the frame before.
+        change: (rows, columns) float32, mean change of each cell since the previous frame.
         slow: The same over `LAG_S`.
         texture: (rows, columns) float32, standard deviation within each cell.
     """
@@ -50,12 +50,12 @@ class CellChange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standstill:
-    """Where the image stands still since a moment.
+    """The part of the image that has stood still since a moment.
 
     Attributes:
-        whole: The whole image stands, as frozen; else a part is covered.
+        whole: The whole image is frozen; else a part is covered.
         cells: (rows, columns) bool.
-        small: The small image as it stands.
+        small: The small image then.
         since: Seconds.
     """
 
@@ -66,7 +66,7 @@ class Standstill:
 
 
 class StandstillDetector:
-    """The last second of small images, and what halted in it."""
+    """Keeps the last second of small images, and detects what stopped in it."""
 
     def __init__(self, covered: float) -> None:
         self._covered = covered
@@ -74,12 +74,12 @@ class StandstillDetector:
         self.standstill: Standstill | None = None
 
     def forget(self) -> None:
-        """Start afresh: what came before says nothing about what comes."""
+        """Reset the history."""
         self._looks.clear()
         self.standstill = None
 
     def update(self, small: Floats, factor: int, time: float) -> Standstill | None:
-        """Take in a frame.
+        """Add a frame.
 
         Args:
             small: (h, w) float32, grey.
@@ -87,7 +87,7 @@ class StandstillDetector:
             time: Seconds.
 
         Returns:
-            What stands still that moved before, or None.
+            What stopped moving, or None.
         """
         if self._looks and self._looks[-1].small.shape != small.shape:
             self.forget()
@@ -102,7 +102,7 @@ class StandstillDetector:
 
     def _push(self, small: Floats, time: float) -> None:
         looks = self._looks
-        while looks and time - looks[0].time > KEPT_S and len(looks) > 3 * FEWEST:
+        while looks and time - looks[0].time > HISTORY_S and len(looks) > 3 * FEWEST:
             looks.popleft()
         last = looks[-1].small if looks else small
         lag = next((k.small for k in reversed(looks) if time - k.time >= LAG_S - 1e-6), last)
@@ -119,13 +119,13 @@ class StandstillDetector:
     def _halted(self, still: float) -> Standstill | None:
         now = self._looks[-1]
         after = [k for k in self._looks if now.time - k.time < AFTER_S]
-        # A slow camera gives few frames in that time: three are needed to see that it stands.
+        # A slow camera gives few frames in that time, but three are needed.
         after = after if len(after) >= 4 else list(self._looks)[-4:]
         before = list(self._looks)[1 : len(self._looks) - len(after)]
         if len(before) < FEWEST:
             return None
         calm = np.median([k.change for k in after[1:]], axis=0)
-        # What passes is calm before and after; what halted or was covered looks the same ever since.
+        # A passing object leaves calm cells that changed; stopped or covered ones look the same since.
         passed = per_cell(cv2.absdiff(now.small, after[1].small)) >= still + SETTLED
         least = np.min([k.slow for k in before], axis=0)
         most = np.max([k.change for k in before], axis=0)
@@ -135,7 +135,7 @@ class StandstillDetector:
         lively = least > 0.4 + 2.0 * noise
         stopped = lively & stands & (now.slow < 0.25 * least)
         then = before[-1].small
-        # Light and codecs change what is bright by more than what is dark.
+        # Light and codecs change bright parts more than dark ones.
         calls_for = JUMP + 0.1 * per_cell(then) + 3.0 * most
         jump = per_cell(cv2.absdiff(now.small, then)) > calls_for
         bare = (texture > 3.0) & (now.texture < 0.3 * texture)
@@ -154,7 +154,7 @@ class StandstillDetector:
 
 
 def per_cell(values: NDArray[np.integer[Any] | np.floating[Any]]) -> Floats:
-    """Means over cells of `CELL` x `CELL`, about."""
+    """Means over cells of about `CELL` x `CELL`."""
     rows, columns = (max(1, round(n / CELL)) for n in values.shape)
     out = cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA)
     return np.asarray(out, dtype=np.float32).reshape(rows, columns)
@@ -166,7 +166,7 @@ def _texture(small: Floats) -> Floats:
 
 
 def _persists(halt: Standstill, small: Floats, still: float) -> bool:
-    """Whether what stood still looks the same as it did then."""
+    """Whether the still part looks the same as it did then."""
     if halt.small.shape != small.shape:
         return False
     apart = per_cell(cv2.absdiff(small, halt.small))[halt.cells]
@@ -174,7 +174,7 @@ def _persists(halt: Standstill, small: Floats, still: float) -> bool:
 
 
 def _all_stopped(lively: Mask, stopped: Mask) -> bool:
-    """Whether all that moved stopped at once: more than one thing, or a large part of the view."""
+    """Whether all motion stopped at once: of more than one object, or in a large part of the view."""
     moved = int(lively.sum())
     if moved == 0 or stopped.sum() < 0.97 * moved:
         return False
@@ -183,7 +183,7 @@ def _all_stopped(lively: Mask, stopped: Mask) -> bool:
 
 
 def _largest(cells: Mask) -> Mask:
-    """The largest connected part; single cells that are missing in it are filled."""
+    """The largest connected part; single missing cells are filled."""
     closed = cv2.morphologyEx(cells.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
     if count < 2:
@@ -193,7 +193,7 @@ def _largest(cells: Mask) -> Mask:
 
 
 def _same_scene(part: Mask, then: Floats, now: Floats) -> bool:
-    """Whether a part shows what it did before in another light: that is no cover."""
+    """Whether a part shows the same scene in another light, and is not covered."""
     size = (then.shape[1], then.shape[0])
     inside = cv2.resize(part.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
     a, b = then[inside], now[inside]

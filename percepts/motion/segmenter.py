@@ -113,7 +113,7 @@ class MotionSegmenter:
     ) -> None:
         self.settings = settings or MotionSettings()
         # Cells and points are independent: one core each, with the same results.
-        self._beside = second_core()
+        self._executor = second_core()
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
         self._model = model or _model(self.settings)
@@ -141,7 +141,7 @@ class MotionSegmenter:
 
     def save(self) -> dict[str, Any]:
         """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
-        return saved_attributes(self, "settings", "trace", "_beside", "_engine", "_model")
+        return saved_attributes(self, "settings", "trace", "_executor", "_engine", "_model")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a segmenter with the same settings."""
@@ -177,7 +177,7 @@ class MotionSegmenter:
         self._cells = scene.cells
         tracks, prior = self._initiated(fit_tracks(predicted, scene), scene, prior)
         evidence, labelling, shown = self._labelled(scene, tracks, prior, directives)
-        small = self._beside.submit(comparable_image, frame)
+        small = self._executor.submit(comparable_image, frame)
         keys = tuple(t.key for t in tracks)
         tracks = self._updated(tracks, scene, evidence, labelling)
         wanted = looked_at(directives, tracks, scene)
@@ -219,9 +219,9 @@ class MotionSegmenter:
         asked = self._foreground.memory is not None
         if asked and not (self._static.active or self._foreground.calm):
             return report_objects(
-                self._foreground, tracks, scene, self._size, self.settings, self._beside
+                self._foreground, tracks, scene, self._size, self.settings, self._executor
             )
-        found = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        found = report_regions(tracks, scene, self._size, self.settings, self._executor)
         return self._with_object_ids(found)
 
     def _with_object_ids(self, found: Sequence[Numbered]) -> tuple[Numbered, ...]:
@@ -259,9 +259,11 @@ class MotionSegmenter:
         """
         near = claimable_cells(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
-        dense = self._beside.submit(dense_likelihood, scene, tracks, old, near, self.settings.noise)
+        dense = self._executor.submit(
+            dense_likelihood, scene, tracks, old, near, self.settings.noise
+        )
         last, memory = self._history.back(1), self._foreground.memory
-        shown = self._beside.submit(flow_cues, scene, last, memory) if self._asks else None
+        shown = self._executor.submit(flow_cues, scene, last, memory) if self._asks else None
         evidence = point_likelihoods(scene, tracks, near, self.settings)
         evidence = apply_ignore(directives, scene, evidence)
         by_appearance = appearance_prior(scene.cells, prior)
@@ -292,10 +294,10 @@ class MotionSegmenter:
         """Measure motion and predict the tracks, with the label priors, in the newest image."""
         cell, old = self.settings.cell, self._history.back(1)
         seconds = image.time - old.time
-        found = self._beside.submit(find_points, image, cell, self.settings.noise)
-        coming = self._beside.submit(superpixels, image, cell, self.settings.contrast)
+        found = self._executor.submit(find_points, image, cell, self.settings.noise)
+        coming = self._executor.submit(superpixels, image, cell, self.settings.contrast)
         flow = flow_back(image.grey, old.grey, self._engine)
-        carried = self._beside.submit(self._carried, flow, before, coming, seconds)
+        carried = self._executor.submit(self._carried, flow, before, coming, seconds)
         points = found.result()
         first = self._track_one_frame(points, flow, old, image)
         cells, tracks, prior = carried.result()
@@ -354,7 +356,9 @@ class MotionSegmenter:
         span = scene.time - old.time
         guess = predicted_positions(scene, tracks, self._predicted(scene.time, span), lag, span)
         noise = self.settings.noise
-        return self._beside.submit(track_points, scene.points, guess, old, scene.image, lag, noise)
+        return self._executor.submit(
+            track_points, scene.points, guess, old, scene.image, lag, noise
+        )
 
     def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
         """The background motion fitted to the constraints over one baseline."""

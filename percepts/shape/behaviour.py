@@ -1,8 +1,7 @@
-"""The shape behaviour: what each region may be, by its silhouette (paper, sections 4 and 5).
+"""The shape behaviour: view hypotheses for each region from its silhouette (paper, sections 4 and 5).
 
-It matches every region against the database, but not in every frame: a region whose silhouette hardly
-changed, or that was matched a moment ago, keeps its hypotheses; and no frame pays for more than a few
-matches.
+Regions are matched against the database, but not in every frame: a region whose silhouette hardly changed, or
+that was matched recently, keeps its hypotheses, and the number of matches per frame is bounded.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ class ShapeSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MatchedRegion:
-    """What a region looked like when it was last matched, and what came of it."""
+    """A region's silhouette when it was last matched, and the result."""
 
     time: float
     thumb: NDArray[np.bool_]
@@ -65,8 +64,8 @@ class _MatchedRegion:
     hypotheses: tuple[Hypothesis, ...]
     areas: tuple[float | None, ...]
 
-    def told(self, region: Region) -> Iterable[Hypothesis]:
-        """The hypotheses with the scale that the region has now."""
+    def rescaled(self, region: Region) -> Iterable[Hypothesis]:
+        """The hypotheses with the region's current scale."""
         for hypothesis, area in zip(self.hypotheses, self.areas, strict=True):
             yield _scaled(hypothesis, area, region)
 
@@ -75,7 +74,7 @@ class ShapeBehaviour:
     """Reports which views of which models each region looks like.
 
     Args:
-        database: The models; without it nothing is ever reported.
+        database: The models; without them nothing is reported.
         settings: How regions are matched.
     """
 
@@ -90,11 +89,11 @@ class ShapeBehaviour:
         self._refiner = PoseRefiner(database.meshes if database is not None else {})
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         return {"remembered": self._remembered, "fits": self._refiner.memory}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a behaviour of the same settings remembered."""
+        """Restore the state of a behaviour with the same settings."""
         self._remembered = dict(state["remembered"])
         self._refiner.memory = dict(state["fits"])
 
@@ -107,8 +106,8 @@ class ShapeBehaviour:
             frame: The frame; its time and its size are used.
             observation: Holds the regions.
             directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
-                (data: names) has these compared whatever the index says; 'rest' (data: behaviour,
-                region, every_s) has a region matched no more often than that.
+                (data: names) compares these whatever the index says; 'rest' (data: behaviour,
+                region, every_s) limits how often a region is matched.
         """
         if self.database is None:
             return []
@@ -122,13 +121,13 @@ class ShapeBehaviour:
         self._refiner.forget(here)
         found = self._match(self.database, due, frame, restrict, first)
         for region, silhouette, matches in zip(due, *found, strict=True):
-            said = self._refined(self.database, frame, region, silhouette, matches)
-            self._remembered[region.id] = _remembered(region, frame.time, restrict, said)
+            hypotheses = self._refined(self.database, frame, region, silhouette, matches)
+            self._remembered[region.id] = _remembered(region, frame.time, restrict, hypotheses)
         return [
             Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
             for r in regions
             if r.id in self._remembered
-            for h in self._remembered[r.id].told(r)
+            for h in self._remembered[r.id].rescaled(r)
         ]
 
     def _due(
@@ -138,7 +137,7 @@ class ShapeBehaviour:
         restrict: frozenset[str] | None,
         resting: Mapping[int, float],
     ) -> list[Region]:
-        """Regions to be matched now: those never matched first, then those matched longest ago."""
+        """Regions to match now: those never matched first, then those matched longest ago."""
         due = [r for r in regions if self._is_due(r, time, restrict, resting.get(r.id, 0.0))]
         last = {k: v.time for k, v in self._remembered.items()}
         due.sort(key=lambda r: (last.get(r.id, -np.inf), r.id))
@@ -174,7 +173,7 @@ class ShapeBehaviour:
         restrict: frozenset[str] | None,
         first: Collection[str],
     ) -> tuple[list[Silhouette | None], list[tuple[ViewMatch, ...]]]:
-        """Silhouettes of the regions and what each looks like; nothing for one that has no shape."""
+        """Silhouettes of the regions and their matches; None and no matches without a shape."""
         silhouettes = [normalise(r.mask, cut=r.cut, sides=_border_sides(r, frame)) for r in regions]
         rankings = iter(
             database.query_all(
@@ -198,24 +197,24 @@ class ShapeBehaviour:
         silhouette: Silhouette | None,
         matches: tuple[ViewMatch, ...],
     ) -> tuple[SizedHypothesis, ...]:
-        """Hypotheses of a region, with fitted orientations where the model's mesh is known."""
-        said = [(_hypothesis(region, m), m.view.area) for m in matches]
+        """Hypotheses of a region, with fitted orientations where the model has a mesh."""
+        hypotheses = [(_hypothesis(region, m), m.view.area) for m in matches]
         if silhouette is None or not self._refiner.meshes:
-            return tuple(said)
+            return tuple(hypotheses)
 
         def more(name: str) -> list[SizedHypothesis]:
             wanted = self._refiner.settings.starts
             found = database.query(silhouette, top=wanted, restrict={name})
             return [(_hypothesis(region, m), m.view.area) for m in found.matches]
 
-        return self._refiner.refined(frame, region, said, more)
+        return self._refiner.refined(frame, region, hypotheses, more)
 
 
 def _remembered(
     region: Region,
     time: float,
     restrict: frozenset[str] | None,
-    said: tuple[SizedHypothesis, ...],
+    hypotheses: tuple[SizedHypothesis, ...],
 ) -> _MatchedRegion:
     return _MatchedRegion(
         time=time,
@@ -223,8 +222,8 @@ def _remembered(
         aspect=_aspect(region),
         cut=region.cut,
         restrict=restrict,
-        hypotheses=tuple(h for h, _ in said),
-        areas=tuple(area for _, area in said),
+        hypotheses=tuple(h for h, _ in hypotheses),
+        areas=tuple(area for _, area in hypotheses),
     )
 
 
@@ -241,7 +240,7 @@ def _aspect(region: Region) -> float:
 
 
 def _thumb(region: Region) -> NDArray[np.bool_]:
-    """The region's mask stretched over a small square: what it looks like, whatever its size."""
+    """The region's mask resized to a small square."""
     small = cv2.resize(
         region.mask.astype(np.uint8) * np.uint8(255), (_THUMB, _THUMB), interpolation=cv2.INTER_AREA
     )
@@ -249,7 +248,7 @@ def _thumb(region: Region) -> NDArray[np.bool_]:
 
 
 def _rest_intervals(directives: Sequence[Directive], behaviour: str) -> dict[int, float]:
-    """Regions that need not be looked at so often: id -> least seconds between two looks."""
+    """Regions to match less often: id -> least seconds between two matches."""
     return {
         d.data["region"]: float(d.data["every_s"])
         for d in directives
@@ -260,7 +259,7 @@ def _rest_intervals(directives: Sequence[Directive], behaviour: str) -> dict[int
 def _name_directives(
     directives: Sequence[Directive],
 ) -> tuple[frozenset[str] | None, frozenset[str]]:
-    """Names that alone are to be considered (None for all), and names to be tried first."""
+    """The names to consider exclusively (None for all), and the names to try first."""
     restrict = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "restrict"]
     first = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "try_first"]
     only = frozenset().union(*restrict) if restrict else None
@@ -268,7 +267,7 @@ def _name_directives(
 
 
 def _hypothesis(region: Region, match: ViewMatch) -> Hypothesis:
-    """What a match says of a region; its scale is added for each frame, from the region's size then."""
+    """A match as a hypothesis; its scale is added in each frame, from the region's current size."""
     view = match.view
     return Hypothesis(
         region_id=region.id,

@@ -1,6 +1,6 @@
 """Signals that do not come from the image, such as a battery, a door or a mode.
 
-Read `files.py` (tables), `mqtt.py` (messages of a broker) and `behaviour.py` (what is reported for a frame).
+Read `files.py` (tables), `mqtt.py` (messages from a broker) and `behaviour.py` (reports for a frame).
 """
 
 from visup.percepts.signals.behaviour import SIGNAL, SignalBehaviour

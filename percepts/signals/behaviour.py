@@ -1,4 +1,4 @@
-"""What signals are at the time of a frame, as one percept."""
+"""Signals as a behaviour: their values at the time of a frame, as one percept."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from typing import Protocol
 from visup.agent import Contract, Directive, Frame, Observation, Percept, Stateless
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-"""What rules can write."""
+"""Names that rules can refer to."""
 
 SIGNAL = "signal"
-"""Kind of percept; its value maps names of signals to numbers, truths or words."""
+"""Kind of percept; its value maps names of signals to numbers, booleans or words."""
 
 Value = float | bool | str
 
 
 class SignalSource(Protocol):
-    """Whoever knows signals."""
+    """A source of signals."""
 
     @property
     def names(self) -> frozenset[str]:
-        """All signals that it may report; empty if that is not known in advance."""
+        """All signals that it may report; empty if unknown in advance."""
 
     def at(self, time: float) -> Mapping[str, Value]:
-        """What is known at a time, seconds of the video; what is not known is left out."""
+        """Values at a time, seconds of the video; unknown ones are left out."""
 
 
 class SignalBehaviour(Stateless):
     """Reports all known signals with each frame.
 
     Args:
-        sources: Whoever knows them; where two tell one name, the later source goes before.
+        sources: The sources; for the same name, the later source wins.
     """
 
     contract = Contract("signals", gives=(SIGNAL,))
@@ -42,7 +42,7 @@ class SignalBehaviour(Stateless):
 
     @property
     def names(self) -> frozenset[str]:
-        """All signals that may be reported; empty if some source cannot say."""
+        """All signals that may be reported; empty if some source does not know."""
         if not all(s.names for s in self._sources):
             return frozenset()
         return frozenset[str]().union(*(s.names for s in self._sources))
@@ -50,7 +50,7 @@ class SignalBehaviour(Stateless):
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One percept with all that is known now."""
+        """One percept with all current values."""
         known: dict[str, Value] = {}
         for source in self._sources:
             known.update(source.at(frame.time))

@@ -27,8 +27,8 @@ class SignalTable:
     """Signals over time; each row is valid until the next one.
 
     Attributes:
-        times: Seconds, rising.
-        rows: What is known from each time on.
+        times: Seconds, ascending.
+        rows: Values from each time on.
         names: All columns.
     """
 
@@ -37,7 +37,7 @@ class SignalTable:
     names: frozenset[str]
 
     def at(self, time: float) -> Mapping[str, Value]:
-        """The row valid at a time; nothing is known before the first."""
+        """The row valid at a time; empty before the first."""
         place = bisect_right(self.times, time)
         return self.rows[place - 1] if place else {}
 
@@ -45,11 +45,11 @@ class SignalTable:
 def read_signals(path: Path) -> SignalTable:
     """Read a table of signals.
 
-    Cells are numbers, `true`, `yes`, `on`, `false`, `no`, `off`, or words; an empty one says that the
-    signal is not known from then on.
+    Cells are numbers, `true`, `yes`, `on`, `false`, `no`, `off`, or words; an empty one makes the signal
+    unknown from then on.
 
     Raises:
-        SettingsError: It cannot be read, or is not such a table; says which line is wrong.
+        SettingsError: The file cannot be read, or is not such a table; the message names the line.
     """
     try:
         text = read_text_file(path, MOST_BYTES)
@@ -61,13 +61,13 @@ def read_signals(path: Path) -> SignalTable:
     except (ValueError, csv.Error) as fault:
         what = f"the signals cannot be read: {fault}"
         raise SettingsError(what, where=str(path), expected=EXPECTED) from None
-    header, times, told = _header(rows, path), list[float](), list[dict[str, Value]]()
+    header, times, values = _header(rows, path), list[float](), list[dict[str, Value]]()
     for number, row in enumerate(rows[1:], start=2):
         if not row:
             continue
         times.append(_time(row, times, len(header), f"{path}:{number}"))
-        told.append({n: _value(c) for n, c in zip(header[1:], row[1:], strict=True) if c.strip()})
-    return SignalTable(tuple(times), tuple(told), frozenset(header[1:]))
+        values.append({n: _value(c) for n, c in zip(header[1:], row[1:], strict=True) if c.strip()})
+    return SignalTable(tuple(times), tuple(values), frozenset(header[1:]))
 
 
 def _header(rows: list[list[str]], path: Path) -> list[str]:

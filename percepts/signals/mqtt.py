@@ -16,16 +16,16 @@ LONGEST_WORD = 200
 
 
 class MqttSignals:
-    """The latest message of each topic: the last part of the topic names the signal.
+    """The latest message of each topic; the last part of the topic names the signal.
 
-    A payload is a number, `true`, `false` or a word, plain or as JSON; an empty one says that the signal
-    is not known any more. Messages count from when they come: the source is to be live.
+    A payload is a number, `true`, `false` or a word, plain or as JSON; an empty one makes the signal
+    unknown. Messages count from their arrival, so the video source must be live.
 
     Args:
         place: `HOST[:PORT]/TOPIC`, such as `broker/cell/#`.
 
     Raises:
-        SettingsError: It is not of that form, or the broker cannot be reached.
+        SettingsError: The address is malformed, or the broker cannot be reached.
         ExtraMissingError: paho-mqtt is not installed.
     """
 
@@ -56,7 +56,7 @@ class MqttSignals:
         return dict(self._known)
 
     def take(self, topic: str, payload: bytes) -> None:
-        """Take in one message; what is no signal is let be."""
+        """Handle one message; anything but a signal is ignored."""
         name, value = topic.rpartition("/")[2], read_payload(payload)
         if not NAME.fullmatch(name):
             return
@@ -67,7 +67,7 @@ class MqttSignals:
 
 
 def read_payload(payload: bytes) -> Value | None:
-    """A message as a value; None of an empty one, or one that is no value."""
+    """A message as a value; None if empty or not a value."""
     text = payload[: 4 * LONGEST_WORD].decode("utf-8", errors="replace").strip()
     try:
         found: Any = json.loads(text)

@@ -1,5 +1,5 @@
-"""Objects taught by a user: outlines drawn in one picture, as they are stored.
+"""Objects taught by a user: outlines drawn in one picture, in their stored form.
 
-Read `view.py`; `drawing.py` shows views to people. The model database stores these views beside those of
+Read `view.py`; `drawing.py` draws views. The model database stores these views beside those of
 meshes and silhouettes.
 """

@@ -1,4 +1,4 @@
-"""A picture of what was taught: each view's pixels with its outline, and the name below."""
+"""Pictures of taught views: each view's pixels with its outline, and the name below."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def view_tile(view: TaughtView, side: int) -> NDArray[np.uint8]:
     """A view's pixels with its outline, fitted into a white square (side, side, 3), BGR."""
     zoom = (side - 12) / max(view.mask.shape)
     size = tuple(max(1, round(n * zoom)) for n in view.mask.shape[::-1])
-    way = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
-    image = cv2.resize(view.image, size, interpolation=way)
+    interpolation = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
+    image = cv2.resize(view.image, size, interpolation=interpolation)
     mask = cv2.resize(view.mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(image, outlines, -1, _LINE, 2, cv2.LINE_AA)

@@ -1,10 +1,9 @@
-"""What lies at a place of a picture: an outline from a single point.
+"""Segmentation of the object at a point of a picture.
 
-All that can be reached from the point by steps of colour smaller than a threshold grows as the
-threshold rises, and jumps where it spills over the edge of a thing into what lies around it. The
-outline is what was reached before the greatest jump (as maximally stable extremal regions are, of
-one seed). Of 93 things that briefs of real clips and rendered worlds outline, a point in their
-middle gives 70 % with an overlap of half or more (median .73); what is of many colours fails.
+The region reachable from the point by colour steps below a threshold grows with the threshold, and jumps
+where it spills over the object's edge. The outline is the region before the greatest jump (as for maximally
+stable extremal regions, from one seed). Of 93 objects outlined in briefs of real clips and rendered worlds, a
+point in their middle gives 70 % with an overlap of half or more (median .73); objects of many colours fail.
 """
 
 from __future__ import annotations
@@ -17,31 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 SIDE = 320
-"""The picture is looked at this wide at most, pixels: what is finer is texture."""
+"""Width to which the picture is reduced, pixels: finer detail is texture."""
 
 STEPS = np.arange(1.0, 60.0, 0.5)
-"""Thresholds that are tried, in CIE L*a*b*; larger steps of colour are no part of one thing."""
+"""Tested thresholds, in CIE L*a*b*; larger colour steps do not occur within one object."""
 
 LEAST, MOST = 0.0008, 0.15
-"""Shares of the picture that a thing may cover: less is a speck, more is the ground it stands on."""
+"""Shares of the picture that an object may cover: less is a speck, more is the ground."""
 
 LEAST_JUMP = math.log(1.5)
-"""What spills over by less has no edge there."""
+"""Least logarithmic growth of area that counts as spilling over an edge."""
 
-_CLOSED = 7  # holes and slits narrower than this are closed, pixels of the small picture
+_CLOSED = 7  # holes and slits narrower than this are closed, pixels of the reduced picture
 
 
 def outline_at(
     picture: NDArray[np.uint8], at: tuple[float, float]
 ) -> tuple[tuple[float, float], ...] | None:
-    """The outline of the thing at a place.
+    """The outline of the object at a point.
 
     Args:
         picture: (H, W, 3) uint8, BGR.
         at: (x, y) in the picture, pixels.
 
     Returns:
-        Corners (x, y) in order, pixels; None where nothing has an edge about the place.
+        Corners (x, y) in order, pixels; None where no edge surrounds the point.
     """
     height, width = picture.shape[:2]
     if not (0 <= at[0] < width and 0 <= at[1] < height):
@@ -67,10 +66,10 @@ def outline_at(
 
 
 def _before_the_jump(lab: NDArray[np.float32], seed: tuple[int, int]) -> NDArray[np.uint8] | None:
-    """(h, w) of 0 and 1: what was reached before it spilled over most; None where it never did."""
+    """(h, w) of 0 and 1: the region before the greatest jump; None without a jump."""
     whole = lab.shape[0] * lab.shape[1]
     found = [_reached(lab, seed, float(step)) for step in STEPS]
-    # What no step reaches is parted by the strongest edges of all: the next jump is to everything.
+    # Beyond the largest step the region would jump to the whole picture.
     areas = [*(int(np.count_nonzero(m)) for m in found), whole]
     best, most = None, LEAST_JUMP
     for mask, (area, after) in zip(found, pairwise(areas), strict=True):
@@ -80,7 +79,7 @@ def _before_the_jump(lab: NDArray[np.float32], seed: tuple[int, int]) -> NDArray
 
 
 def _reached(lab: NDArray[np.float32], seed: tuple[int, int], step: float) -> NDArray[np.uint8]:
-    """What steps of colour up to one size reach from a point."""
+    """The region reachable from a point by colour steps up to `step`."""
     mask = np.zeros((lab.shape[0] + 2, lab.shape[1] + 2), np.uint8)
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | (1 << 8)
     cv2.floodFill(lab, mask, seed, (0,) * 3, (step,) * 3, (step,) * 3, flags)

@@ -1,7 +1,7 @@
-"""A thing as it was shown: an outline drawn once in a picture, with the pixels in and around it.
+"""Taught views: an outline drawn in one picture, with the pixels in and around it.
 
-Only what was seen is kept. Colours, keypoints, silhouettes and shock graphs follow from it when they
-are needed, so that a better way of recognising serves things that were taught before.
+Only the pixels are stored. Colours, keypoints, silhouettes and shock graphs are derived when needed, so that
+a better recogniser also serves objects taught earlier.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import SettingsError
 
 SCENE_WIDTH = 480
-"""The picture in which a thing was shown is kept at most this wide, pixels."""
+"""Most width of the stored picture, pixels."""
 
 LEAST_PIXELS = 24
-"""A smaller outline shows nothing that could be recognised."""
+"""Fewest pixels of an outline that can be recognised."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TaughtView:
-    """One outline of one thing, in one picture.
+    """One outline of one object, in one picture.
 
     Attributes:
-        name: Of the thing; a task's actors may stand for it.
+        name: Name of the object; a task's actors may refer to it.
         image: (h, w, 3) uint8, BGR: the outline's box, with half its longer side around it as far as
             the picture reaches.
-        mask: (h, w) bool, the thing in `image`.
+        mask: (h, w) bool, the object in `image`.
         origin: (x, y) of `image` in the picture, pixels.
         frame_size: (width, height) of the picture, pixels.
         scene: (H, W, 3) uint8, BGR: the whole picture, at most `SCENE_WIDTH` wide.
@@ -45,7 +45,7 @@ class TaughtView:
 
     @property
     def bbox(self) -> tuple[int, int, int, int]:
-        """(x, y, width, height) of the thing in the picture, pixels, half open."""
+        """(x, y, width, height) of the object in the picture, pixels, half open."""
         x, y, w, h = cv2.boundingRect(self.mask.astype(np.uint8))
         return self.origin[0] + x, self.origin[1] + y, w, h
 
@@ -53,15 +53,15 @@ class TaughtView:
 def taught_view(
     name: str, picture: NDArray[np.uint8], outline: Sequence[Sequence[float]]
 ) -> TaughtView:
-    """The view that an outline drawn in a picture shows.
+    """The view of an outline drawn in a picture.
 
     Args:
-        name: Of the thing.
+        name: Name of the object.
         picture: (H, W, 3) uint8, BGR.
         outline: At least three corners (x, y), pixels of the picture.
 
     Raises:
-        SettingsError: The outline has too few corners, or hardly any pixel of the picture in it.
+        SettingsError: The outline has too few corners, or almost no pixels of the picture in it.
     """
     corners = np.asarray(outline, dtype=np.float64)
     if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
@@ -77,10 +77,10 @@ def taught_view(
 
 
 def taught_mask(name: str, picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> TaughtView:
-    """The view that a mask over a whole picture shows; see `taught_view`.
+    """The view of a mask over a whole picture; see `taught_view`.
 
     Raises:
-        SettingsError: Hardly any pixel is in the mask.
+        SettingsError: The mask has almost no pixels.
     """
     height, width = mask.shape
     if np.count_nonzero(mask) < LEAST_PIXELS:

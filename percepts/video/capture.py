@@ -1,4 +1,4 @@
-"""The little of OpenCV's capture that sources need, and opening one without noise."""
+"""The part of OpenCV's capture interface that sources need, opened without log output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_FRAMES = 10**8
 
 
 class Capture(Protocol):
-    """What is used of `cv2.VideoCapture`."""
+    """The part of `cv2.VideoCapture` in use."""
 
     def isOpened(self) -> bool:
         """Whether frames can be read."""
@@ -30,7 +30,7 @@ class Capture(Protocol):
         ...
 
     def retrieve(self) -> tuple[bool, NDArray[np.generic]]:
-        """Decode the frame that was grabbed."""
+        """Decode the grabbed frame."""
         ...
 
     def get(self, prop: int) -> float:
@@ -38,12 +38,12 @@ class Capture(Protocol):
         ...
 
     def release(self) -> None:
-        """Let go of the file or camera."""
+        """Release the file or camera."""
         ...
 
 
 CaptureFactory = Callable[[str | int], Capture]
-"""Opens what the user named; tests give one of their own."""
+"""Opens what the user named; tests pass their own."""
 
 
 def open_capture(name: str | int) -> Capture:
@@ -63,13 +63,13 @@ def open_capture(name: str | int) -> Capture:
 
 
 def take(capture: Capture) -> NDArray[np.uint8] | None:
-    """The frame that was grabbed last as (H, W, 3) uint8 BGR, or None if it cannot be decoded."""
+    """The last grabbed frame as (H, W, 3) uint8 BGR, or None if it cannot be decoded."""
     ok, image = capture.retrieve()
     return to_bgr(image) if ok and image is not None and image.size else None
 
 
 def frame_rate(capture: Capture, wanted: float | None) -> tuple[float, tuple[str, ...]]:
-    """Frames per second, and a note when they had to be assumed."""
+    """Frames per second, and a note if assumed."""
     import cv2
 
     if wanted is not None:
@@ -81,7 +81,7 @@ def frame_rate(capture: Capture, wanted: float | None) -> tuple[float, tuple[str
 
 
 def announced_frames(capture: Capture) -> int | None:
-    """How many frames the container announces, or None when it does not say."""
+    """Number of frames according to the container, or None if it does not say."""
     import cv2
 
     count = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))

@@ -37,11 +37,11 @@ class ImageFolder(VideoSource):
     """Images of one folder as frames at a constant rate.
 
     Args:
-        name: What the user named.
+        name: The user's name for it.
         files: The images, in order; at least one.
         every: Only every n-th image is read.
         fps: Frames per second.
-        notes: Sentences about what had to be assumed.
+        notes: Sentences about assumptions made.
 
     Raises:
         SourceError: The first image cannot be read.
@@ -91,7 +91,7 @@ class ImageFolder(VideoSource):
         return Frame(index, index / self.fps, image)
 
     def _image(self, index: int) -> NDArray[np.uint8]:
-        """One image, which has the size of the first."""
+        """One image, checked to have the size of the first."""
         if index == 0 and self._first is not None:
             image, self._first = self._first, None
             return image
@@ -117,7 +117,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
         (H, W, 3) uint8 BGR.
 
     Raises:
-        UnreadableImageError: It cannot be read, is no image, or ends too early.
+        UnreadableImageError: It cannot be read, is not an image, or is truncated.
     """
     try:
         data = read_bounded(path, LARGEST_FILE_BYTES)
@@ -133,7 +133,7 @@ def decode_image(data: bytes) -> NDArray[np.uint8]:
         (H, W, 3) uint8 BGR.
 
     Raises:
-        UnreadableImageError: It is no image, or ends too early.
+        UnreadableImageError: It is not an image, or is truncated.
     """
     import cv2
 
@@ -145,7 +145,7 @@ def decode_image(data: bytes) -> NDArray[np.uint8]:
         check_picture_size(data)
     except ValueError as e:
         raise UnreadableImageError(str(e)) from e
-    # JPEG has no alpha, and only the colour flag honours the camera's orientation.
+    # JPEG has no alpha, and only the colour flag applies the EXIF orientation.
     flags = cv2.IMREAD_COLOR if data.startswith(JPEG_START) else cv2.IMREAD_UNCHANGED
     try:
         with quiet():
@@ -158,7 +158,7 @@ def decode_image(data: bytes) -> NDArray[np.uint8]:
 
 
 def _ends_early(data: bytes) -> bool:
-    """Whether an image lost its end; decoders would fill the rest with grey."""
+    """Whether an image is truncated; decoders would fill the rest with grey."""
     if data.startswith(PNG_START):
         return PNG_END not in data[-1024:]
     return data.startswith(JPEG_START) and JPEG_END not in data[-65536:]
@@ -171,7 +171,7 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
 
 
 def images_in(folder: Path) -> list[Path]:
-    """The image files of a folder in natural order; hidden files are left out."""
+    """The image files of a folder in natural order; hidden files are skipped."""
     found = [
         p
         for p in folder.iterdir()
@@ -181,14 +181,14 @@ def images_in(folder: Path) -> list[Path]:
 
 
 def image_names(source: str) -> tuple[str, ...]:
-    """Names of the images of a source, in order; none where it is no folder of images."""
+    """Names of the images of a source, in order; none if it is not a folder of images."""
     if not Path(source).is_dir():
         return ()
     return tuple(p.name for p in _find_images(Path(source))[1])
 
 
 def open_folder(folder: Path, *, every: int = 1, fps: float | None = None) -> ImageFolder:
-    """Open a folder of images, or a sequence folder that holds one (MOT, DAVIS).
+    """Open a folder of images, or a sequence folder containing one (MOT, DAVIS).
 
     Args:
         folder: The folder; it exists.
@@ -216,7 +216,7 @@ def open_folder(folder: Path, *, every: int = 1, fps: float | None = None) -> Im
 
 
 def _find_images(folder: Path) -> tuple[Path, list[Path]]:
-    """Where the images are: in the folder, or in one that such sequences usually have."""
+    """Find the images: in the folder, or in a usual subfolder of such sequences."""
     files = images_in(folder)
     if files:
         return folder, files
@@ -232,7 +232,7 @@ def _find_images(folder: Path) -> tuple[Path, list[Path]]:
 
 
 def _hint(folder: Path) -> str:
-    """What the user may have meant instead of a folder without images."""
+    """A hint for a folder without images."""
     inside = sorted(folder.iterdir())
     for path in inside:
         if path.suffix.lower() in VIDEO_SUFFIXES:
@@ -244,7 +244,7 @@ def _hint(folder: Path) -> str:
 
 
 def _sequence_info(folder: Path) -> dict[str, str]:
-    """What a MOT `seqinfo.ini` says (keys in lower case); empty when there is none to be read."""
+    """The values of a MOT `seqinfo.ini` (keys in lower case); empty without one."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text_file(folder / "seqinfo.ini"))
@@ -254,7 +254,7 @@ def _sequence_info(folder: Path) -> dict[str, str]:
 
 
 def _rate(images: Path) -> tuple[float, tuple[str, ...]]:
-    """Frame rate of a folder of images, and a note when it had to be assumed."""
+    """Frame rate of a folder of images, and a note if assumed."""
     for folder in (images, images.parent):
         text = _sequence_info(folder).get("framerate")
         if text is None:

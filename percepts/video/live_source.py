@@ -1,4 +1,4 @@
-"""A camera or a stream: frames that are made while they are read."""
+"""Live sources: cameras and streams, with reconnection."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ LONGEST_WAIT_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Reconnection:
-    """How a source that delivers nothing any more is opened again.
+    """How to reopen a source that has dropped.
 
     Attributes:
         reopen: Opens it.
-        patience_s: How long to try, seconds.
-        wait: Waits so many seconds; an argument for tests.
+        patience_s: How long to retry, seconds.
+        wait: Sleeps for a number of seconds; injectable for tests.
     """
 
     reopen: Callable[[], Capture]
@@ -35,19 +35,19 @@ class Reconnection:
 class LiveSource(VideoSource):
     """A camera or stream; the time of a frame is when it was received.
 
-    When it delivers nothing any more it is opened again, at first soon and then ever more seldom, until
-    it is back or patience is at an end. Numbers and times of frames go on.
+    When it drops it is reopened with increasing intervals until it is back or patience runs out. Frame
+    numbers and times continue.
 
     Args:
-        name: What the user named.
+        name: The user's name for it.
         capture: An open capture.
-        every: Only every n-th frame is given.
+        every: Only every n-th frame is returned.
         fps: Frame rate to assume, or None for what the camera says.
-        clock: Seconds from any start; an argument so that a run can be repeated.
-        reconnection: How it is opened again; None to end when it drops.
+        clock: Seconds from any start; injectable for reproducible runs.
+        reconnection: How to reopen it; None to end when it drops.
 
     Attributes:
-        notify: Told at once when it drops, while nobody can step: one sentence.
+            notify: Called with a sentence as soon as it drops, while no step can run.
 
     Raises:
         SourceError: It delivers no frame.
@@ -68,7 +68,7 @@ class LiveSource(VideoSource):
         rate, notes = frame_rate(capture, fps)
         self.notify: Callable[[str], None] | None = None
         self._reconnection = reconnection
-        # Written by whoever reads frames, which may be a thread of its own, and read by the cycle.
+        # Written by the frame reader, possibly in its own thread, and read by the agent's cycle.
         self._came_back: deque[str] = deque()
         self._capture = capture
         self._clock = clock
@@ -104,43 +104,43 @@ class LiveSource(VideoSource):
         return frame
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """Once after it came back: how long nothing was delivered."""
+        """Reported once after it came back: how long it was gone."""
         while self._came_back:
-            said = self._came_back.popleft()
+            message = self._came_back.popleft()
             yield AlertCondition(
-                SOURCE_DROPPED, (), Severity.WARNING, said, key=self.name, needs=()
+                SOURCE_DROPPED, (), Severity.WARNING, message, key=self.name, needs=()
             )
 
     def _grab(self) -> bool:
-        return self._capture.grab() or (self._received > 0 and self._back_again())
+        return self._capture.grab() or (self._received > 0 and self._reconnected())
 
-    def _back_again(self) -> bool:
-        """Open it again and again; whether a frame can be received."""
-        again = self._reconnection
-        if again is None or again.patience_s <= 0:
+    def _reconnected(self) -> bool:
+        """Retry until a frame can be received; whether that succeeded."""
+        reconnection = self._reconnection
+        if reconnection is None or reconnection.patience_s <= 0:
             return False
         if self.notify:
             self.notify(f"{self.name} delivers no frames; trying again.")
         since, pause = self._clock(), FIRST_WAIT_S
-        while (gone := self._clock() - since) < again.patience_s:
+        while (gone_s := self._clock() - since) < reconnection.patience_s:
             self._capture.release()
-            again.wait(min(pause, again.patience_s - gone))
+            reconnection.wait(min(pause, reconnection.patience_s - gone_s))
             pause = min(2 * pause, LONGEST_WAIT_S)
-            self._capture = again.reopen()
+            self._capture = reconnection.reopen()
             if self._capture.isOpened() and self._capture.grab():
-                gone = self._clock() - since
-                self._came_back.append(f"{self.name} delivered nothing for {gone:.1f} s.")
+                gone_s = self._clock() - since
+                self._came_back.append(f"{self.name} delivered nothing for {gone_s:.1f} s.")
                 return True
         return False
 
     def _advance(self, every: int) -> Frame | None:
-        """Receive until a wanted frame is there."""
+        """Receive frames up to the next wanted one."""
         while self._grab():
             index, self._received = self._received, self._received + 1
             now = self._clock()
             if index == 0:
                 self._start = now
-            # A coarse clock may stand still between two frames, but time never does.
+            # Keeps times strictly increasing when the clock is coarse.
             self._last_time = max(now - self._start, self._last_time + 1e-6 if index else 0.0)
             image = None if index % every else take(self._capture)
             if image is not None:

@@ -1,4 +1,4 @@
-"""A clip that is played over and over, as a camera would deliver it: to rehearse a supervisor without one."""
+"""A clip played in a loop as if from a camera, to rehearse a supervisor without one."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from visup.percepts.video.capture import Capture, CaptureFactory, frame_rate
 from visup.percepts.video.waiting_clock import WaitingClock
 
 LOOP = "loop:"
-"""Before the name of such a clip: `loop:clip.mp4`."""
+"""Prefix of such a source: `loop:clip.mp4`."""
 
 
 class LoopedCapture:
-    """A capture of a clip that restarts at its end, each frame at its time.
+    """A capture of a clip that restarts at its end, with each frame at its time.
 
-    Like a camera it waits for nobody: who asks late is given the next frame at once, until the clip's
-    own times are caught up with.
+    Like a camera it does not wait: a late reader gets the next frames at once until it has caught up with
+    the clip's own times.
 
     Args:
         path: The clip.
-        factory: What opens it.
-        fps: Frames a second, in place of what the clip says.
-        clock: By what it is played.
+        factory: Opens it.
+        fps: Frames per second, in place of the clip's own.
+        clock: Clock of the playback.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class LoopedCapture:
         return self._clip.isOpened()
 
     def grab(self) -> bool:
-        """Wait until the next frame is due, and go to it; False when the clip holds none."""
+        """Wait until the next frame is due, and advance to it; False when the clip is empty."""
         now = self._clock.now()
         self._due = now if self._due is None else self._due + self._pause
         if self._due > now:
             self._clock.wait(self._due - now)
-        return self._clip.grab() or self._begin_anew()
+        return self._clip.grab() or self._restart()
 
     def retrieve(self) -> tuple[bool, NDArray[np.generic]]:
         """Decode the frame."""
@@ -62,7 +62,7 @@ class LoopedCapture:
         """Close the clip."""
         self._clip.release()
 
-    def _begin_anew(self) -> bool:
+    def _restart(self) -> bool:
         self._clip.release()
         self._clip = self._factory(self._path)
         return self._clip.isOpened() and self._clip.grab()

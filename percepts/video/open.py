@@ -1,4 +1,4 @@
-"""Opening whatever the user named as a source of frames."""
+"""Opening of a source of frames from what the user named."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def open_source(
     Args:
         source: A video file, a folder of images (or a MOT or DAVIS sequence folder), the index of
             a camera such as '0', a URL (rtsp, http, ...), a ROS 2 bag (`bag` or `bag#/topic`), or
-            `loop:CLIP`, a video file that is played over and over as a camera would deliver it.
-        every: Give only every n-th frame; frames keep their number and time in the source.
-        fps: Frames per second to assume in place of what the source says.
-        factory: What opens files, cameras and URLs.
-        patience_s: How long a camera or stream that drops is tried again, seconds.
+            `loop:CLIP`, a video file played in a loop as if from a camera.
+        every: Return only every n-th frame; frames keep their number and time in the source.
+        fps: Frames per second to assume in place of the source's own.
+        factory: Opens files, cameras and URLs.
+        patience_s: How long to retry a camera or stream that drops, seconds.
 
     Returns:
         The source, its first frame decoded. Use it in a `with` statement.
@@ -69,7 +69,7 @@ def open_source(
 
 @dataclass(frozen=True, slots=True)
 class _Opening:
-    """How sources are opened; fields as the arguments of `open_source`."""
+    """Options for opening a source; fields as the arguments of `open_source`."""
 
     every: int
     fps: float | None
@@ -77,9 +77,9 @@ class _Opening:
     patience_s: float
 
     def live(self, name: str, capture: Capture, opened: str | int) -> LiveSource:
-        """A source of an open capture that is opened again when it drops."""
-        again = Reconnection(lambda: self.factory(opened), self.patience_s)
-        return LiveSource(name, capture, every=self.every, fps=self.fps, reconnection=again)
+        """A live source of an open capture, reopened when it drops."""
+        reconnection = Reconnection(lambda: self.factory(opened), self.patience_s)
+        return LiveSource(name, capture, every=self.every, fps=self.fps, reconnection=reconnection)
 
 
 def _check(every: int, fps: float | None) -> None:
@@ -104,9 +104,9 @@ def _camera(camera: int | str, factory: CaptureFactory) -> Capture:
 
 
 def _open_url(url: str, opening: _Opening) -> VideoFile | LiveSource:
-    """A recording when the stream knows how many frames it has, else a live source.
+    """A recording when the stream knows its number of frames, else a live source.
 
-    It is called by its address without what only its owner should know: names stand in every record.
+    It is named by its address without credentials, since names appear in every record.
     """
     shown = redacted(url)
     if url.split(":", 1)[0].lower() not in SCHEMES:
@@ -151,7 +151,7 @@ def _open_path(path: Path, opening: _Opening) -> VideoSource:
         if path.is_char_device():
             return opening.live(str(path), _camera(str(path), opening.factory), str(path))
         regular, exists = path.is_file(), path.exists()
-    except (OSError, ValueError) as e:  # a name that is too long or has a NUL in it
+    except (OSError, ValueError) as e:  # the name is too long or contains NUL
         raise SourceError("this is not a usable file name", where=str(path)) from e
     if regular:
         return open_file(path, every=opening.every, fps=opening.fps, factory=opening.factory)
@@ -166,7 +166,7 @@ def _open_path(path: Path, opening: _Opening) -> VideoSource:
 
 
 def _bag(path: Path) -> tuple[Path, str | None] | None:
-    """A bag and the topic that is named after a `#`, or None when it is no bag."""
+    """A bag and the topic named after a `#`, or None when it is not a bag."""
     if path.exists():
         return (path, None) if is_bag(path) else None
     name, mark, topic = str(path).partition("#")
@@ -174,7 +174,7 @@ def _bag(path: Path) -> tuple[Path, str | None] | None:
 
 
 def _nearest(path: Path) -> str:
-    """The file of the same folder whose name comes closest, if one does."""
+    """A suggestion of the file of most similar name in the same folder, if any."""
     try:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:

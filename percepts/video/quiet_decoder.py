@@ -1,4 +1,4 @@
-"""Silences OpenCV and FFmpeg, since visup reports errors itself."""
+"""Silencing of OpenCV and FFmpeg, since visup reports errors itself."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ STDERR = 2
 
 
 def hush_decoder() -> None:
-    """Ask FFmpeg inside OpenCV for silence; it reads this once, when it first opens a video."""
+    """Set FFmpeg inside OpenCV to quiet; it reads this once, when it first opens a video."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Drop what native code writes to standard error while a file is opened.
+    """Discard native output to standard error while a file is opened.
 
-    The libraries write to the file descriptor itself, so that it is what must be turned away. Kept
-    to short moments, since it silences the whole process.
+    The libraries write to the file descriptor itself, which must therefore be redirected. Only for short
+    moments, since it silences the whole process.
     """
     try:
         sys.stderr.flush()
-        kept = os.dup(STDERR)
+        saved = os.dup(STDERR)
     except (OSError, ValueError, AttributeError):  # no standard error to protect
         yield
         return
@@ -33,5 +33,5 @@ def quiet() -> Iterator[None]:
             os.dup2(nowhere.fileno(), STDERR)
         yield
     finally:
-        os.dup2(kept, STDERR)
-        os.close(kept)
+        os.dup2(saved, STDERR)
+        os.close(saved)

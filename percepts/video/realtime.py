@@ -1,13 +1,11 @@
-"""Real time: a late reader gets the newest frame, and those in between are dropped.
+"""Real-time playback: a late reader gets the newest frame, and those in between are dropped.
 
-The policy, in one place: *the newest frame that is due*. A frame is due when it was received, or, of
-a recording that is played as a camera would deliver it, when its time has come. Frames that were due
-while the one before was still being thought about are dropped, all but the newest; frames keep their
-numbers and times, so that what follows knows how long nobody looked. What was dropped is counted and
-told (`troubles`, `dropped`).
-
-A recording needs no thread, and with an injected clock the same frames are dropped each time. A live
-source is read in a thread, since a capture whose frames nobody takes hands out old ones later.
+The policy, in one place: *the newest frame that is due*. A frame is due when it was received, or, for a
+recording played as if from a camera, when its time has come. Of the frames that became due while the previous
+one was processed, all but the newest are dropped; frames keep their numbers and times, so that later stages
+know how long the gap was. Dropped frames are counted and reported (`runtime_faults`, `dropped`).
+ A recording needs no thread, and with an injected clock the same frames are dropped each time. A live source
+is read in a thread, since a capture that is not drained returns old frames later.
 """
 
 from __future__ import annotations
@@ -25,25 +23,25 @@ from visup.percepts.video.source import VideoSource
 
 WINDOW_S = 5.0
 SHARE = 0.1
-"""From this share of the frames of the window on, it is told that frames are dropped."""
+"""Dropped share of the frames of the window from which it is reported."""
 
 LONG_S = 1.0
-"""From so long without a look on, it is told as a warning."""
+"""Time without a processed frame from which it is a warning, seconds."""
 
 PATIENCE_S = 5.0
-"""How long a reader may take to end; one that is stuck in its capture is left alone."""
+"""How long to wait for a reader to end, seconds; one stuck in its capture is abandoned."""
 
 
 class RealTimeFrames(Iterator[Frame], ABC):
-    """Frames as time brings them.
+    """Frames in real time.
 
     Args:
-        name: What their source is called.
+        name: Name of their source.
         clock: Seconds from any start.
 
     Attributes:
-        dropped: Frames that were dropped so far.
-        given: Frames that were given so far.
+        dropped: Frames dropped so far.
+        given: Frames returned so far.
     """
 
     def __init__(self, name: str, clock: Callable[[], float] = time.monotonic) -> None:
@@ -55,10 +53,10 @@ class RealTimeFrames(Iterator[Frame], ABC):
         self._origin: float | None = None
 
     def lag(self, time: float) -> float:
-        """How long ago it was what a frame shows, seconds; the first frame is taken to have come at once.
+        """Age of a frame, seconds, assuming that the first came without delay.
 
         Args:
-            time: Of the frame, seconds.
+            time: Time of the frame, seconds.
         """
         return 0.0 if self._origin is None else max(0.0, self.clock() - self._origin - time)
 
@@ -74,7 +72,7 @@ class RealTimeFrames(Iterator[Frame], ABC):
         return frame
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """That frames are dropped, while more than a tenth of those of late were."""
+        """Reports dropped frames while more than a tenth of the recent ones were."""
         lost = sum(missed for _, missed in self._recent)
         if lost < SHARE * (lost + len(self._recent)):
             return
@@ -88,32 +86,32 @@ class RealTimeFrames(Iterator[Frame], ABC):
         yield AlertCondition(FRAMES_DROPPED, (), severity, text, key=self.name, needs=())
 
     def note(self) -> str | None:
-        """One sentence for the end of a run; None when nothing was dropped."""
+        """A sentence for the end of a run; None when no frame was dropped."""
         if not self.dropped:
             return None
         whole = self.dropped + self.given
         return f"To keep pace with the clock, {self.dropped} of {whole} frames were dropped."
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
 
     @abstractmethod
     def _newest(self) -> tuple[Frame, int]:
-        """The newest frame that is due, waited for if none is, and how many before it are dropped.
+        """The newest due frame, after waiting if there is none, and the number dropped before it.
 
         Raises:
-            StopIteration: There are no more.
+            StopIteration: There are no more frames.
         """
 
 
 class PacedRecording(RealTimeFrames):
-    """A recording, played as a camera would deliver it.
+    """A recording played as if from a camera.
 
     Args:
-        frames: The recording, or what is left of it.
-        name: What it is called.
+        frames: The recording, or the rest of it.
+        name: Its name.
         clock: Seconds from any start.
-        wait: Waits so many seconds.
+        wait: Sleeps for a number of seconds.
     """
 
     def __init__(
@@ -147,7 +145,7 @@ class LatestFrames(RealTimeFrames):
     """A live source, read as fast as it delivers.
 
     Args:
-        frames: Its frames; only this reads them from now on.
+        frames: Its frames; nothing else may read them.
         source: The source itself.
     """
 
@@ -172,7 +170,7 @@ class LatestFrames(RealTimeFrames):
                     if self._stop:
                         break
         except Exception as fault:
-            self._fault = fault  # it is raised where frames are asked for
+            self._fault = fault  # raised in the consumer's thread
         with self._changed:
             self._ended = True
             self._changed.notify()
@@ -189,7 +187,7 @@ class LatestFrames(RealTimeFrames):
         raise StopIteration
 
     def close(self) -> None:
-        """Read no more; a source in which the reader is stuck is left to the end of the process."""
+        """Stop reading; a source whose reader is stuck is abandoned until the process ends."""
         self._stop = True
         self._reader.join(PATIENCE_S)
         if self._reader.is_alive():
@@ -197,10 +195,10 @@ class LatestFrames(RealTimeFrames):
 
 
 def in_real_time(source: VideoSource, frames: Iterator[Frame]) -> RealTimeFrames:
-    """Frames of a source as time brings them, whatever the source.
+    """Frames of any source in real time.
 
     Args:
         source: The source.
-        frames: Its frames, from any of them on.
+        frames: Its frames, or the rest of them.
     """
     return LatestFrames(frames, source) if source.live else PacedRecording(frames, source.name)

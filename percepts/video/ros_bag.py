@@ -1,7 +1,7 @@
 """The pictures of a ROS 2 bag (`sensor_msgs/Image`, `CompressedImage`); needs `visup[ros]`.
 
-Messages are read as the two types that visup knows. What a bag itself says about types is not looked at:
-code would be made of it, and a bag may come from strangers.
+Messages are decoded as the two types known to visup. Type definitions inside a bag are ignored: they would be
+compiled to code, and a bag may come from strangers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from visup.percepts.video.video_file import ContainerClock
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 BAG_SUFFIXES = (".mcap", ".db3")
 RATE_MESSAGES = 50
-"""The rate is the median of so many intervals."""
+"""Number of messages from which the rate is estimated, as the median interval."""
 
 PLAIN = {
     "mono8": ("u1", 1),
@@ -42,9 +42,9 @@ PLAIN = {
     "mono16": ("u2", 1),
     "16UC1": ("u2", 1),
 }
-"""Encoding -> type of a value, values of a pixel."""
+"""Encoding -> type of a value, values per pixel."""
 
-# What is called BGGR by the colours of its first two rows has OpenCV's name by its second row and column.
+# Bayer patterns are named by their first two rows; OpenCV names them by the second row and column.
 BAYER = {"bayer_rggb8": "BG", "bayer_bggr8": "RG", "bayer_gbrg8": "GR", "bayer_grbg8": "GB"}
 YUV = {"yuv422": "UYVY", "uyvy": "UYVY", "yuv422_yuy2": "YUY2", "yuyv": "YUY2"}
 
@@ -63,14 +63,14 @@ def open_bag(
     """Open a bag.
 
     Args:
-        path: Of which `is_bag` holds.
-        topic: Whose pictures are wanted; None for the only one that there is.
+        path: A path for which `is_bag` holds.
+        topic: The topic to read; None for the only one.
         every: Only every n-th picture is decoded.
         fps: Pictures per second to assume in place of their stamps.
 
     Raises:
         ExtraMissingError: rosbags is not installed.
-        SourceError: It cannot be read, or has no pictures, or several topics of them and none was named.
+        SourceError: It cannot be read, has no pictures, or several topics with pictures and none was named.
     """
     try:
         from rosbags.rosbag2 import Reader
@@ -87,7 +87,7 @@ def open_bag(
     except SourceError:
         _close(reader)
         raise
-    except Exception as fault:  # whatever a damaged file has the library raise
+    except Exception as fault:  # a damaged file may make the library raise anything
         _close(reader)
         raise SourceError(
             f"the bag cannot be read ({type(fault).__name__}: {fault})",
@@ -103,7 +103,7 @@ def _close(reader: Any) -> None:
 
 
 def _chosen(path: Path, topics: dict[str, Any], wanted: str | None) -> str:
-    """The topic whose pictures are read."""
+    """The topic to read."""
     known = [n for n, t in topics.items() if t.msgtype in (IMAGE, COMPRESSED) and t.msgcount]
     if not known:
         raise SourceError(
@@ -134,7 +134,7 @@ class _Pictures:
     Attributes:
         reader: An open `rosbags.rosbag2.Reader`.
         topic: Its name.
-        types: The store of types that turns messages into records.
+        types: The type store that deserialises messages.
     """
 
     reader: Any
@@ -143,7 +143,7 @@ class _Pictures:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of messages."""
         return int(self.reader.topics[self.topic].msgcount)
 
     def messages(self) -> Iterator[tuple[float, str, bytes]]:
@@ -171,18 +171,18 @@ class _Pictures:
             return _plain(message)
         except UnreadableImageError:
             raise
-        except Exception as fault:  # a damaged message may have the library raise anything
+        except Exception as fault:  # a damaged message may make the library raise anything
             raise UnreadableImageError(f"cannot be decoded ({fault})") from fault
 
 
 class RosBag(VideoSource):
-    """The pictures of one topic as frames, at the times at which they were recorded.
+    """The pictures of one topic as frames, at their recording times.
 
     Args:
         name: The bag and its topic.
         pictures: Its messages.
         every: Only every n-th picture is decoded.
-        fps: Pictures per second, or None for what the times of the first ones say.
+        fps: Pictures per second, or None for the rate of the first ones.
 
     Raises:
         SourceError: The first picture cannot be decoded.
@@ -223,16 +223,16 @@ class RosBag(VideoSource):
                 if index % self.every == 0:
                     return Frame(index, time, self._image(kind, data))
         except UnreadableImageError as fault:
-            told = f"picture {index} of {self.frame_count} {fault}"
-        except Exception as fault:  # whatever a damaged file has the library raise
-            told = f"the bag cannot be read on ({type(fault).__name__}: {fault})"
+            problem = f"picture {index} of {self.frame_count} {fault}"
+        except Exception as fault:  # a damaged file may make the library raise anything
+            problem = f"the bag cannot be read on ({type(fault).__name__}: {fault})"
         else:
             return None
-        self._end(Ending.TRUNCATED, f"{told}; what came before is kept.")
+        self._end(Ending.TRUNCATED, f"{problem}; what came before is kept.")
         return None
 
     def _image(self, kind: str, data: bytes) -> NDArray[np.uint8]:
-        """One picture, which has the size of the first."""
+        """One picture, checked to have the size of the first."""
         image = self._pictures.image(kind, data)
         size = (image.shape[1], image.shape[0])
         if size != self.size:
@@ -272,7 +272,7 @@ def _plain(message: Any) -> NDArray[np.uint8]:
 
 
 def _rows(message: Any, kind: str, values: int) -> NDArray[Any]:
-    """The pixels of a message, (H, W, values), without what fills its rows up."""
+    """The pixels of a message, (H, W, values), without row padding."""
     order = ">" if message.is_bigendian else "<"
     dtype = np.dtype(f"{order}{kind}")
     height, width, step = int(message.height), int(message.width), int(message.step)

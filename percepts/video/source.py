@@ -1,4 +1,4 @@
-"""What a video source is: frames in order, and an honest word on how they ended."""
+"""The interface of video sources: frames in order, and how they ended."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ class Ending(StrEnum):
 class VideoSource(ABC, Iterator[Frame]):
     """Frames in order, read once; close it, or use it in a `with` statement.
 
-    Opening a source reads its first frame, so that what cannot be read fails at once. Every image
-    is (H, W, 3) uint8 BGR, whatever was stored, and all have the same size.
+    Opening a source reads its first frame, so that unreadable sources fail at once. Every image is
+    (H, W, 3) uint8 BGR, whatever was stored, and all have the same size.
 
     Attributes:
-        name: What the user named.
+        name: The user's name for it.
         fps: Frames per second of the source itself, before `every`.
         size: (width, height) pixels.
-        frame_count: Frames of the source before `every`, or None when unknown; for video files it
-            is what the container announces, which may be a little off.
-        live: Whether frames are made while they are read; so for a whole kind of source.
-        notes: Sentences about what had to be assumed.
+        frame_count: Frames of the source before `every`, or None when unknown; for video files the
+            container's count, which may be slightly off.
+        live: Whether frames are produced while they are read; fixed per class.
+        notes: Sentences about assumptions made.
         ended: How it ended, or None while frames may still come.
         problem: Why it is truncated, one sentence, or None.
-        span: Numbers of the first frame that is given, and of the first that no longer is; None for no end.
+        span: Number of the first frame returned, and of the first beyond the end; None for no end.
 
     Args:
-        name: What the user named.
+        name: The user's name for it.
         fps: Frames per second.
         size: (width, height) pixels.
         frame_count: Frames, or None when unknown.
-        every: Only every n-th frame is given.
-        notes: Sentences about what had to be assumed.
+        every: Only every n-th frame is returned.
+        notes: Sentences about assumptions made.
     """
 
     live = False
@@ -97,33 +97,33 @@ class VideoSource(ABC, Iterator[Frame]):
         self.close()
 
     def close(self) -> None:
-        """Let go of the file or camera; a source closed before its end has been stopped."""
+        """Release the file or camera; a source closed before its end counts as stopped."""
         self._end(Ending.STOPPED)
 
     def abandon(self) -> None:
-        """Count it as stopped without letting go of it: a thread that cannot be stopped is in it."""
+        """Mark it as stopped without releasing it: a thread that cannot be stopped is using it."""
         self.ended = self.ended or Ending.STOPPED
 
     def _end(self, how: Ending, problem: str | None = None) -> None:
-        """Note how it ended, the first time, and let go of what is held."""
+        """Record how it ended, the first time, and release it."""
         if self.ended is None:
             self.ended, self.problem = how, problem
             self._release()
 
     @abstractmethod
     def _next(self) -> Frame | None:
-        """The next frame that is wanted; None at the end (after `_end` if it is not complete)."""
+        """The next wanted frame; None at the end (after `_end` if incomplete)."""
 
     @abstractmethod
     def _release(self) -> None:
-        """Let go of the file or camera."""
+        """Release the file or camera."""
 
 
 def to_bgr(image: NDArray[np.generic]) -> NDArray[np.uint8]:
-    """Turn an image of any common kind into the one kind that visup works on.
+    """Convert an image of any common type to the one type that visup uses.
 
-    16-bit values are scaled by their full range, floats are taken as 0 to 1, and what is
-    transparent becomes black.
+    16-bit values are scaled by their full range, floats are assumed 0 to 1, and transparent parts become
+    black.
 
     Args:
         image: (H, W) or (H, W, C) with C 1 (grey), 3 (BGR) or 4 (BGR and alpha); bool, any
@@ -149,7 +149,7 @@ def to_bgr(image: NDArray[np.generic]) -> NDArray[np.uint8]:
 
 
 def _to_uint8(image: NDArray[np.generic]) -> NDArray[np.uint8]:
-    """The same image in 8 bits, its full range kept."""
+    """The image in 8 bits, with its full range."""
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
     if image.dtype == np.bool_:

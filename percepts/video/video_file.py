@@ -1,4 +1,4 @@
-"""A video file, or a recording behind a URL, read to its end."""
+"""Video files, and recordings behind URLs, read to their end."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from visup.percepts.video.source import Ending, VideoSource
 SNIFFED_BYTES = 4096
 ROUNDING_S = 0.002
 LEAST_STEP = 0.1
-"""Two frames are no nearer in time than that, in usual intervals: nothing is at two places at once, and a
-velocity between two moments that are the same but for rounding has no bounds."""
+"""Least time between two frames, in usual intervals: velocities between moments that are equal up to rounding
+would be unbounded."""
 STILL_IMAGE = "it is a single image, not a video"
 TEXT = "it is a text file, not a video"
 
@@ -33,14 +33,13 @@ TEXT = "it is a text file, not a video"
 class ContainerClock:
     """Times of the frames of a container, in seconds since its first frame.
 
-    Containers round their times (WebM to a millisecond), so that where they agree with a constant
-    rate the exact quotient is used. Where they differ the rate varies and the container is right.
-    A container that goes back in time, or stands still, is wrong, and the rate carries on from the last good
-    time.
+    Containers round their times (WebM to a millisecond), so where they agree with a constant rate the exact
+    quotient is used. Where they differ the rate varies and the container is right. A container that goes
+    back in time, or stands still, is wrong, and the rate continues from the last valid time.
 
     Attributes:
         fps: Frames per second, above 0.
-        constant: Whether the user gave the rate, so that the container is not asked.
+        constant: Whether the user gave the rate, so that the container's times are ignored.
     """
 
     fps: float
@@ -53,28 +52,28 @@ class ContainerClock:
 
         Args:
             index: Number of the frame, from 0.
-            container_s: What the container says, seconds from any start.
+            container_s: The container's time, seconds from any start.
 
         Returns:
-            Seconds, greater than for the frame before by at least a tenth of the usual interval.
+            Seconds, later than the previous frame by at least a tenth of the usual interval.
         """
         if self._first is None:
             self._first = container_s if np.isfinite(container_s) else 0.0
-        even, told = index / self.fps, container_s - self._first
-        if self.constant or abs(told - even) <= ROUNDING_S:
-            told = even
+        even, time_s = index / self.fps, container_s - self._first
+        if self.constant or abs(time_s - even) <= ROUNDING_S:
+            time_s = even
         least = self._last + LEAST_STEP / self.fps if index else self._last
-        if not (np.isfinite(told) and told > least):
-            told = self._last + 1.0 / self.fps if index else 0.0
-        self._last = told
-        return told
+        if not (np.isfinite(time_s) and time_s > least):
+            time_s = self._last + 1.0 / self.fps if index else 0.0
+        self._last = time_s
+        return time_s
 
 
 def check_frame_size(name: str, capture: Capture) -> None:
-    """Refuse a video whose frames are too large, before the first one is decoded.
+    """Reject a video whose frames are too large, before decoding the first.
 
     Raises:
-        SourceError: They are.
+        SourceError: They are too large.
     """
     import cv2
 
@@ -86,12 +85,12 @@ def check_frame_size(name: str, capture: Capture) -> None:
 
 
 class VideoFile(VideoSource):
-    """A recording: its frames, its times, and whether all that it announces was there.
+    """A recording: its frames, their times, and whether all announced frames were there.
 
     Args:
-        name: What the user named.
+        name: The user's name for it.
         capture: An open capture.
-        every: Only every n-th frame is given.
+        every: Only every n-th frame is returned.
         fps: Frame rate that the user gave, or None to use the container's times.
 
     Raises:
@@ -139,7 +138,7 @@ class VideoFile(VideoSource):
         return frame
 
     def _advance(self, every: int) -> Frame | None:
-        """Grab until a wanted frame is there; frames in between are not converted."""
+        """Grab up to the next wanted frame; frames in between are not converted."""
         import cv2
 
         while self._capture.grab():
@@ -168,15 +167,15 @@ class VideoFile(VideoSource):
 
 
 def falls_short(read: int, last_time: float, announced: int | None, fps: float) -> bool:
-    """Whether a video ended before what it announces, beyond what containers get wrong themselves.
+    """Whether a video ended before its announced end, beyond the usual error of containers.
 
-    Announced counts are often an estimate from duration and rate, so both the count and the time
-    must fall short: a video of varying rate holds fewer frames than announced, but its full time.
+    Announced counts are often estimated from duration and rate, so both the count and the time must fall
+    short: a video of variable rate holds fewer frames than announced, but its full duration.
 
     Args:
         read: Frames that could be decoded.
-        last_time: Time of the last of them, seconds.
-        announced: Frames that the container announces, or None when it does not say.
+        last_time: Time of the last one, seconds.
+        announced: Frames according to the container, or None when it does not say.
         fps: Frames per second.
 
     Returns:
@@ -206,9 +205,9 @@ def open_file(
 
     Args:
         path: The file; it exists.
-        every: Only every n-th frame is given.
+        every: Only every n-th frame is returned.
         fps: Frame rate to assume, or None for the container's own times.
-        factory: What opens the capture.
+        factory: Opens the capture.
 
     Returns:
         The source, its first frame decoded.
@@ -248,14 +247,14 @@ def _head(path: Path) -> bytes:
 
 
 def _not_a_video(head: bytes) -> str | None:
-    """What a file is instead of a video, judging by its first bytes."""
+    """What a file is instead of a video, by its first bytes."""
     if head.startswith((b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\0", b"MM\0*")):
         return STILL_IMAGE
     return TEXT if _is_text(head) else None
 
 
 def _is_text(head: bytes) -> bool:
-    """Whether bytes read as text: FFmpeg would play a text file as a slide show of letters."""
+    """Whether bytes are text: FFmpeg would play a text file as a slide show of letters."""
     if any(b < 32 and b not in b"\t\n\r\f\x1b" for b in head):
         return False
     try:

@@ -1,4 +1,4 @@
-"""A clock that can be waited by, so that tests need not wait."""
+"""A clock with a sleep function, so that tests need not wait."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class WaitingClock:
-    """By what something waits for its time; arguments for tests.
+    """The clock and sleep function of a waiter; injectable for tests.
 
     Attributes:
         now: Seconds from any start.
-        wait: Waits so many seconds.
+        wait: Sleeps for a number of seconds.
     """
 
     now: Callable[[], float] = time.monotonic

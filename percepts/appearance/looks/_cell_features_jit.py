@@ -1,4 +1,4 @@
-"""Features of the cells of a patch, compiled; `cell_features` says what they are for."""
+"""Compiled loops of `cell_features`: histograms of a patch's cells."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Floats = NDArray[np.float32]
 
 BINS = 9  # orientations of edges, unsigned, over half a turn
 COLOURS = 3  # mean lightness and colour of a cell
-SPARE = 1  # how much a cell is of the thing's own colours
+SPARE = 1  # how far a cell has the object's colours
 
 
 @compiled
 def _turn(x: np.float32, y: np.float32) -> np.float32:
-    """The direction of an edge as a share of half a turn, 0 to 1, right to a thousandth."""
+    """The orientation of an edge as a share of half a turn, 0 to 1, accurate to a thousandth."""
     a, b = abs(x), abs(y)
     t = (b if b < a else a) / (a if b < a else b)
     turn = t * (np.float32(0.30952) - np.float32(0.06108) * t * t)
@@ -29,12 +29,12 @@ def _turn(x: np.float32, y: np.float32) -> np.float32:
 
 @compiled
 def cell_histograms(lab: NDArray[np.uint8], odds: Floats, side: int) -> Floats:
-    """What each cell of a patch shows: edges by orientation, colours, and odds.
+    """Histograms of each cell of a patch: edges by orientation, colours, and odds.
 
     Args:
         lab: (h, w, 3) uint8, CIE Lab as OpenCV codes it; h and w are multiples of `side`.
         odds: (h, w) float32.
-        side: Of a cell, pixels.
+        side: Side of a cell, pixels.
 
     Returns:
         (BINS + COLOURS + SPARE, h / side, w / side) float32.
@@ -72,14 +72,14 @@ def cell_histograms(lab: NDArray[np.uint8], odds: Floats, side: int) -> Floats:
 
 @compiled
 def normalise_edges(cells: Floats, least: float) -> Floats:
-    """Edges relative to the strength of edges around, so that light matters little.
+    """Normalise edges by the strength of edges around, for robustness to lighting.
 
     Args:
-        cells: As of `cell_histograms`.
-        least: Strength to which what is weaker is not raised.
+        cells: From `cell_histograms`.
+        least: Strength below which edges are not amplified.
 
     Returns:
-        The same with edges from 0 to about 0.5; the rest as it is.
+        The cells with edges from 0 to about 0.5; the rest unchanged.
     """
     rows, cols = cells.shape[1:]
     energy = np.zeros((rows, cols), np.float32)

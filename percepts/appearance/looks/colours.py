@@ -1,4 +1,4 @@
-"""Which colours are a thing's own, and which those of what surrounds it."""
+"""Colour models: histograms of an object's colours against those of its surroundings."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
-_STEPS = 16  # of lightness and of each colour; 4096 bins
-# Shares of the pixels below which a colour says little. A colour never met, neither on the thing nor
-# around it, is rather that of something else that has come: it speaks against the thing, a little.
+_STEPS = 16  # bins of lightness and of each colour; 4096 in all
+# Shares of the pixels below which a colour says little. A colour met neither on the object nor around it
+# probably belongs to something else: it counts slightly against the object.
 _RARE, _STRANGE = np.float32(1 / 1500), np.float32(1 / 450)
 _CLIP = np.float32(3.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourModel:
-    """Histograms over CIE Lab of a thing and of its surroundings.
+    """Histograms over CIE Lab of an object and of its surroundings.
 
     Attributes:
-        thing: (4096,) float32, shares that add up to 1.
-        around: (4096,) float32, the same of what surrounds it.
-        table: (4096,) float32, log odds of the thing for each colour, -3 to 3.
+        thing: (4096,) float32, shares of the object, which sum to 1.
+        around: (4096,) float32, shares of its surroundings.
+        table: (4096,) float32, log odds of the object for each colour, -3 to 3.
     """
 
     thing: Floats
@@ -34,15 +34,15 @@ class ColourModel:
     table: Floats
 
     def odds(self, bins: NDArray[np.int32]) -> Floats:
-        """Log odds that pixels of these colours are the thing's.
+        """Log odds that pixels of these colours are the object's.
 
         Args:
-            bins: Any shape, as of `colour_bins`.
+            bins: From `colour_bins`, any shape.
         """
         return self.table[bins]
 
     def blended(self, other: ColourModel, thing: float, around: float) -> ColourModel:
-        """This model with a share of another's thing and surroundings."""
+        """This model blended with shares of another's object and surroundings."""
         return colour_model(
             self.thing * np.float32(1 - thing) + other.thing * np.float32(thing),
             self.around * np.float32(1 - around) + other.around * np.float32(around),
@@ -56,7 +56,7 @@ def colour_bins(lab: Bytes) -> NDArray[np.int32]:
         lab: (..., 3) uint8, CIE Lab as OpenCV codes it.
 
     Returns:
-        (...) int32, 0 to 4095. Colours are told apart finely near grey, where most are.
+        (...) int32, 0 to 4095. Bins are finer near grey, where most colours are.
     """
     bins = _LIGHT[lab[..., 0]]
     bins += _GREEN[lab[..., 1]]
@@ -65,25 +65,25 @@ def colour_bins(lab: Bytes) -> NDArray[np.int32]:
 
 
 def colour_model(thing: Floats, around: Floats) -> ColourModel:
-    """The model that follows from two histograms."""
+    """A model from two histograms."""
     table = np.log((thing + _RARE) / (around + _STRANGE))
     return ColourModel(thing, around, np.clip(table, -_CLIP, _CLIP).astype(np.float32))
 
 
 def learn_colours(lab: Bytes, thing: Floats, around: Floats) -> ColourModel:
-    """The colours of a patch.
+    """Learn the colours of a patch.
 
     Args:
         lab: (h, w, 3) uint8, CIE Lab.
-        thing: (h, w) float32, how much each pixel is the thing's.
-        around: (h, w) float32, how much each pixel is of its surroundings.
+        thing: (h, w) float32, weight of each pixel as the object's.
+        around: (h, w) float32, weight of each pixel as its surroundings'.
     """
     bins = colour_bins(lab).ravel()
     return colour_model(_histogram(bins, thing.ravel()), _histogram(bins, around.ravel()))
 
 
 def summed_colours(models: list[ColourModel]) -> ColourModel:
-    """The colours of several views of one thing."""
+    """The colours of several views of one object."""
     share = np.float32(1 / len(models))
     thing = reduce(np.add, [m.thing for m in models]) * share
     return colour_model(thing, reduce(np.add, [m.around for m in models]) * share)
@@ -93,7 +93,7 @@ def _histogram(bins: NDArray[np.int32], weights: Floats) -> Floats:
     counts = np.bincount(bins, weights, minlength=_STEPS**3).reshape((_STEPS,) * 3)
     binned: Floats = counts.astype(np.float32)
     for axis in range(3):
-        # Light and noise shift a colour to the bins beside its own.
+        # Smoothed, since light and noise shift colours to neighbouring bins.
         flat = np.moveaxis(binned, axis, 0).reshape(_STEPS, -1)
         smooth = cv2.filter2D(
             np.ascontiguousarray(flat), -1, _KERNEL, borderType=cv2.BORDER_REPLICATE

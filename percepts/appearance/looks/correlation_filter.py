@@ -1,8 +1,8 @@
-"""Where a thing is, from a filter learned on what it looks like and what surrounds it.
+"""A discriminative correlation filter that localises an object in a patch.
 
-A discriminative correlation filter with spatial reliability (Lukezic et al., CSR-DCF, 2017): one
-filter for each channel of features, allowed to use only cells that show the thing, found by
-alternating between the frequency domain, where the filter fits, and space, where it is cut to the mask.
+With spatial reliability (Lukezic et al., CSR-DCF, 2017): one filter per feature channel, restricted to cells
+that show the object, found by alternating between the frequency domain, where the filter is fitted, and
+space, where it is masked.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ Spectrum = NDArray[np.complex64]
 _ROUNDS = 4
 _PENALTY, _GROWTH = np.float32(5.0), np.float32(3.0)
 _RIDGE = np.float32(0.01)
-_SHARP = 0.06  # width of the wanted peak, of the thing's size in cells
+_SHARP = 0.06  # width of the target peak, as a share of the object's size in cells
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrelationFilter:
-    """A filter as it was learned.
+    """A learned filter.
 
     Attributes:
         spectrum: (channels, h, w // 2 + 1) complex64.
-        weights: (channels,) float32, how much each channel is trusted; they add up to 1.
-        peak: Height of the response where it was learned.
+        weights: (channels,) float32, reliability of each channel; they sum to 1.
+        peak: Height of the response on the training patch.
     """
 
     spectrum: Spectrum
@@ -37,7 +37,7 @@ class CorrelationFilter:
     peak: float
 
     def blended(self, other: CorrelationFilter, share: float) -> CorrelationFilter:
-        """This filter with a share of another."""
+        """This filter blended with a share of another."""
         keep, new = np.float32(1 - share), np.float32(share)
         return CorrelationFilter(
             self.spectrum * keep + other.spectrum * new,
@@ -46,13 +46,13 @@ class CorrelationFilter:
         )
 
     def response(self, features: Floats) -> Floats:
-        """How much each shift of a patch looks like the thing.
+        """The filter's response at each shift of a patch.
 
         Args:
             features: (channels, h, w) float32.
 
         Returns:
-            (h, w) float32, shift 0 in the middle; about 1 where the thing is as it was learned.
+            (h, w) float32, shift 0 in the middle; about 1 where the object is as learned.
         """
         spectrum = _forward(windowed(features)) * np.conj(self.spectrum)
         summed = np.asarray(np.tensordot(self.weights, spectrum, 1), dtype=np.complex64)
@@ -61,19 +61,19 @@ class CorrelationFilter:
 
 
 def windowed(features: Floats) -> Floats:
-    """Features faded out towards the border, for what lies beyond it is not what follows."""
+    """Features faded out towards the border, since the transform wraps around."""
     rows, cols = features.shape[1:]
     fade = np.outer(np.hanning(rows + 2)[1:-1], np.hanning(cols + 2)[1:-1])
     return features * fade.astype(np.float32)
 
 
 def learn_filter(features: Floats, mask: Floats, size: float) -> CorrelationFilter:
-    """The filter that answers where the thing is and nowhere else in a patch.
+    """Learn a filter that responds at the object and nowhere else in a patch.
 
     Args:
-        features: (channels, h, w) float32, the thing in the middle.
-        mask: (h, w) float32, 0 to 1, the cells that show the thing.
-        size: Of the thing, cells: it gives the width of the peak.
+        features: (channels, h, w) float32, the object in the middle.
+        mask: (h, w) float32, 0 to 1, the cells that show the object.
+        size: Size of the object, cells; gives the width of the peak.
 
     Returns:
         The filter.
@@ -89,8 +89,8 @@ def learn_filter(features: Floats, mask: Floats, size: float) -> CorrelationFilt
     ridge = _RIDGE / np.float32(2 * shape[0] * shape[1])
     for _ in range(_ROUNDS):
         spectrum = (cross + penalty * cut - multiplier) / (power + penalty)
-        held = _backward(multiplier + penalty * spectrum, shape) / (ridge + penalty)
-        cut = _forward(mask * held)
+        masked = _backward(multiplier + penalty * spectrum, shape) / (ridge + penalty)
+        cut = _forward(mask * masked)
         multiplier = multiplier + penalty * (spectrum - cut)
         penalty = penalty * _GROWTH
     answers = _backward(f * np.conj(cut), shape)
@@ -101,7 +101,7 @@ def learn_filter(features: Floats, mask: Floats, size: float) -> CorrelationFilt
 
 
 def peak_of(response: Floats) -> tuple[float, float, float]:
-    """The highest point of a response, between its cells.
+    """The sub-cell maximum of a response.
 
     Args:
         response: (h, w) float32, shift 0 in the middle.

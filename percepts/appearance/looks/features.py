@@ -1,4 +1,4 @@
-"""What a patch looks like to a correlation filter: edges, colours, and the odds of its colours."""
+"""Feature channels of a patch for the correlation filter: edges, colours, and colour odds."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Bytes = NDArray[np.uint8]
 CELL = 4
 """Side of a cell, pixels of a patch."""
 
-_WEAK = 60.0  # summed edges of a cell that are as much noise as edge
-_CONTRAST = np.float32(1 / 60)  # of lightness and colour, so that they weigh as much as edges
+_WEAK = 60.0  # summed edge strength of a cell at the noise level
+_CONTRAST = np.float32(1 / 60)  # scale of lightness, so that it weighs as much as edges
 _CHROMA = np.float32(1 / 30)
 
 
@@ -28,10 +28,10 @@ def cell_features(lab: Bytes, odds: Floats) -> Floats:
 
     Args:
         lab: (h, w, 3) uint8, CIE Lab as OpenCV codes it; h and w are multiples of `CELL`.
-        odds: (h, w) float32, how much each pixel's colour speaks for the thing.
+        odds: (h, w) float32, log odds of each pixel's colour.
 
     Returns:
-        (channels, h / CELL, w / CELL) float32, of mean about 0, each channel within about -1 to 1.
+        (channels, h / CELL, w / CELL) float32, mean about 0, each channel within about -1 to 1.
     """
     cells = normalise_edges(cell_histograms(lab, odds, CELL), _WEAK)
     middle = cells[BINS]

@@ -1,4 +1,4 @@
-"""Where a thing is and how large and turned it shows, and patches cut out accordingly."""
+"""Poses of objects (position, scale, in-plane rotation) and patches cut out accordingly."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Picture = NDArray[np.uint8] | NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class PatchPose:
-    """A similarity from a thing's own patch to the picture.
+    """A similarity transform from an object's patch to the picture.
 
     Attributes:
-        x: Of the patch's middle in the picture, pixels.
+        x: Centre of the patch in the picture, pixels.
         y: The same, downwards.
         scale: Pixels of the picture per pixel of the patch.
-        angle: Turn from the patch to the picture, radians.
+        angle: Rotation from the patch to the picture, radians.
     """
 
     x: float
@@ -43,14 +43,14 @@ class PatchPose:
         )
 
     def moved(self, motion: Doubles) -> PatchPose:
-        """After a similarity of the picture, a (2, 3) matrix."""
+        """The pose after a similarity of the picture, a (2, 3) matrix."""
         x, y = motion[:, :2] @ (self.x, self.y) + motion[:, 2]
         scale = float(np.hypot(motion[0, 0], motion[1, 0]))
         turn = float(np.arctan2(motion[1, 0], motion[0, 0]))
         return PatchPose(float(x), float(y), self.scale * scale, self.angle + turn)
 
     def shifted(self, dx: float, dy: float) -> PatchPose:
-        """After a shift by pixels of the patch."""
+        """The pose after a shift by pixels of the patch."""
         cos, sin = self.scale * np.cos(self.angle), self.scale * np.sin(self.angle)
         return PatchPose(
             float(self.x + cos * dx - sin * dy),
@@ -60,17 +60,17 @@ class PatchPose:
         )
 
     def resized(self, by: float, turn: float = 0.0) -> PatchPose:
-        """Larger by a factor, and turned by radians."""
+        """The pose scaled by a factor and rotated by radians."""
         return PatchPose(self.x, self.y, self.scale * by, self.angle + turn)
 
     def apart(self, other: PatchPose, radius: float) -> float:
-        """How far two poses shift a point at a radius (pixels of the patch), pixels of the picture."""
+        """Distance between two poses of a point at a radius (patch pixels), picture pixels."""
         shift = float(np.hypot(self.x - other.x, self.y - other.y))
         bend = np.hypot(self.scale - other.scale, self.scale * (self.angle - other.angle))
         return shift + float(bend) * radius
 
     def motion_to(self, other: PatchPose) -> Doubles:
-        """(2, 3) similarity of the picture that takes this pose to another."""
+        """(2, 3) similarity of the picture that maps this pose to another."""
         by, turn = other.scale / self.scale, other.angle - self.angle
         cos, sin = by * np.cos(turn), by * np.sin(turn)
         linear = np.array([[cos, -sin], [sin, cos]])
@@ -80,13 +80,13 @@ class PatchPose:
 def cut_patch(
     image: Picture, pose: PatchPose, shape: tuple[int, ...], nearest: bool = False
 ) -> Picture:
-    """The patch that a pose shows; beyond the border what lies there goes on.
+    """The patch at a pose; beyond the border the border pixels are repeated.
 
     Args:
         image: (H, W) or (H, W, 3).
-        pose: Of the patch.
+        pose: Pose of the patch.
         shape: (height, width) of the patch.
-        nearest: Take the nearest pixels instead of blending.
+        nearest: Nearest pixels instead of interpolation.
     """
     flags = cv2.WARP_INVERSE_MAP | (cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR)
     out = np.asarray(
@@ -108,12 +108,12 @@ def window_of(pose: PatchPose, shape: tuple[int, ...], size: tuple[int, int]) ->
     """The box of the picture that a patch covers.
 
     Args:
-        pose: Of the patch.
+        pose: Pose of the patch.
         shape: (height, width) of the patch.
         size: (width, height) of the picture.
 
     Returns:
-        (left, top, right, bottom), half open; None when it lies outside.
+        (left, top, right, bottom), half open; None when outside the picture.
     """
     h, w = shape[:2]
     corners = np.array([[0, 0, 1], [w - 1, 0, 1], [0, h - 1, 1], [w - 1, h - 1, 1]], dtype=float)
@@ -126,13 +126,13 @@ def window_of(pose: PatchPose, shape: tuple[int, ...], size: tuple[int, int]) ->
 
 
 def paint(patch: Picture, pose: PatchPose, window: Window, outside: float = 0.0) -> Picture:
-    """A patch as it lies in a window of the picture.
+    """A patch rendered into a window of the picture.
 
     Args:
         patch: (h, w) or (h, w, 3).
-        pose: Of the patch.
+        pose: Pose of the patch.
         window: (left, top, right, bottom) of the picture.
-        outside: What stands where the patch does not reach.
+        outside: Value outside the patch.
     """
     left, top, right, bottom = window
     matrix = pose.matrix(patch.shape) - np.array([[0, 0, left], [0, 0, top]])

@@ -1,4 +1,4 @@
-"""A frame in which taught objects are searched for, of bounded size."""
+"""Scenes: frames of bounded size in which taught objects are searched."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from visup.percepts.appearance.looks.pose import Bytes, PatchPose, cut_patch
 
 WORK_SIZE = 640
-"""Longer side of the picture in which things are looked for, pixels at most."""
+"""Most pixels along the longer side of the searched picture."""
 
 _LEVELS = 3
 
@@ -21,8 +21,8 @@ class Scene:
 
     Attributes:
         time: Seconds.
-        lab: Pictures in CIE Lab, (h, w, 3) uint8, each half as large as the one before, as far as
-            somebody has asked for them.
+        lab: CIE Lab pyramid, (h, w, 3) uint8, each level half the size of the previous one; levels are
+            computed on demand.
         grey: (h, w) uint8.
         frame_size: (width, height) of the frame, pixels.
     """
@@ -43,7 +43,7 @@ class Scene:
         return float(self.grey.shape[1] / self.frame_size[0])
 
     def patch(self, pose: PatchPose, shape: tuple[int, ...]) -> Bytes:
-        """(height, width, 3) uint8, Lab: what a pose shows, from the picture of fitting fineness."""
+        """(height, width, 3) uint8, Lab: the patch at a pose, from the pyramid level of matching scale."""
         level = int(np.clip(np.round(np.log2(max(pose.scale, 1e-3))), 0, _LEVELS - 1))
         while level >= len(self.lab) and min(self.lab[-1].shape[:2]) >= 16:
             self.lab.append(np.asarray(cv2.pyrDown(self.lab[-1]), dtype=np.uint8))
@@ -68,7 +68,7 @@ def prepare_scene(image: Bytes, time: float) -> Scene:
     small = work_scale((width, height))
     if small < 1:
         size = max(1, round(width * small)), max(1, round(height * small))
-        # Averaging over areas that are no whole pixels is slow, and of use only where many make one.
+        # Area averaging is slow for fractional factors, and useful only for strong reduction.
         how = cv2.INTER_AREA if small < 0.6 else cv2.INTER_LINEAR
         image = np.asarray(cv2.resize(image, size, interpolation=how), dtype=np.uint8)
     lab = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""What is known of a thing from the views that a user has shown: patch, mask, colours, filter."""
+"""Appearance models of objects from taught views: patch, mask, colours, filter."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from visup.percepts.taught.view import TaughtView
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
-SIDE = 44.0  # side of a thing in its patch, pixels, if it were square
-LONGEST = 104.0  # most pixels of its longer side
-AROUND = 1.15  # how much of its surroundings a patch shows, of its side
+SIDE = 44.0  # side of a square object in its patch, pixels
+LONGEST = 104.0  # most pixels of an object's longer side
+AROUND = 1.15  # margin of a patch around the object, in sides
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Appearance:
-    """What one view shows of a thing, as a patch with the thing in the middle.
+    """One view of an object, as a patch with the object in the middle.
 
     Attributes:
         lab: (h, w, 3) uint8, CIE Lab.
-        mask: (h, w) float32, 0 to 1, the thing.
-        colours: Its colours and those around it.
-        filter: Learned where it is.
+        mask: (h, w) float32, 0 to 1, the object.
+        colours: Colours of the object and its surroundings.
+        filter: Filter learned on the patch.
     """
 
     lab: Bytes
@@ -47,25 +47,25 @@ class Appearance:
 
     @property
     def area(self) -> float:
-        """Of the thing, pixels of the patch."""
+        """Area of the object, pixels of the patch."""
         return float(self.mask.sum())
 
     @property
     def radius(self) -> float:
-        """Half the side of a square as large as the thing, pixels of the patch."""
+        """Half the side of a square of the object's area, pixels of the patch."""
         return 0.5 * float(np.sqrt(self.area))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewModel:
-    """An appearance with where it was shown.
+    """An appearance and where it was taught.
 
     Attributes:
-        name: Of the thing.
-        appearance: What the view shows.
-        pose: Where it was, working pixels of the picture in which it was shown.
+        name: Name of the object.
+        appearance: Its appearance.
+        pose: Its pose, working pixels of the picture in which it was taught.
         size: (width, height) of that picture, working pixels.
-        scene: (H, W, 3) uint8, BGR: that picture, small.
+        scene: (H, W, 3) uint8, BGR: that picture, reduced.
     """
 
     name: str
@@ -76,7 +76,7 @@ class ViewModel:
 
 
 def view_models(views: Sequence[TaughtView]) -> tuple[ViewModel, ...]:
-    """The models of taught views, in their order."""
+    """The models of taught views, in order."""
     return tuple(_view_model(v) for v in views)
 
 
@@ -103,7 +103,7 @@ def _part_scene(image: Bytes, small: float) -> Scene:
 
 
 def _fitted(box: tuple[float, float, float, float]) -> tuple[PatchPose, tuple[int, int]]:
-    """The pose and the size of the patch that shows a box and some of its surroundings."""
+    """The pose and size of the patch that shows a box and its margin."""
     x, y, w, h = box
     side = float(np.sqrt(w * h))
     by = min(SIDE / side, LONGEST / max(w, h))
@@ -130,19 +130,19 @@ def _mask_patch(
 
 
 def learn_appearance(lab: Bytes, mask: Floats) -> Appearance:
-    """All that follows from a patch and its mask."""
+    """Build an appearance from a patch and its mask."""
     colours = learn_colours(lab, mask, surroundings(mask))
     return Appearance(lab, mask, colours, learned_filter(lab, mask, colours))
 
 
 def surroundings(mask: Floats) -> Floats:
-    """(h, w) float32: how much each pixel of a patch is surely not the thing."""
+    """(h, w) float32: weight of each pixel of a patch as surroundings."""
     near = cv2.dilate(mask, np.ones((5, 5), np.uint8))
     return np.asarray(1 - near, dtype=np.float32)
 
 
 def learned_filter(lab: Bytes, mask: Floats, colours: ColourModel) -> CorrelationFilter:
-    """The filter of a patch with the thing in the middle."""
+    """The filter of a patch with the object in the middle."""
     features = cell_features(lab, colours.odds(colour_bins(lab)))
     rows, cols = features.shape[1:]
     support = cv2.resize(mask, (cols, rows), interpolation=cv2.INTER_AREA)

@@ -1,1 +1,1 @@
-"""What is reported: regions of things, and moving regions that no thing explains."""
+"""Output: regions of objects, and moving regions that no object explains."""

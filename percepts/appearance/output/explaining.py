@@ -1,4 +1,4 @@
-"""Which moving regions are taught things, seen once more."""
+"""Removal of moving regions that taught objects already explain."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.tracking.track import Blob
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 
-SMALL = 384  # longer side of the picture in which regions are compared, pixels
-RIM = 0.12  # how far a moving region may lie beyond the outline of a thing, of the thing's side
-MAINLY = 0.5  # share of a region that a thing explains
-LEFT = 0.35  # least share of a region that is left when it is reported without the thing
-LEAST = 0.0004  # of the picture, that is left
+SMALL = 384  # longer side of the picture for comparing regions, pixels
+RIM = 0.12  # tolerance of a moving region around an object's outline, as a share of its side
+MAINLY = 0.5  # share of a region inside an object from which the object explains it
+LEFT = 0.35  # least share of a region that remains when reported without the object
+LEAST = 0.0004  # least remaining area, as a share of the picture
 
 Mask = NDArray[np.bool_]
 
@@ -26,11 +26,11 @@ Mask = NDArray[np.bool_]
 def unexplained(
     moving: Sequence[Region], things: Sequence[Region], size: tuple[int, int]
 ) -> tuple[Region, ...]:
-    """The moving regions that no thing explains, each without the pixels that things have.
+    """The moving regions that no object explains, each without the objects' pixels.
 
     Args:
-        moving: Found by their motion.
-        things: Taught things in view.
+        moving: Regions of motion segmentation.
+        things: Taught objects in view.
         size: (width, height) of the frame.
     """
     if not moving or not things:
@@ -45,12 +45,12 @@ def unexplained(
 
 
 def shares(region: Region, blob: Blob, scene: Scene) -> float:
-    """How much a region and a blob have in common (IoU).
+    """Intersection over union of a region and a blob.
 
     Args:
         region: In frame pixels.
         blob: In working pixels of the scene.
-        scene: Gives the scale.
+        scene: The scene, for its scale.
     """
     here = np.zeros(scene.size[::-1], dtype=bool)
     left, top, right, bottom = blob.window
@@ -61,7 +61,7 @@ def shares(region: Region, blob: Blob, scene: Scene) -> float:
 
 
 def _near(things: Sequence[Region], size: tuple[int, int]) -> tuple[Mask, float]:
-    """(h, w) bool: on a thing or at its rim, in a small picture; and the scale of that picture."""
+    """(h, w) bool: objects and their rims in a small picture; and the scale of that picture."""
     scale = min(1.0, SMALL / max(size))
     shape = max(1, round(size[1] * scale)), max(1, round(size[0] * scale))
     out = np.zeros(shape, dtype=bool)
@@ -91,7 +91,7 @@ def _rest_of(
     near: tuple[Mask, float],
     size: tuple[int, int],
 ) -> Region | None:
-    """What of a region is left beside the things; None when that is nothing of its own."""
+    """The part of a region outside the objects; None when it is insignificant."""
     covered, scale = near
     small = _small(region, (covered.shape[0], covered.shape[1]), scale)
     share = float(np.mean(covered[small]))
@@ -102,7 +102,7 @@ def _rest_of(
     left = region.mask.copy()
     for r in things:
         _take(left, region.bbox, r)
-    # What is left of the rim is not worth telling.
+    # Remains of the rim are not worth reporting.
     mask = clean_mask(left, LEAST * size[0] * size[1])
     if mask is None or np.count_nonzero(mask) < LEFT * region.area:
         return None
@@ -119,7 +119,7 @@ def _rest_of(
 
 
 def _take(left: Mask, bbox: tuple[int, int, int, int], thing: Region) -> None:
-    """Take a thing's pixels from a mask in place."""
+    """Remove an object's pixels from a mask in place."""
     x, y, w, h = bbox
     u, v, n, m = thing.bbox
     x0, y0, x1, y1 = max(x, u), max(y, v), min(x + w, u + n), min(y + h, v + m)

@@ -1,4 +1,4 @@
-"""The region of a taught thing, at the full size of the frame."""
+"""Regions of taught objects in frame pixels."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
 from visup.percepts.motion.outlines.region_outline import RegionOutline, describe_mask
 
-OVER_S = 0.2  # over which a velocity is taken, seconds
-JITTER_PX = 0.5  # working pixels by which a pose is off
+OVER_S = 0.2  # time over which a velocity is measured, seconds
+JITTER_PX = 0.5  # error of a pose, working pixels
 LEAST_SIGMA = 0.5  # pixels per second
 
 
 def thing_outline(blob: Blob, scene: Scene) -> RegionOutline | None:
-    """A blob of the working picture in frame pixels; None when nothing is left of it."""
+    """A blob of the working picture in frame pixels; None when nothing remains."""
     mask, origin = _enlarged(blob, scene)
     return describe_mask(mask, origin, scene.frame_size) if mask.any() else None
 
@@ -27,13 +27,13 @@ def thing_outline(blob: Blob, scene: Scene) -> RegionOutline | None:
 def thing_region(
     track: ThingTrack, shape: RegionOutline, scene: Scene, last: float | None
 ) -> Region:
-    """What is reported of a thing in a frame.
+    """The reported region of an object.
 
     Args:
-        track: The thing.
-        shape: What is seen of it.
+        track: The track of the object.
+        shape: Its visible outline.
         scene: The frame.
-        last: Time of the frame before, seconds; None when there was none.
+        last: Time of the previous frame, seconds; None when there was none.
 
     Returns:
         Its region in frame pixels.
@@ -44,7 +44,7 @@ def thing_region(
 
 
 def confidence(track: ThingTrack) -> float:
-    """How sure it is that this is the thing: it was recognised, and looks as it should now."""
+    """Confidence that this is the object: it was recognised, and still looks as expected."""
     return float(0.7 + 0.3 * np.clip(track.peak, 0, 1) * track.explained)
 
 
@@ -66,7 +66,7 @@ def _enlarged(
 def _velocity(
     track: ThingTrack, scale: float, at: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
-    """(vx, vy) of a point of a thing and its standard deviation, frame pixels per second."""
+    """(vx, vy) of a point of an object and its standard deviation, frame pixels per second."""
     if len(track.path) < 2:
         return (0.0, 0.0), 0.0
     now, pose = track.path[-1]
@@ -84,7 +84,7 @@ def _velocity(
 
 
 def _motion(track: ThingTrack, scale: float, last: float | None) -> Doubles | None:
-    """(2, 3) affine from the frame before to this one, frame pixels."""
+    """(2, 3) affine from the previous frame to this one, frame pixels."""
     if last is None or len(track.path) < 2 or track.path[-2][0] < last - 1e-6:
         return None
     out = track.path[-2][1].motion_to(track.path[-1][1])

@@ -1,6 +1,6 @@
-"""Finding taught things, and following them.
+"""Detection and tracking of taught objects.
 
-Read `track.py` (what is believed of a thing), `verification.py` and `detection.py` (finding it),
-`points.py` and `following.py` (where it went), `segmentation.py` (which pixels are its own),
-`learning.py` (how it looks now), then `tracker.py`, a frame's way through all of these.
+Read `track.py` (the state of an object), `verification.py` and `detection.py` (detection), `points.py` and
+`following.py` (frame-to-frame tracking), `segmentation.py` (assignment of pixels), `learning.py` (adaptation
+of the appearance), then `tracker.py`, which runs all of these on a frame.
 """

@@ -1,4 +1,4 @@
-"""Comparing pixels with those remembered, compiled; `segmentation` says what it is for."""
+"""Compiled loop of `segmentation`: comparison of pixels with remembered ones."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Bytes = NDArray[np.uint8]
 
 @compiled
 def like_before(now: Bytes, was: Bytes, light: int, chroma: int) -> NDArray[np.bool_]:
-    """Which pixels look as they did, but for the light.
+    """Which pixels are unchanged except for lighting.
 
-    A shadow darkens a pixel and moves its colour towards grey in proportion; it leaves its kind.
+    A shadow darkens a pixel and moves its colour towards grey in proportion, but keeps its hue.
 
     Args:
         now: (h, w, 3) uint8, CIE Lab as OpenCV codes it.
-        was: (h, w, 3) uint8, the same of before.
-        light: Steps of lightness by which a pixel may differ.
-        chroma: Steps of either colour.
+        was: (h, w, 3) uint8, the same as remembered.
+        light: Tolerance of lightness, steps.
+        chroma: Tolerance of either colour, steps.
 
     Returns:
         (h, w) bool.

@@ -1,8 +1,8 @@
-"""How the picture of the resting scene moves because the camera does.
+"""Camera motion, from points of the static scene.
 
-Points all over the picture, away from things, are followed from a key frame on, so that a slow drift adds up
-until it can be told from noise. A point that has long gone with the rest of the scene has more say than one
-that is new: an arm that comes into view is not taken for the scene, even where it fills most of it.
+Points all over the picture, away from objects, are tracked from a key frame on, so that slow drift
+accumulates until it exceeds the noise. Points that have long moved with the scene outweigh new ones: an arm
+that comes into view is not taken for the scene, even where it fills most of it.
 """
 
 from __future__ import annotations
@@ -22,24 +22,23 @@ from visup.percepts.appearance.tracking.points import (
     similarity_of,
 )
 
-KEY_S = 0.5  # how long a key frame serves
-OFF_PX = 1.0  # working pixels by which a point of the scene may miss the motion of the others
-RESTS_PX = 0.35  # working pixels by which points move since the key frame while the camera rests
-RESTS, AGREE = 0.6, 0.45  # shares of the points that must rest, or go together
-LEAST = 8  # points that tell of the scene
+KEY_S = 0.5  # lifetime of a key frame, seconds
+OFF_PX = 1.0  # tolerance of a scene point about the common motion, working pixels
+RESTS_PX = 0.35  # most motion of points since the key frame while the camera rests, working pixels
+RESTS, AGREE = 0.6, 0.45  # shares of the points that must rest, or agree on a motion
+LEAST = 8  # fewest points for an estimate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraTrack:
     """Points of the scene since a key frame.
 
-    Attributes:
-        since: Seconds, of the key frame.
-        key: (N, 2) float32, where points were in it, working pixels.
-        now: (N, 2) float32, where they are in the last frame.
-        proven: (N,) bool, points that have gone with the scene over a key frame before.
-        motion: (2, 3) similarity of the picture from the key frame to the last one; `STILL` itself while
-            the camera rests; None while that is not known.
+    since: Time of the key frame, seconds.
+    key: (N, 2) float32, positions in the key frame, working pixels.
+    now: (N, 2) float32, positions in the last frame.
+    proven: (N,) bool, points that moved with the scene during an earlier key frame.
+    motion: (2, 3) similarity of the picture from the key frame to the last one; `STILL` itself while
+        the camera rests; None while unknown.
     """
 
     since: float = -np.inf
@@ -52,17 +51,17 @@ class CameraTrack:
 def followed_camera(
     before: CameraTrack, old: Scene, new: Scene, taken: NDArray[np.bool_] | None
 ) -> tuple[CameraTrack, Doubles | None]:
-    """Follow the scene into the next frame.
+    """Track the scene into the next frame.
 
     Args:
-        before: The points up to the frame before.
-        old: The frame before.
+        before: The points up to the previous frame.
+        old: The previous frame.
         new: The frame.
-        taken: (h, w) bool, where things are in the frame before; None where none are known.
+        taken: (h, w) bool, objects in the previous frame; None where none are known.
 
     Returns:
-        The points, and the (2, 3) similarity of the picture from the frame before to this one, working
-        pixels: `STILL` itself where the camera rests, None where the points do not agree.
+        The points, and the (2, 3) similarity of the picture from the previous frame to this one, working
+        pixels: `STILL` itself when the camera rests, None when the points do not agree.
     """
     due = new.time - before.since > KEY_S or before.motion is None or len(before.now) < LEAST
     track = _new_key(before, old, taken) if due else before
@@ -74,7 +73,7 @@ def followed_camera(
 
 
 def _new_key(before: CameraTrack, old: Scene, taken: NDArray[np.bool_] | None) -> CameraTrack:
-    """The frame before as a key frame: points that belong to the scene, and new ones where none are."""
+    """Start a key frame: retain points of the scene, and add new ones where there are none."""
     with_scene = _goes_with(before)
     if taken is not None and len(before.now):
         at = np.clip(np.round(before.now).astype(int), 0, (old.size[0] - 1, old.size[1] - 1))
@@ -87,7 +86,7 @@ def _new_key(before: CameraTrack, old: Scene, taken: NDArray[np.bool_] | None) -
 
 
 def _goes_with(track: CameraTrack) -> NDArray[np.bool_]:
-    """(N,) bool: points that go with the scene."""
+    """(N,) bool: points that move with the scene."""
     if track.motion is None:
         return np.zeros(len(track.now), dtype=bool)
     there = track.key @ track.motion[:, :2].T + track.motion[:, 2]
@@ -106,12 +105,12 @@ def _scene_motion(track: CameraTrack) -> Doubles | None:
     if found is None or found[1] <= AGREE:
         return None
     there = key @ found[0][:, :2].T + found[0][:, 2]
-    # Less than points can be followed by is no motion, whatever hides or shadows some of them.
+    # Motion below the tracking accuracy counts as none, even if some points are hidden or shadowed.
     return STILL if np.hypot(*(there - key).T).max() < RESTS_PX else found[0]
 
 
 def _between(old: Doubles | None, new: Doubles | None) -> Doubles | None:
-    """The similarity that leads from one to another; `STILL` itself where both are."""
+    """The similarity from one to another; `STILL` itself where both are."""
     if new is None or old is None:
         return None
     if np.array_equal(old, new):

@@ -14,14 +14,14 @@ Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
 COARSER = 4  # working pixels per pixel of what is compared
-APART_S = 0.2  # between two pictures that are compared
-LATELY_S = 0.6  # for how long a change counts
-LEAST = 12  # steps of lightness that are no noise
+APART_S = 0.2  # interval between two compared pictures
+LATELY_S = 0.6  # how long a change counts
+LEAST = 12  # steps of lightness above the noise
 NEVER = np.float32(-1e6)
 
 
 class ChangeMap:
-    """When each part of the picture last changed; one per video."""
+    """The time when each part of the picture last changed; one per video."""
 
     def __init__(self) -> None:
         self._was: Bytes | None = None
@@ -29,11 +29,11 @@ class ChangeMap:
         self._when: Floats | None = None
 
     def update(self, scene: Scene, camera: Doubles) -> None:
-        """Take in a frame.
+        """Update with a frame.
 
         Args:
             scene: The frame.
-            camera: (2, 3) similarity of the picture since the frame before.
+            camera: (2, 3) similarity of the picture since the previous frame.
         """
         early = scene.time - self._time < APART_S - 1e-6
         if early and camera is STILL and self._was is not None:
@@ -49,7 +49,7 @@ class ChangeMap:
         if camera is not STILL:
             small = camera.copy()
             small[:, 2] /= COARSER
-            # What comes into view is new, but has not changed.
+            # Parts coming into view are new, not changed.
             self._was = _warped(self._was, small, now)
         if early:
             return
@@ -60,7 +60,7 @@ class ChangeMap:
         self._was, self._time = now, scene.time
 
     def lately(self, scene: Scene) -> NDArray[np.bool_] | None:
-        """(h, w) bool, of any size: the parts that changed of late; None when none did."""
+        """(h, w) bool, of any size: the parts that changed recently; None when none did."""
         if self._when is None:
             return None
         out = np.asarray(scene.time - self._when < LATELY_S)

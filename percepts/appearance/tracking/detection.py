@@ -1,4 +1,4 @@
-"""Looking for a thing in the whole picture, at several sizes and turns."""
+"""Detection of an object in the whole picture, at several scales and rotations."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from visup.percepts.appearance.tracking.verification import OWN, Match, verify
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-COARSE = 13.0  # side of a thing when the whole picture is searched, pixels
-_MOST = 6  # places that are looked at closely
-_EACH = 3  # of one size and turn
+COARSE = 13.0  # side of an object in a search of the whole picture, pixels
+_MOST = 6  # most positions to verify
+_EACH = 3  # most of one scale and rotation
 
 
 def search(
@@ -29,17 +29,17 @@ def search(
     most: int = _MOST,
     where: Mask | None = None,
 ) -> list[Match]:
-    """The places that look most like a thing.
+    """The positions most similar to an object.
 
     Args:
         scene: The frame.
-        it: What the thing looks like.
-        poses: Sizes and turns to try; where they are does not matter.
-        most: Places that are looked at closely.
-        where: (h, w) bool, of any size: parts of the picture in which the thing's middle may lie.
+        it: The object's appearance.
+        poses: Scales and rotations to try; positions are ignored.
+        most: Most positions to verify.
+        where: (h, w) bool, of any size: parts of the picture that may hold the object's centre.
 
     Returns:
-        The best first.
+        Matches, best first.
     """
     found = [c for p in poses for c in _coarse(scene, it, p, where)]
     found.sort(key=lambda c: c[0])
@@ -54,16 +54,16 @@ def search(
 def colour_peaks(
     scene: Scene, it: Appearance, pose: PatchPose, where: Mask | None = None
 ) -> list[tuple[float, PatchPose]]:
-    """Where a thing's colours are gathered, whatever its shape: for what has bent or turned.
+    """Positions where an object's colours concentrate, for objects that have bent or turned.
 
     Args:
         scene: The frame.
-        it: What the thing looked like.
-        pose: Its size and turn; where it is does not matter.
-        where: (h, w) bool, of any size: parts of the picture in which the thing's middle may lie.
+        it: The object's last appearance.
+        pose: Its scale and rotation; the position is ignored.
+        where: (h, w) bool, of any size: parts of the picture that may hold the object's centre.
 
     Returns:
-        The two best places: how much more of its colours they have than what is around, and the pose.
+        The two best positions: their excess of its colours over the surroundings, and the pose.
     """
     small = min(1.0, COARSE / (2 * it.radius * pose.scale))
     width, height = scene.size
@@ -88,7 +88,7 @@ def colour_peaks(
 def _gathering(
     it: Appearance, pose: PatchPose, small: float
 ) -> tuple[tuple[float, float], Floats, Floats]:
-    """Weights within a thing and around it, each adding up to 1, and the patch's middle in them."""
+    """Weights within an object and around it, each summing to 1, and the patch's centre in them."""
     _, mask, middle = _small_template(it, pose, small)
     wide = np.pad(mask, 5)
     soft = cv2.GaussianBlur(wide, (0, 0), 1.5)
@@ -100,7 +100,7 @@ def _gathering(
 
 
 def _alike(a: PatchPose, b: PatchPose, radius: float) -> bool:
-    """Whether looking closely at one place finds the other."""
+    """Whether verification of one position would find the other."""
     near = a.apart(b, 0) <= 0.4 * radius * a.scale + abs(a.scale - b.scale)
     return near and abs(a.angle - b.angle) < 0.3 and 0.8 < a.scale / b.scale < 1.25
 
@@ -108,7 +108,7 @@ def _alike(a: PatchPose, b: PatchPose, radius: float) -> bool:
 def _coarse(
     scene: Scene, it: Appearance, pose: PatchPose, where: Mask | None
 ) -> list[tuple[float, PatchPose]]:
-    """Places of one size and turn by colour alone: (mean squared difference, pose)."""
+    """Positions of one scale and rotation by colour alone: (mean squared difference, pose)."""
     side = float(np.sqrt(it.mask.sum())) * pose.scale
     small = min(1.0, COARSE / side)
     width, height = scene.size
@@ -138,7 +138,7 @@ def _coarse(
 def _middles(
     where: Mask, size: tuple[int, int], shape: tuple[int, ...], middle: tuple[float, float]
 ) -> Mask:
-    """(h, w) bool: corners of a template for which its middle lies in a part of the picture."""
+    """(h, w) bool: template corners for which the centre lies inside `where`."""
     small = cv2.resize(where.view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     ys = np.clip(np.arange(shape[0]) + round(middle[1]), 0, size[1] - 1)
     xs = np.clip(np.arange(shape[1]) + round(middle[0]), 0, size[0] - 1)
@@ -148,7 +148,7 @@ def _middles(
 def _small_template(
     it: Appearance, pose: PatchPose, small: float
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], tuple[float, float]]:
-    """The thing as it would show at a scale and turn, cropped: picture, mask, its patch's middle."""
+    """The object rendered at a scale and rotation, cropped: picture, mask, centre of its patch."""
     by = pose.scale * small
     reach = int(np.ceil(np.hypot(*it.shape) * by / 2)) + 1
     at = PatchPose(reach, reach, by, pose.angle)

@@ -1,4 +1,4 @@
-"""Looking for things that are not in view: which of the places that look alike are theirs."""
+"""Redetection of objects that are not in view, and their assignment to positions."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from visup.percepts.appearance.tracking.detection import colour_peaks, search
 from visup.percepts.appearance.tracking.track import Blob, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
-SURE = 0.6  # score that no other thing is seen to reach
-FAIR, APART = 0.42, 1.5  # score that will do where no other place has a share of it
-GATHERED = 0.45  # how much more of its colours a place must have than what is around
-NOISE = 0.15  # score that any place may have
-MOVING_FAIR, MOVING_APART = 0.45, 1.2  # the same among places that have changed of late
-AT_HOME = 0.1  # how much the place where a thing was taught speaks for it
+SURE = 0.6  # score that other objects were not observed to reach
+FAIR, APART = 0.42, 1.5  # sufficient score if it exceeds those of other positions by this factor
+GATHERED = 0.45  # least excess of its colours over the surroundings
+NOISE = 0.15  # score that any position may have by chance
+MOVING_FAIR, MOVING_APART = 0.45, 1.2  # as FAIR and APART, among positions that changed recently
+AT_HOME = 0.1  # bonus of the position where an object was taught
 RECENT_SIZES = (0.85, 1.0, 1.18)
 SIZES = (0.75, 0.87, 1.0, 1.15, 1.32)
 TURNS = (-0.4, 0.4)
-TAKEN = 0.5  # share of a place that is another thing's
+TAKEN = 0.5  # share of a position covered by another object from which it is taken
 
 
 @dataclass(frozen=True, slots=True)
 class ThingPlace:
-    """A place where a thing may be.
+    """A candidate position of an object.
 
     Attributes:
-        name: Of the thing.
-        number: Of the view that it looks like.
-        looks: What it looks like there.
-        match: How it agrees.
-        score: With what speaks for the place.
+        name: Name of the object.
+        number: Number of the matching view.
+        looks: Appearance there.
+        match: Its match.
+        score: Score of the match, with the bonus of the position.
     """
 
     name: str
@@ -47,12 +47,12 @@ class ThingPlace:
 
 
 def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
-    """Places that look like a thing, and not only a little more so than others do.
+    """Positions that match an object clearly better than others do.
 
     Args:
         scene: The frame.
-        view: What the thing looked like when it was taught.
-        number: Of the view.
+        view: The taught view.
+        number: Its number.
     """
     it, home = view.appearance, home_of(scene, view)
     unit = home.scale
@@ -66,7 +66,7 @@ def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
 
 
 def home_of(scene: Scene, view: ViewModel) -> PatchPose:
-    """Where a thing was when it was taught, in the frame."""
+    """The pose at which an object was taught, in this frame."""
     by = max(scene.size) / max(view.size)
     return PatchPose(view.pose.x * by, view.pose.y * by, view.pose.scale * by)
 
@@ -74,13 +74,13 @@ def home_of(scene: Scene, view: ViewModel) -> PatchPose:
 def moving_places(
     scene: Scene, view: ViewModel, number: int, where: NDArray[np.bool_]
 ) -> list[ThingPlace]:
-    """Places that have changed of late and look like a thing: more so than all else that moves.
+    """Recently changed positions that match an object better than anything else that moves.
 
     Args:
         scene: The frame.
-        view: What the thing looked like when it was taught.
-        number: Of the view.
-        where: (h, w) bool, of any size: what has changed of late.
+        view: The taught view.
+        number: Its number.
+        where: (h, w) bool, of any size: recently changed parts.
     """
     it = view.appearance
     unit = view.pose.scale * max(scene.size) / max(view.size)
@@ -93,11 +93,11 @@ def moving_places(
 
 
 def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
-    """Places that look like a thing did when it was last seen.
+    """Positions that match an object's last appearance.
 
     Args:
         scene: The frame.
-        track: A thing that is hidden.
+        track: The track of a hidden object.
     """
     it, last = track.looks, track.pose
     if it is None or last is None:
@@ -112,7 +112,7 @@ def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
 def _gathered(
     scene: Scene, it: Appearance, last: PatchPose, where: NDArray[np.bool_] | None = None
 ) -> list[Match]:
-    """The one place where a thing's colours are gathered, if there is just one."""
+    """The position where an object's colours concentrate, if it is unique."""
     (most, pose), (second, _) = colour_peaks(scene, it, last, where)
     if most < GATHERED or second > most / APART:
         return []
@@ -121,7 +121,7 @@ def _gathered(
 
 
 def _outstanding(matches: Sequence[Match], it: Appearance, apart: float = APART) -> list[Match]:
-    """Those that look like a thing, and not only a little more so than other places do."""
+    """The matches that are clearly better than those of other positions."""
     if not matches:
         return []
     top = max(matches, key=lambda m: m.score).pose
@@ -133,12 +133,12 @@ def _outstanding(matches: Sequence[Match], it: Appearance, apart: float = APART)
 def assigned(
     scene: Scene, found: Sequence[ThingPlace], taken: Sequence[Blob]
 ) -> dict[str, ThingPlace]:
-    """The best place for each thing, no two things in one.
+    """Assign the best position to each object, at most one object to each.
 
     Args:
         scene: The frame.
-        found: Candidates for all things that are looked for.
-        taken: Where things are already.
+        found: Candidates of all searched objects.
+        taken: Blobs of objects already located.
     """
     out: dict[str, ThingPlace] = {}
     full = list(taken)
@@ -154,7 +154,7 @@ def assigned(
 
 
 def footprint(scene: Scene, pose: PatchPose, it: Appearance) -> Blob | None:
-    """The pixels that a thing at a pose covers; None when it is out of view."""
+    """The pixels that an object at a pose covers; None when out of view."""
     window = window_of(pose, it.shape, scene.size)
     if window is None:
         return None
@@ -162,7 +162,7 @@ def footprint(scene: Scene, pose: PatchPose, it: Appearance) -> Blob | None:
 
 
 def overlap(a: Blob, b: Blob) -> float:
-    """What two blobs share, of the smaller."""
+    """Intersection of two blobs as a share of the smaller."""
     left, top = max(a.window[0], b.window[0]), max(a.window[1], b.window[1])
     right, bottom = min(a.window[2], b.window[2]), min(a.window[3], b.window[3])
     if right <= left or bottom <= top:

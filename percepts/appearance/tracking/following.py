@@ -1,4 +1,4 @@
-"""Where a thing went from one frame to the next: at rest, moved, covered or lost."""
+"""Frame-to-frame tracking of an object: at rest, moving, covered or lost."""
 
 from __future__ import annotations
 
@@ -24,35 +24,34 @@ from visup.percepts.appearance.tracking.verification import (
 
 Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 
-AS_IT_WAS = 0.97  # share of a window unchanged where nothing happened
-LOSE_S = 0.5  # how long a thing is followed without being seen
-LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # of what is still the thing
-UNSURE_PEAK = 0.4  # of the filter, below which colours are asked where the thing is
-OWN_COLOURS = 0.25  # how much more of its colours a thing shows than what is around it
-MOVED_PX = 1.0  # working pixels
-CARRIED = 0.6  # share that it must explain where many points of it agree on the move
-BETTER = 0.04  # share of its pixels that a move must explain beyond rest
-COVERED = 0.2  # share unchanged below which a thing at rest cannot be seen
+AS_IT_WAS = 0.97  # unchanged share of a window from which nothing happened
+LOSE_S = 0.5  # how long an object is tracked without being observed
+LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # least filter peak and explained share of a tracked object
+UNSURE_PEAK = 0.4  # filter peak below which colours localise the object
+OWN_COLOURS = 0.25  # least excess of the object's colours over the surroundings
+MOVED_PX = 1.0  # least motion that ends rest, working pixels
+CARRIED = 0.6  # least explained share of a move on which many points agree
+BETTER = 0.04  # share of pixels by which a move must explain more than rest
+COVERED = 0.2  # unchanged share below which an object at rest is covered
 UNCOVERED = 0.5
 FOUND_AGAIN = 0.6
-PLAIN = 0.8  # share of the last answer at which points that agree need no closer look
-LOOK_CLOSER = 4  # frames, after which it is taken all the same
-_GROWTH, _TURN = 1.035, 0.07  # of a thing from frame to frame, and radians, that are tried
-_SURER = 1.03  # how much more the filter must answer for these
-_FIRM = 5  # points that tell a turn and a growth
+PLAIN = 0.8  # share of the last peak from which agreeing points need no scale and rotation search
+LOOK_CLOSER = 4  # frames between two such searches in any case
+_GROWTH, _TURN = 1.035, 0.07  # scale factor and rotation (radians) per frame that are tried
+_SURER = 1.03  # factor by which the filter must respond better to these
+_FIRM = 5  # fewest points to estimate rotation and scale
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameMotion:
-    """What moved from one frame to the next.
+    """The motion from one frame to the next.
 
     Attributes:
         scene: The new frame.
         camera: (2, 3) similarity of the picture; `STILL` itself when the camera rests.
-        points: On things, by the number of their track.
-        number: Of the frame.
-        same: For each thing whose rest is remembered, by its name, (h, w) bool: pixels of its window
-            that look as they did.
+        points: Points on objects, by the number of their track.
+        number: Number of the frame.
+        same: For each object with a rest memory, by name, (h, w) bool: unchanged pixels of its window.
     """
 
     scene: Scene
@@ -68,51 +67,51 @@ class FrameMotion:
 
 
 def followed(track: ThingTrack, owner: int, motion: FrameMotion) -> ThingTrack:
-    """A thing one frame on.
+    """The track in the next frame.
 
     Args:
-        track: As it was.
-        owner: Whose points are its own.
-        motion: What moved.
+        track: The previous track.
+        owner: Number of its points.
+        motion: The frame's motion.
     """
     if track.state is State.ABSENT or track.pose is None or track.looks is None:
         return track
     if track.state is State.HIDDEN:
-        return _looked_again(track, motion)
+        return _redetected(track, motion)
     if track.state is State.RESTING and motion.static and track.rest is not None:
         return _at_rest(track, motion.points.of(owner), motion)
     return _moving(track, motion.points.of(owner), motion)
 
 
 def noted(track: ThingTrack, time: float, pose: PatchPose) -> ThingTrack:
-    """A thing that is seen at a pose."""
+    """The track, observed at a pose."""
     path = tuple(p for p in track.path if time - p[0] <= PATH_S)
     return replace(track, pose=pose, path=(*path, (time, pose)), seen=time)
 
 
 def _at_rest(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTrack:
-    """It rests, unless a move explains more of its pixels, or nothing of it is left to be seen."""
+    """Track an object at rest: it stays so unless a move explains more, or it is covered."""
     scene, pose, it, rest = motion.scene, track.pose, track.looks, track.rest
     assert pose is not None
     assert it is not None
     assert rest is not None
     same = motion.same[track.name]
-    kept = float(np.mean(same[rest.blob.mask]))
+    unchanged_share = float(np.mean(same[rest.blob.mask]))
     if np.mean(same) > AS_IT_WAS:
-        return noted(replace(track, explained=kept, peak=1.0), scene.time, pose)
+        return noted(replace(track, explained=unchanged_share, peak=1.0), scene.time, pose)
     best, peak, firm = _located(track, pose, points, motion)
     template = template_of(it.lab, it.mask)
     _, there = explained_pixels(template, scene.patch(best, it.shape))
     _, here = explained_pixels(template, scene.patch(pose, it.shape))
-    here = max(here, kept)
-    # What is as bright as what is behind it hardly changes the place that it leaves; its points tell.
+    here = max(here, unchanged_share)
+    # An object as bright as its background hardly changes what it uncovers; its points decide.
     least = CARRIED if firm else here + BETTER
     if best.apart(pose, it.radius) >= MOVED_PX and peak >= 0.3 and there >= least:
         return _seen_moving(track, best, peak, there, scene)
-    if kept < COVERED and colour_agreement(scene, best, it)[0] > OWN_COLOURS:
+    if unchanged_share < COVERED and colour_agreement(scene, best, it)[0] > OWN_COLOURS:
         return _seen_moving(track, best, peak, there, scene)
     track = replace(track, explained=here, peak=peak)
-    if kept >= COVERED or here >= 0.3:
+    if unchanged_share >= COVERED or here >= 0.3:
         return noted(track, scene.time, pose)
     if scene.time - track.seen > LOSE_S:
         return replace(track, state=State.HIDDEN, visible=None)
@@ -129,7 +128,7 @@ def _moving(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTrac
     _, share = explained_pixels(template, scene.patch(best, it.shape))
     colours, middle = colour_agreement(scene, best, it)
     if peak < UNSURE_PEAK and colours > OWN_COLOURS and not firm:
-        # It bends, or turns another side to the camera: its colours tell where it is.
+        # It bends or turns: its colours localise it.
         best = _between(best, middle, 0.4)
     if (peak > LEAST_PEAK and share > LEAST_SHARE) or colours > OWN_COLOURS:
         return replace(_seen_moving(track, best, peak, share, scene), colours=colours)
@@ -146,7 +145,7 @@ def _seen_moving(
     return noted(now, scene.time, pose)
 
 
-def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
+def _redetected(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
     """Search for a hidden object where it was."""
     assert track.pose is not None
     scene, it, pose = motion.scene, track.looks, track.pose.moved(motion.camera)
@@ -167,10 +166,10 @@ def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
 def _located(
     track: ThingTrack, base: PatchPose, points: Points, motion: FrameMotion
 ) -> tuple[PatchPose, float, bool]:
-    """Where a thing's filter answers most, near where its points and its past expect it.
+    """Localise an object by its filter, near the position predicted by its points and its path.
 
     Returns:
-        The pose, how strongly it answers, and whether many points agree on where it went.
+        The pose, the filter's peak, and whether many points agree on the move.
     """
     it, scene = track.looks, motion.scene
     assert it is not None
@@ -179,7 +178,7 @@ def _located(
     best, peak = base, 0.0
     if guess is not None:
         at, peak = _answer(scene, guess, it)
-        # Points are precise, the filter is sure of the place: it pulls them back slowly.
+        # Points are precise but drift; the filter corrects them slowly.
         best = _between(guess, at, 0.25) if at.apart(guess, 0) < 1.6 * guess.scale else at
         if firm and peak > PLAIN * track.peak and motion.number % LOOK_CLOSER:
             return best, peak, True
@@ -190,7 +189,7 @@ def _located(
 
 
 def _resized(best: PatchPose, peak: float, it: Appearance, scene: Scene) -> tuple[PatchPose, float]:
-    """A little larger, smaller or turned, when the filter answers better to that."""
+    """The pose slightly scaled or rotated, when the filter responds better to that."""
     for by, turn in ((_GROWTH, 0.0), (1 / _GROWTH, 0.0), (1.0, _TURN), (1.0, -_TURN)):
         at, height = _answer(scene, best.resized(by, turn), it)
         if height > peak * _SURER:
@@ -208,7 +207,7 @@ def _between(a: PatchPose, b: PatchPose, share: float) -> PatchPose:
 
 
 def _by_points(pose: PatchPose, points: Points) -> tuple[PatchPose | None, bool]:
-    """Where most of a thing's points went, None when too few were followed; and if it is sure."""
+    """The pose moved with most of an object's points, None when too few; and whether it is firm."""
     before, after = points
     found = similarity_of(before, after, 1.5) if len(before) >= _FIRM else None
     if found is not None and found[1] > 0.5:

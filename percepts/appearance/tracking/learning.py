@@ -1,4 +1,4 @@
-"""How a thing looks now, learned while it moves, and what is remembered while it rests."""
+"""Adaptation of an object's appearance while it moves, and its rest memory."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from visup.percepts.appearance.tracking.track import Blob, RestMemory, State, Th
 
 Floats = NDArray[np.float32]
 
-SURE_PEAK, SURE_SHARE = 0.4, 0.5  # below these one does not learn: it may be something else
+SURE_PEAK, SURE_SHARE = 0.4, 0.5  # no adaptation below these: it may be another object
 SURE_COLOURS = 0.35
 GROW_RATE, SHRINK_RATE = 0.08, 0.05
 ANCHOR = np.float32(0.02)
 PIXEL_RATE, FILTER_RATE = 0.12, 0.04
 COLOUR_RATE, AROUND_RATE = 0.02, 0.1
 PATH_S = 0.4
-REST_SHARE = 0.7  # of `PATH_S` that a thing must have been followed to be seen to rest
-STILL_PX, STILL_SHARE = 0.6, 0.01  # what a thing at rest may seem to move, and of its size
+REST_SHARE = 0.7  # share of `PATH_S` for which an object must have been tracked to be at rest
+STILL_PX, STILL_SHARE = 0.6, 0.01  # most apparent motion at rest: pixels, and share of its size
 
 
 def learned(
     track: ThingTrack, scene: Scene, claim: tuple[Window, Floats], blob: Blob, taught: Appearance
 ) -> ThingTrack:
-    """A thing with how it looks now.
+    """A track with its adapted appearance.
 
     Args:
-        track: A thing that moves.
+        track: The track of a moving object.
         scene: The frame.
-        claim: Its window and log odds before others had their share.
-        blob: The pixels that it won.
-        taught: The view that it looks like.
+        claim: Its window and log odds before the competition.
+        blob: The pixels it won.
+        taught: The taught view that it matches.
     """
     it, pose = track.looks, track.pose
     sure = track.peak >= SURE_PEAK and track.explained >= SURE_SHARE
@@ -44,10 +44,10 @@ def learned(
         return track
     lab = scene.patch(pose, it.shape)
     seen = _in_patch(blob.window, blob.mask, track, scene)
-    # What another thing has won tells nothing of the shape.
+    # Pixels won by another object say nothing about the shape.
     taken = _in_patch(claim[0], claim[1] > 0, track, scene) - seen
     rate = np.where(seen > it.mask, GROW_RATE, SHRINK_RATE) * np.clip(1 - taken, 0, 1)
-    # Its shape is drawn back to that which was taught, or it would spread over what it touches.
+    # The shape is pulled back to the taught one, or it would spread over what it touches.
     back = ANCHOR * (taught.mask - it.mask)
     mask = (it.mask + rate * (seen - it.mask) + back).astype(np.float32)
     share = (np.float32(PIXEL_RATE) * seen)[..., None]
@@ -62,7 +62,7 @@ def learned(
 
 
 def _in_patch(window: Window, mask: NDArray[np.bool_], track: ThingTrack, scene: Scene) -> Floats:
-    """(h, w) float32: a mask of the picture as the thing's patch shows it."""
+    """(h, w) float32: a mask of the picture in the object's patch."""
     assert track.looks is not None
     assert track.pose is not None
     left, top, right, bottom = window
@@ -72,12 +72,12 @@ def _in_patch(window: Window, mask: NDArray[np.bool_], track: ThingTrack, scene:
 
 
 def rested(track: ThingTrack, scene: Scene, first: bool) -> ThingTrack:
-    """A thing that was seen not to move for a while is at rest, as it is.
+    """Put a track that has not moved for a while at rest.
 
     Args:
-        track: A thing that moves, as far as is known.
+        track: The track of an object that is not known to rest.
         scene: The frame.
-        first: Whether it is the first frame: what is there is taken to rest.
+        first: Whether it is the first frame, in which everything is assumed at rest.
     """
     it, pose = track.looks, track.pose
     if it is None or pose is None or track.visible is None or not track.path:

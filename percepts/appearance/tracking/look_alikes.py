@@ -1,4 +1,4 @@
-"""Things that look alike, and whose a place is that might be any one's of them."""
+"""Look-alike objects: which one of them a position belongs to."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from visup.percepts.appearance.tracking.finding import SURE, ThingPlace, home_of
 from visup.percepts.appearance.tracking.verification import verify
 
 LookAlikes = dict[int, frozenset[int]]
-"""Number of each view -> numbers of views of other things that look like it."""
+"""Number of each view -> numbers of views of other objects that look like it."""
 
 
 def look_alikes(views: Sequence[ViewModel]) -> LookAlikes:
-    """Which views of different things look alike: each is found where the other was taught."""
+    """Views of different objects that look alike: each is detected where the other was taught."""
     like = {
         (i, k)
         for (i, one), (k, other) in permutations(enumerate(views), 2)
@@ -43,17 +43,17 @@ def settled(
     alike: LookAlikes,
     sought: Collection[str],
 ) -> ThingPlace:
-    """A place with whose it is: of things that look alike the one's that was taught nearest to it.
+    """Resolve a position among look-alikes: it belongs to the one taught nearest to it.
 
-    Things are looked for one after the other; of two that are equal the first would take whatever place
-    comes into view. Where a thing was taught is where it belongs, or nobody can tell.
+    Objects are searched one after another; of two equal ones the first would take any position that comes
+    into view. The taught positions are the only information that separates them.
 
     Args:
         scene: The frame.
-        place: Where one thing was found.
+        place: Where one object was detected.
         views: All taught views.
         alike: Which of them look alike.
-        sought: Names of the things that are not in view.
+        sought: Names of the objects not in view.
     """
     rivals = [k for k in sorted(alike[place.number]) if views[k].name in sought]
     pose = place.match.pose

@@ -1,4 +1,4 @@
-"""Where points of a frame went: on things, and all over the picture."""
+"""Point tracking from frame to frame: on objects, and all over the picture."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from visup.percepts.appearance.looks.scene import Scene
 
 STILL = np.eye(2, 3)
 NO_POINTS = np.zeros((0, 2), dtype=np.float32)
-_GRID = 12, 8  # cells of the picture, in each of which one point tells of the camera
+_GRID = 12, 8  # grid of the picture; one camera point per cell
 _WINDOW = (13, 13)
-_BACK = 0.7  # pixels: a point that does not come back as near as this was lost
+_BACK = 0.7  # most forward-backward error, pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointMotion:
-    """Points of one frame and where they are in the next.
+    """Points of one frame and their positions in the next.
 
     Attributes:
-        before: (N, 2) float32, working pixels of the frame before.
+        before: (N, 2) float32, working pixels of the previous frame.
         after: (N, 2) float32, in this frame.
-        owner: (N,) int64, number of what a point is on.
+        owner: (N,) int64, number of the object that each point is on.
     """
 
     before: NDArray[np.float32]
@@ -41,12 +41,12 @@ class PointMotion:
 def follow_points(
     old: Scene, new: Scene, points: NDArray[np.float32], owner: NDArray[np.int64]
 ) -> PointMotion:
-    """Where points went, those that come back when followed backwards.
+    """Track points; those that fail the forward-backward check are dropped.
 
     Args:
-        old: The frame before.
+        old: The previous frame.
         new: The frame.
-        points: (N, 2) float32, working pixels of the frame before.
+        points: (N, 2) float32, working pixels of the previous frame.
         owner: (N,) int64, carried along.
     """
     if not len(points):
@@ -56,7 +56,7 @@ def follow_points(
     at, found, _ = cv2.calcOpticalFlowPyrLK(
         here, there, start, start.copy(), winSize=_WINDOW, maxLevel=3
     )
-    back, again, _ = cv2.calcOpticalFlowPyrLK(
+    back, back_found, _ = cv2.calcOpticalFlowPyrLK(
         there,
         here,
         at,
@@ -66,19 +66,19 @@ def follow_points(
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     off = np.abs(back - start).reshape(-1, 2).max(axis=1)
-    fine = (found.ravel() > 0) & (again.ravel() > 0) & (off < _BACK)
+    fine = (found.ravel() > 0) & (back_found.ravel() > 0) & (off < _BACK)
     return PointMotion(points[fine], at.reshape(-1, 2)[fine], owner[fine])
 
 
 def grid_points(
     scene: Scene, taken: NDArray[np.bool_] | None, known: NDArray[np.float32] = NO_POINTS
 ) -> NDArray[np.float32]:
-    """(N, 2) float32: the best point to follow in each cell of a grid, away from things.
+    """(N, 2) float32: the best point to track in each cell of a grid, away from objects.
 
     Args:
         scene: The frame.
-        taken: (h, w) bool, where things are; None where none are known.
-        known: (K, 2) float32, points in whose cells no other is wanted, working pixels.
+        taken: (h, w) bool, where objects are; None where none are known.
+        known: (K, 2) float32, points in whose cells no other is needed, working pixels.
     """
     width, height = scene.size
     strength = cv2.cornerMinEigenVal(cv2.pyrDown(scene.grey), 5)
@@ -106,12 +106,12 @@ def grid_points(
 def similarity_of(
     before: NDArray[np.float32], after: NDArray[np.float32], off: float
 ) -> tuple[Doubles, float] | None:
-    """The similarity that most points follow, and which share of them does.
+    """The similarity that most points follow, and their share.
 
     Args:
         before: (N, 2) float32.
         after: (N, 2) float32.
-        off: How far a point may be off, pixels.
+        off: Tolerance of a point, pixels.
     """
     if len(before) < 4:
         return None

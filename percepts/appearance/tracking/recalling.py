@@ -1,4 +1,4 @@
-"""Comparing a thing that is followed with what was taught, so that it does not become another."""
+"""Periodic comparison of a tracked object with its taught views, against drift to another object."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
 MOVING_S, RESTING_S = 0.3, 2.0  # between two comparisons
-BETTER = 0.15  # score by which another place must look more like what was taught
-DOUBTFUL = 0.4  # score at rest below which what was never beyond doubt is not believed
-REACH = 2.5  # how far it may be, of the thing's radius
+BETTER = 0.15  # score by which another position must match the taught views better
+DOUBTFUL = 0.4  # score at rest below which a track that was never proven is dropped
+REACH = 2.5  # search radius, in radii of the object
 SIZES = (0.8, 1.0, 1.25)
 
 
 def recalled(
     track: ThingTrack, views: Sequence[ViewModel], scene: Scene, others: Sequence[Blob]
 ) -> ThingTrack:
-    """A thing that looks as it was taught is believed to look just so, where it does.
+    """Reset a track's appearance and pose to a taught view where that matches.
 
     Args:
-        track: A thing in view.
-        views: All that were taught.
+        track: The track of an object in view.
+        views: All taught views.
         scene: The frame.
-        others: Where other things are.
+        others: Blobs of other objects.
     """
     it, pose = track.looks, track.pose
     wait = MOVING_S if track.state is State.MOVING else RESTING_S
@@ -51,7 +51,7 @@ def recalled(
     taught = views[number].appearance
     blob = footprint(scene, best.pose, taught)
     if best.score < DOUBTFUL and track.state is State.RESTING and not track.proven:
-        # It was taken for the thing when it moved; at rest it does not look like it.
+        # It passed for the object while it moved; at rest it does not look like it.
         return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
     if best.score <= SURE or blob is None or any(overlap(blob, o) > 0.5 for o in others):
         return track
@@ -59,7 +59,7 @@ def recalled(
 
 
 def _strayed(track: ThingTrack, best: Match) -> bool:
-    """Whether a thing looks more like what was taught than like what it was believed to have become."""
+    """Whether an object matches a taught view better than its adapted appearance."""
     return (
         track.state is State.MOVING and best.score > (max(track.peak, 0) * track.explained) ** 0.5
     )
@@ -68,7 +68,7 @@ def _strayed(track: ThingTrack, best: Match) -> bool:
 def _elsewhere(
     track: ThingTrack, number: int, here: Match, views: Sequence[ViewModel], scene: Scene
 ) -> tuple[int, Match]:
-    """A place close by that looks clearly more like what was taught."""
+    """A nearby position that clearly matches a taught view better."""
     assert track.pose is not None
     it = views[number].appearance
     size = _as_large(track.pose, track, views[number], views).scale
@@ -84,7 +84,7 @@ def _elsewhere(
 def _as_large(
     pose: PatchPose, track: ThingTrack, view: ViewModel, views: Sequence[ViewModel]
 ) -> PatchPose:
-    """A pose of one view as a pose of another, so that the thing shows as large."""
+    """A pose of one view converted to another, preserving the object's apparent size."""
     now, then = views[track.number].appearance, view.appearance
     return pose if now is then else pose.resized(now.radius / then.radius)
 

@@ -1,4 +1,4 @@
-"""Which pixels are which thing's: each goes to the thing that explains it best."""
+"""Segmentation among objects: each pixel goes to the object that explains it best."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 Claim = tuple[Window, Floats]
-"""A window (left, top, right, bottom) and (h, w) float32 log odds that its pixels are a thing's."""
+"""A window (left, top, right, bottom) and (h, w) float32 log odds that its pixels are the object's."""
 
-_SHAPE = np.float32(3.0)  # log odds of a pixel well within a thing, or well outside
-_COLOUR = np.float32(2.0)  # most that a colour says
-_LIKE, _UNLIKE = np.float32(1.0), np.float32(-1.5)  # of a pixel that looks as the template wants
-_INNER = np.float32(4.0)  # pixels of a patch from the outline, beyond which one is well in or out
-_LIMB = 11.0  # how far a limb may reach beyond the outline
-_UNLIKE_ALL = 2.5  # log odds of a colour that is the thing's alone
-_CHANGED = 14, 7  # steps of lightness and of colour by which a pixel at rest may differ
-# What looks as it did, to the pixel, is nothing that has come in front.
-_KEPT, _LOST = np.float32(5.0), np.float32(-2.0)
+_SHAPE = np.float32(3.0)  # log odds of a pixel well within an object, or well outside
+_COLOUR = np.float32(2.0)  # most log odds of a colour
+_LIKE, _UNLIKE = np.float32(1.0), np.float32(-1.5)  # log odds of a match with the template, or none
+_INNER = np.float32(4.0)  # distance to the outline of a pixel well in or out, patch pixels
+_LIMB = 11.0  # reach of a limb beyond the outline, patch pixels
+_UNLIKE_ALL = 2.5  # log odds of a colour unique to the object
+_CHANGED = 14, 7  # tolerance of lightness and of colour of a pixel at rest, steps
+# Log odds of unchanged and of changed pixels: an exact match is not an occluder.
+_SAME, _DIFFERENT = np.float32(5.0), np.float32(-2.0)
 NOWHERE = np.float32(-9.0)
 
 
 def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | None:
-    """How much each pixel near a thing speaks for it.
+    """Log odds that pixels near an object are its own.
 
     Args:
         scene: The frame.
-        pose: Where the thing is.
-        looks: How it looks.
+        pose: Pose of the object.
+        looks: Its appearance.
 
     Returns:
-        The window and (h, w) float32 log odds; None when the thing is out of view.
+        The window and (h, w) float32 log odds; None when the object is out of view.
     """
     window = window_of(pose, looks.shape, scene.size)
     if window is None:
@@ -57,9 +57,9 @@ def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | No
 
 
 def _shape_odds(mask: Floats, colours: Floats) -> Floats:
-    """(h, w) float32: log odds of a pixel from how far within or without the outline it lies.
+    """(h, w) float32: log odds of pixels by their distance to the outline.
 
-    Limbs move: a colour that nothing else around has may carry the outline outwards.
+    Limbs move, so a colour unique in the surroundings may extend the outline.
     """
     thing = (mask > 0.5).view(np.uint8)
     if not thing.any():
@@ -72,19 +72,19 @@ def _shape_odds(mask: Floats, colours: Floats) -> Floats:
 
 
 def rest_scores(rest: RestMemory, same: Mask) -> Claim:
-    """How much each pixel still speaks for a thing at rest.
+    """Log odds that pixels still belong to an object at rest.
 
     Args:
-        rest: As it was.
-        same: As of `unchanged`.
+        rest: Its rest memory.
+        same: From `unchanged`.
     """
-    score = np.where(same, _KEPT, _LOST)
+    score = np.where(same, _SAME, _DIFFERENT)
     score[~rest.blob.mask] = NOWHERE
     return rest.blob.window, score
 
 
 def unchanged(scene: Scene, rest: RestMemory) -> Mask:
-    """(h, w) bool: pixels of a window that look as they did, whatever the light."""
+    """(h, w) bool: unchanged pixels of a window, whatever the light."""
     left, top, right, bottom = rest.blob.window
     now = np.ascontiguousarray(scene.lab[0][top:bottom, left:right])
     same = like_before(now, rest.lab, *_CHANGED)
@@ -96,14 +96,14 @@ def unchanged(scene: Scene, rest: RestMemory) -> Mask:
 
 
 def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob | None]:
-    """The pixels that each thing wins.
+    """The pixels that each object wins.
 
     Args:
-        claims: For each thing its window and (h, w) float32 log odds.
+        claims: For each object its window and (h, w) float32 log odds.
         size: (width, height) of the picture.
 
     Returns:
-        For each thing what it shows, specks and all; None where nothing is left.
+        For each object its visible blob, including specks; None where nothing remains.
     """
     best = np.zeros(size[::-1], dtype=np.float32)
     for claim in claims:
@@ -123,7 +123,7 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
 
 
 def cleaned(blob: Blob) -> Blob | None:
-    """Without specks."""
+    """The blob without specks."""
     mask = blob.mask.view(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
     if count < 2:

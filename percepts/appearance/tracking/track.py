@@ -1,4 +1,4 @@
-"""What is believed of a taught thing from frame to frame."""
+"""The state of a taught object from frame to frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Bytes = NDArray[np.uint8]
 
 
 class State(StrEnum):
-    """What a thing is doing, as far as it is seen."""
+    """The state of an object, as far as observed."""
 
     ABSENT = "absent"
     MOVING = "moving"
@@ -46,10 +46,10 @@ class Blob:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestMemory:
-    """What the picture shows where a thing rests.
+    """The picture at an object at rest.
 
     Attributes:
-        blob: The thing, whole as far as it was seen.
+        blob: The object, as completely as observed.
         lab: (h, w, 3) uint8, Lab, of the blob's window.
     """
 
@@ -59,25 +59,25 @@ class RestMemory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ThingTrack:
-    """One thing.
+    """The track of one object.
 
     Attributes:
-        name: As it was taught.
-        number: Of the view that it looks like, among all taught views.
-        id: Of its region, 0 until it is seen.
-        state: What it is doing.
-        pose: Where it is, or was last believed to be; working pixels.
-        looks: How it looks now.
-        visible: What is seen of it; None when nothing is.
-        rest: What is remembered while it rests.
+        name: Name as taught.
+        number: Number of the view that it matches, among all taught views.
+        id: Id of its region, 0 until it is detected.
+        state: Its state.
+        pose: Its current or last pose, working pixels.
+        looks: Its current appearance.
+        visible: Its visible part; None when there is none.
+        rest: Its memory while it rests.
         path: (time, pose) of the last half second, oldest first.
-        peak: How strongly its filter answered last.
-        explained: Share of its pixels that looked as they should.
-        colours: How much more of its colours it showed than what is around it.
-        seen: When it was last seen, seconds.
-        since: When it was first seen, seconds.
-        proven: Whether it has looked beyond doubt as it was taught.
-        asked: When the whole picture was last searched for it, seconds.
+        peak: Last peak of its filter.
+        explained: Share of its pixels that looked as expected.
+        colours: Excess of its colours over those of the surroundings.
+        seen: Time of the last observation, seconds.
+        since: Time of the first observation, seconds.
+        proven: Whether it has clearly matched a taught view.
+        asked: Time of the last search of the whole picture for it, seconds.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Following taught things from frame to frame, all of them together."""
+"""The tracker of taught objects, all of them together."""
 
 from __future__ import annotations
 
@@ -51,17 +51,17 @@ from visup.percepts.appearance.tracking.track import IN_VIEW, Blob, State, Thing
 
 Mask = NDArray[np.bool_]
 
-POINTS = 24  # that are followed on each thing
-HOLD_S = 0.12  # how long a thing that is lost is still reported where it should be
-LEAST_SEEN = 0.04  # share of a thing below which nothing of it is seen
+POINTS = 24  # most points tracked on each object
+HOLD_S = 0.12  # how long a lost object is still reported at its predicted position
+LEAST_SEEN = 0.04  # visible share below which an object is hidden
 EVERY = 3  # frames between two searches of the whole picture
 
 
 class ThingTracker:
-    """Where all taught things are; one per video.
+    """Tracks all taught objects; one per video.
 
     Args:
-        views: What is known of them.
+        views: Models of their views.
 
     Attributes:
         views: As given.
@@ -83,10 +83,10 @@ class ThingTracker:
 
     @property
     def camera(self) -> Doubles | None:
-        """(2, 3) similarity of the picture since the frame before, pixels of the frame; None unknown.
+        """(2, 3) similarity of the picture since the previous frame, frame pixels; None if unknown.
 
-        What the points of the picture away from things do is taken for the camera's motion: where most
-        of the picture is something that moves by itself, such as water, it is taken for that.
+        The common motion of points away from objects is taken for the camera's: where most of the picture
+        moves by itself, such as water, the estimate is wrong.
         """
         if self._camera is None or self._camera is STILL or self.scene is None:
             return self._camera
@@ -95,19 +95,19 @@ class ThingTracker:
         return found
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far."""
+        """The state after the frames so far."""
         return {k: v for k, v in vars(self).items() if k not in ("views", "_alike")}
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take on what a tracker of the same views remembered."""
+        """Restore the state of a tracker of the same views."""
         vars(self).update(state)
 
     def step(self, scene: Scene, new_id: Callable[[Blob], int]) -> tuple[ThingTrack, ...]:
-        """The things in the next frame.
+        """Track the objects in the next frame.
 
         Args:
             scene: The frame.
-            new_id: Gives the id of what is seen for the first time.
+            new_id: Returns the id of an object detected for the first time.
 
         Returns:
             One track for each name, in the order of teaching.
@@ -128,7 +128,7 @@ class ThingTracker:
         return self.tracks
 
     def view_number(self, track: ThingTrack) -> int:
-        """Which of the views of its own name a thing looks like, from 0."""
+        """Number, from 0, of the view that an object matches, among those of its name."""
         return self._numbers(track.name).index(track.number)
 
     def _numbers(self, name: str) -> list[int]:
@@ -139,7 +139,7 @@ class ThingTracker:
         resting = [t for t in self.tracks if t.state is State.RESTING and t.name in calm]
         seen = [t for t in self.tracks if t.state in IN_VIEW]
         if self._static and seen and len(resting) == len(seen):
-            # The camera rests, too: what it shows has not moved by a pixel.
+            # The camera rests, too: nothing has moved by a pixel.
             moved = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64))
             camera: Doubles | None = STILL
         else:
@@ -157,7 +157,7 @@ class ThingTracker:
         self.tracks = tuple(tracks)
 
     def _followed_points(self, old: Scene, scene: Scene, calm: Collection[str]) -> PointMotion:
-        """Points of things that may move, and where they went."""
+        """Tracked points of objects that may move."""
         points = [(-1, NO_POINTS)]
         for k, t in enumerate(self.tracks):
             rests = t.state is State.RESTING and t.name in calm
@@ -167,7 +167,7 @@ class ThingTracker:
         return follow_points(old, scene, np.concatenate([p for _, p in points]), owner)
 
     def _find(self, scene: Scene) -> None:
-        """Look for things that are not in view: all of them at first, then one after another."""
+        """Search for objects that are not in view: all of them at first, then one at a time."""
         lost = sorted((t for t in self.tracks if t.state not in IN_VIEW), key=lambda t: t.asked)
         first = self._count == 1
         due = lost if first else lost[: self._count % EVERY == 0]
@@ -193,7 +193,7 @@ class ThingTracker:
         self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
 
     def _settled(self, placed: Mapping[str, ThingPlace], scene: Scene) -> dict[str, ThingPlace]:
-        """Whose the places are, where things that look alike are not all looked for at once."""
+        """Resolve positions of look-alikes that are not all searched at once."""
         sought = {t.name for t in self.tracks if t.state not in IN_VIEW} - set(placed)
         found: dict[str, ThingPlace] = {}
         for place in placed.values():
@@ -210,7 +210,7 @@ class ThingTracker:
     def _shown(
         self, track: ThingTrack, claim: Claim | None, blob: Blob | None, scene: Scene
     ) -> ThingTrack:
-        """A thing with the pixels that it won, and with what they teach."""
+        """A track with the pixels it won, and its appearance adapted to them."""
         pose, it, rest = track.pose, track.looks, track.rest
         if claim is None or blob is None or pose is None or it is None:
             return replace(track, visible=None)
@@ -246,7 +246,7 @@ def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTr
 
 
 def _forgotten(track: ThingTrack) -> ThingTrack:
-    """A thing in a picture of another size: nothing is known of where it is."""
+    """A track in a picture of another size: its position is unknown."""
     return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
 
 
@@ -257,7 +257,7 @@ def _numbered(track: ThingTrack, scene: Scene, new_id: Callable[[Blob], int]) ->
 
 
 def _claim(track: ThingTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim | None:
-    """What a thing that is in view claims of the picture."""
+    """The claim of an object in view on the picture."""
     if track.state not in IN_VIEW or scene.time - track.seen > HOLD_S:
         return None
     if track.state is State.RESTING and track.rest is not None:
@@ -268,7 +268,7 @@ def _claim(track: ThingTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim |
 
 
 def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> Mask:
-    """(h, w) bool: where things are seen."""
+    """(h, w) bool: visible objects."""
     out = np.zeros(scene.size[::-1], dtype=bool)
     for t in tracks:
         if t.visible is not None:
@@ -278,7 +278,7 @@ def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> Mask:
 
 
 def _occupied(track: ThingTrack, scene: Scene) -> Iterator[Blob]:
-    """Where a thing in view is; what has only just come into view again has no pixels of its own yet."""
+    """Blobs of an object in view; one just redetected has no pixels of its own yet."""
     if track.visible is not None:
         yield track.visible
     elif track.seen == scene.time and track.pose is not None and track.looks is not None:
@@ -288,7 +288,7 @@ def _occupied(track: ThingTrack, scene: Scene) -> Iterator[Blob]:
 
 
 def _points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:
-    """(N, 2) float32: points of a thing that can be followed."""
+    """(N, 2) float32: trackable points of an object."""
     left, top, right, bottom = blob.window
     inner = cv2.erode(blob.mask.view(np.uint8), np.ones((3, 3), np.uint8))
     grey = np.ascontiguousarray(scene.grey[top:bottom, left:right])

@@ -1,4 +1,4 @@
-"""How well a place of the picture agrees with what a thing looks like."""
+"""Verification: how well a position of the picture matches an appearance."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from visup.percepts.appearance.looks.thing_model import Appearance
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
-_NEAR = np.array([16, 9, 9], dtype=np.int16)  # steps of Lab by which a like pixel may differ
-_LIGHTER = 30.0  # most that the whole may be lighter or darker, steps
-OWN = 0.7  # log odds from which a colour is the thing's own
+_NEAR = np.array([16, 9, 9], dtype=np.int16)  # tolerance of a matching pixel, steps of Lab
+_LIGHTER = 30.0  # most overall change of lightness, steps
+OWN = 0.7  # log odds from which a colour is the object's own
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How a pose agrees.
+    """The match of a pose.
 
     Attributes:
-        pose: Where the filter answers most.
-        peak: How strongly, about 1 where the thing is as it was learned.
-        explained: Share of the thing's pixels that look as they should, 0 to 1.
+        pose: Position of the filter's peak.
+        peak: Height of the peak, about 1 where the object is as learned.
+        explained: Share of the object's pixels that look as expected, 0 to 1.
     """
 
     pose: PatchPose
@@ -40,7 +40,7 @@ class Match:
 
     @property
     def score(self) -> float:
-        """Both together, 0 to 1."""
+        """Combination of both, 0 to 1."""
         return float(np.sqrt(np.clip(self.peak, 0, 1) * self.explained))
 
 
@@ -51,7 +51,7 @@ def respond(
     colours: ColourModel,
     it: CorrelationFilter,
 ) -> tuple[PatchPose, float]:
-    """Where near a pose a filter answers most, and how strongly."""
+    """Position and height of a filter's peak near a pose."""
     lab = scene.patch(pose, shape)
     features = cell_features(lab, colours.odds(colour_bins(lab)))
     dx, dy, peak = peak_of(it.response(features))
@@ -60,12 +60,12 @@ def respond(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """Pixels of a thing, with how far each may differ.
+    """Pixels of an object, each with its tolerated range.
 
     Attributes:
         low: (h, w, 3) int16, Lab: the darkest near each pixel.
         high: (h, w, 3) int16, the lightest.
-        weight: (h, w) float32, how much a pixel counts.
+        weight: (h, w) float32, weight of each pixel.
     """
 
     low: NDArray[np.int16]
@@ -74,14 +74,14 @@ class Template:
 
 
 def template_of(lab: Bytes, mask: Floats) -> Template:
-    """The template of a patch; a pixel's neighbours are as good as itself, for poses are inexact."""
+    """The template of a patch; neighbouring pixels match too, since poses are inexact."""
     low = np.asarray(cv2.erode(lab, _BLOCK), dtype=np.int16) - _NEAR
     high = np.asarray(cv2.dilate(lab, _BLOCK), dtype=np.int16) + _NEAR
     return Template(low, high, mask)
 
 
 def explained_pixels(template: Template, lab: Bytes) -> tuple[NDArray[np.bool_], float]:
-    """Which pixels of a patch look as a template wants, and the share of its weight that they have."""
+    """Which pixels of a patch match a template, and their share of its weight."""
     middle = (template.low[..., 0] + template.high[..., 0]) // 2
     sure = template.weight > 0.5
     if not sure.any():
@@ -97,16 +97,16 @@ def explained_pixels(template: Template, lab: Bytes) -> tuple[NDArray[np.bool_],
 
 
 def colour_agreement(scene: Scene, pose: PatchPose, it: Appearance) -> tuple[float, PatchPose]:
-    """How much more a thing's colours are found where it should be than around it, and their middle.
+    """Excess of an object's colours at its position over the surroundings, and their centre.
 
     Args:
         scene: The frame.
-        pose: Where it should be.
-        it: How it looks.
+        pose: Expected pose.
+        it: Its appearance.
 
     Returns:
-        The share of the thing's pixels with its colours less that of those around, -1 to 1, and the
-        pose shifted to where these colours lie.
+        The share of the object's pixels with its colours minus that of the surroundings, -1 to 1, and
+        the pose shifted to the centre of these colours.
     """
     odds = it.colours.odds(colour_bins(scene.patch(pose, it.shape)))
     own = (odds > OWN).astype(np.float32)
@@ -126,14 +126,14 @@ def colour_agreement(scene: Scene, pose: PatchPose, it: Appearance) -> tuple[flo
 
 
 def _ring(mask: Floats) -> Floats:
-    """(h, w) float32: what lies close around a thing, but not on its rim."""
+    """(h, w) float32: the close surroundings of an object, without its rim."""
     near = cv2.dilate(mask, np.ones((5, 5), np.uint8))
     far = cv2.dilate(mask, np.ones((21, 21), np.uint8))
     return np.asarray(np.clip(far - near, 0, 1), dtype=np.float32)
 
 
 def verify(scene: Scene, it: Appearance, pose: PatchPose) -> Match:
-    """How well a thing agrees with a place, after looking for the best place near it."""
+    """Match an object at a position, after a local search."""
     pose, peak = respond(scene, pose, it.shape, it.colours, it.filter)
     for by in (1.0, 0.93, 1.075):
         at, height = respond(scene, pose.resized(by), it.shape, it.colours, it.filter)

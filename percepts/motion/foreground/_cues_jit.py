@@ -70,10 +70,10 @@ def flow_statistics(labels: Labels, flow: Floats, gx: Floats, gy: Floats, count:
     for y in range(0, height, EVERY):
         below = min(y + EVERY, height - 1)
         for x in range(0, width, EVERY):
-            beside = min(x + EVERY, width - 1)
+            next_x = min(x + EVERY, width - 1)
             c, steep = labels[y, x], np.float32(0)
             for k in range(2):
-                right = flow[y, beside, k] - flow[y, x, k]
+                right = flow[y, next_x, k] - flow[y, x, k]
                 down = flow[below, x, k] - flow[y, x, k]
                 steep += right * right + down * down
                 out[c, k] += flow[y, x, k]

@@ -59,13 +59,13 @@ def inside_log_odds(share: Floats, tone: NDArray[np.uint8]) -> Floats:
     """
     inside = (share > 0.5).view(np.uint8)
     kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
-    beside = cv2.dilate(inside, kernel) != cv2.erode(inside, kernel)
+    near = cv2.dilate(inside, kernel) != cv2.erode(inside, kernel)
     # For means over a window, every other pixel is enough.
     some = np.ascontiguousarray(inside[::2, ::2])
     full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
     tones = np.ascontiguousarray(tone[::2, ::2])
     mine = np.asarray(cv2.bitwise_and(tones, tones, mask=some), dtype=np.uint8)
-    return _odds(beside, full, tone, _means(mine), _means(tones))
+    return _odds(near, full, tone, _means(mine), _means(tones))
 
 
 def _means(tones: NDArray[np.uint8]) -> tuple[Floats, Floats]:
@@ -78,7 +78,7 @@ def _means(tones: NDArray[np.uint8]) -> tuple[Floats, Floats]:
 
 @compiled
 def _odds(
-    beside: NDArray[np.bool_],
+    near: NDArray[np.bool_],
     full: Floats,
     tone: NDArray[np.uint8],
     inside: tuple[Floats, Floats],
@@ -87,7 +87,7 @@ def _odds(
     """Log odds, by tone, that pixels near an outline are inside, (h, w) float32; 0 elsewhere.
 
     Args:
-        beside: (h, w) which pixels.
+        near: (h, w) bool, the pixels.
         full: (h / 2, w / 2) share of the window around each that is inside.
         tone: (h, w, 3).
         inside: (h / 2, w / 2, 3) means over the window of the tones inside, 0 taken for others, and
@@ -96,12 +96,12 @@ def _odds(
     """
     mine, mine_squared = inside
     every, every_squared = all_
-    out = np.zeros(beside.shape, np.float32)
-    for y in range(beside.shape[0]):
-        for x in range(beside.shape[1]):
+    out = np.zeros(near.shape, np.float32)
+    for y in range(near.shape[0]):
+        for x in range(near.shape[1]):
             v, u = y // 2, x // 2
             part = float(full[v, u])
-            if not beside[y, x] or part <= LEAST or part >= 1 - LEAST:
+            if not near[y, x] or part <= LEAST or part >= 1 - LEAST:
                 continue
             away, wide = 0.0, 1.0
             for i in range(3):

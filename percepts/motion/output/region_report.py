@@ -97,7 +97,7 @@ def report_regions(
     scene: FrameMeasurements,
     size: tuple[int, int],
     settings: MotionSettings,
-    beside: Executor,
+    executor: Executor,
 ) -> tuple[Region, ...]:
     """Regions of the confirmed tracks that are in view.
 
@@ -106,7 +106,7 @@ def report_regions(
         scene: The frame.
         size: (width, height) of the frame.
         settings: Gives the least area.
-        beside: Computes every other outline in parallel.
+        executor: Computes every other outline in parallel.
 
     Returns:
         Regions by id.
@@ -121,7 +121,7 @@ def report_regions(
         )
 
     visible = [t for t in reported if t.last_seen == scene.time]
-    out = [_region(t, shape, scale) for t, shape in _outlined(visible, drawn, beside)]
+    out = [_region(t, shape, scale) for t, shape in _outlined(visible, drawn, executor)]
     return tuple(sorted(out, key=lambda r: r.id))
 
 
@@ -131,7 +131,7 @@ def report_objects(
     scene: FrameMeasurements,
     size: tuple[int, int],
     settings: MotionSettings,
-    beside: Executor,
+    executor: Executor,
 ) -> tuple[Region, ...]:
     """Regions of the objects of the foreground that are in view.
 
@@ -141,7 +141,7 @@ def report_objects(
         scene: The frame.
         size: (width, height) of the frame.
         settings: Gives the least area.
-        beside: Computes every other outline in parallel.
+        executor: Computes every other outline in parallel.
 
     Returns:
         Regions by id.
@@ -156,15 +156,15 @@ def report_objects(
 
     return tuple(
         _object_region(o, shape, by_id.get(o.track), state, scene)
-        for o, shape in _outlined(reported, drawn, beside)
+        for o, shape in _outlined(reported, drawn, executor)
     )
 
 
 def _outlined(
-    things: Sequence[T], drawn: Callable[[T], RegionOutline | None], beside: Executor
+    things: Sequence[T], drawn: Callable[[T], RegionOutline | None], executor: Executor
 ) -> list[tuple[T, RegionOutline]]:
     """Items with their outlines, every other one computed in parallel; those without one are dropped."""
-    later = [beside.submit(drawn, thing) for thing in things[1::2]]
+    later = [executor.submit(drawn, thing) for thing in things[1::2]]
     shapes: list[RegionOutline | None] = [None] * len(things)
     shapes[::2] = [drawn(thing) for thing in things[::2]]
     shapes[1::2] = [shape.result() for shape in later]

@@ -1,7 +1,7 @@
-"""Parts of a build: some views of one mesh, kept in a file until all parts are done.
+"""Parts of a build: some views of one mesh, stored in a file until all parts are done.
 
-A part's file is a model database. It is called after the content of the mesh and all settings that the
-views depend on, so that it is used again by a build that wants just the same, and by no other.
+A part's file is a model database. Its name hashes the mesh's content and all settings that the views depend
+on, so that only a build with exactly the same input reuses it.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ class BuildPart:
 
     Attributes:
         mesh: Its file.
-        views: Views of the mesh in all.
-        seed: Of their directions.
-        first: First of the views of this part.
-        count: How many.
-        path: Where they are kept.
+        views: Total number of views of the mesh.
+        seed: Seed of their directions.
+        first: Number of the first view of this part.
+        count: Number of views of this part.
+        path: File of the part.
     """
 
     mesh: Path
@@ -76,7 +76,7 @@ def parts_of(mesh: Path, folder: Path, views: int, seed: int) -> list[BuildPart]
 
 
 def is_made(part: BuildPart) -> bool:
-    """Whether a part's file is there, whole and sound."""
+    """Whether a part's file exists, complete and valid."""
     try:
         return part.path.is_file() and all(True for _ in read_part(part))
     except VisupError:
@@ -84,7 +84,7 @@ def is_made(part: BuildPart) -> bool:
 
 
 def read_part(part: BuildPart) -> Iterator[NewView]:
-    """The views of a part that was made.
+    """The views of a finished part.
 
     Raises:
         DatabaseError: Its file is damaged.

@@ -1,6 +1,6 @@
 """Building a model database: views of meshes, exemplars of silhouettes, masks of a video.
 
-Models are named after their mesh files. Nothing here depends on the order in which processes finish.
+Models are named after their mesh files. The result does not depend on the order in which processes finish.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel, mesh_model
 from visup.percepts.shape.silhouette.silhouette import binary_picture, looks_cut, normalise
 
 VIEWS = 32
-"""Views rendered of each mesh unless asked otherwise."""
+"""Default number of views rendered of each mesh."""
 
 CLUSTERS = 8
-"""Exemplars kept of a folder of silhouettes unless asked otherwise."""
+"""Default number of exemplars of a folder of silhouettes."""
 
 MOST_CLUSTERED = 400
-"""Silhouettes that are clustered at most; of more, so many evenly spaced ones are."""
+"""Most silhouettes to cluster; more are sampled evenly."""
 
 PICTURES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
-"""Endings of the picture files that are read as silhouettes."""
+"""Suffixes of picture files read as silhouettes."""
 
 LARGEST_PICTURE_BYTES = 2**28
 UNSCORED = 128
-"""Value of mask pixels that belong to no object for certain."""
+"""Value of mask pixels that are not scored."""
 
 Progress = Callable[[int, int, str], None]
-"""Called with how many views are done, of how many, and the name of the model they were done of."""
+"""Called with the number of finished views, their total, and the name of the current model."""
 
 
 def read_silhouette(path: Path) -> NDArray[np.bool_]:
@@ -93,10 +93,10 @@ def read_masks(folder: Path, label: int | None = None) -> list[NDArray[np.bool_]
 
     Args:
         folder: Label pictures: 0 is background, 128 is not scored, every other value is one object.
-        label: Value of the object; all objects are taken as one when None.
+        label: Value of the object; all objects as one when None.
 
     Returns:
-        A mask for each frame in which the object is seen.
+        A mask for each frame in which the object is visible.
 
     Raises:
         DatabaseError: The folder is missing, holds no pictures, a picture cannot be read, or no frame
@@ -128,17 +128,17 @@ def _pictures_in(folder: Path) -> list[Path]:
 
 
 def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
-    """Views of a mesh file, ready to be stored under the name of the file; symmetric ones are one.
+    """Views of a mesh file, named after the file, with symmetric ones merged.
 
     Raises:
-        DatabaseError: The file is no mesh.
-        ExtraMissingError: What renders meshes is not installed.
+        DatabaseError: The file is not a mesh.
+        ExtraMissingError: The renderer is not installed.
     """
     return merge_symmetric(rendered(mesh, half_sphere_directions(count, seed)))
 
 
 def rendered(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
-    """Views of a mesh file from these directions (V, 3), as `mesh_views` but none merged."""
+    """Views of a mesh file from these directions (V, 3), as `mesh_views` but without merging."""
     views = []
     for seen in render_views(load_mesh(mesh), directions):
         silhouette = normalise(seen.mask)
@@ -153,10 +153,10 @@ def silhouette_views(
 ) -> list[NewView]:
     """Exemplars of silhouettes, ready to be stored.
 
-    Whole silhouettes and those that a border cuts are clustered apart: none stands for the other.
+    Whole silhouettes and those cut by a border are clustered separately.
 
     Args:
-        name: Of the model.
+        name: Name of the model.
         masks: (H, W) bool each, whole pictures.
         clusters: How many exemplars, shared between whole and cut ones by their numbers.
 
@@ -170,7 +170,7 @@ def silhouette_views(
             f"none of {len(masks)} silhouettes for {name!r} shows anything",
             expected="pictures with an object of at least 24 pixels",
         )
-    # All pairs are compared: of a long video, every so manyth frame stands for those around it.
+    # All pairs are compared, so a long video is subsampled evenly.
     every = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
     some = [shapes[k] for k in every]
     cut = [s for s in some if s.cut]
@@ -187,13 +187,13 @@ def silhouette_views(
 
 
 class BuildOptions(TypedDict, total=False):
-    """What may be asked of a build.
+    """Options of a build.
 
     Attributes:
-        views: Views of each mesh, before symmetric ones are merged; `VIEWS` unless told.
-        seed: Turns the directions of the views; 0, as usual, leaves them.
-        clusters: Exemplars of each name's silhouettes; `CLUSTERS` unless told.
-        jobs: Processes; one unless told.
+        views: Views of each mesh, before symmetric ones are merged; default `VIEWS`.
+        seed: Seed of a random rotation of the view directions; 0, the default, for none.
+        clusters: Exemplars of each name's silhouettes; default `CLUSTERS`.
+        jobs: Number of processes; default 1.
     """
 
     views: int
@@ -212,24 +212,24 @@ def build_database(
 ) -> ModelDatabase:
     """Build a database from mesh files; each model's name is its file's stem.
 
-    What is done is kept in a folder beside the target until all is done: a build that was killed, or
-    that stopped at a bad mesh, goes on where it was when it is started again.
+    Finished parts are stored in a folder beside the target until the build is complete: a build that was
+    killed, or that stopped at a bad mesh, resumes when started again.
 
     Args:
-        path: Where the database is written; what stands there is replaced when all is done.
+        path: Where the database is written; an existing file is replaced at the end.
         meshes: Mesh files with different stems.
         silhouettes: Name -> masks (H, W) bool, whole pictures; their exemplars are added to that name.
-        progress: Told of views done.
+        progress: Callback for finished views.
         options: See `BuildOptions`.
 
     Returns:
         The database; the same bytes for the same input, whatever `jobs` is and however often the
-        build was begun.
+        build was resumed.
 
     Raises:
         SettingsError: Two meshes have the same stem, or a number is out of range.
         DatabaseError: A mesh cannot be read, or the file cannot be written.
-        ExtraMissingError: What renders meshes is not installed.
+        ExtraMissingError: The renderer is not installed.
     """
     views, jobs = options.get("views", VIEWS), options.get("jobs", 1)
     _check_names(meshes)
@@ -246,20 +246,20 @@ def build_database(
         for name, masks in silhouettes.items():
             yield from silhouette_views(name, masks, options.get("clusters", CLUSTERS))
 
-    kept = (_kept_mesh(mesh) for mesh in meshes)
+    kept = (_read_mesh_model(mesh) for mesh in meshes)
     built = ModelDatabase.create(target, stored(), kept)
     shutil.rmtree(folder, ignore_errors=True)
     return built
 
 
-def _kept_mesh(path: Path) -> MeshModel:
-    """What is kept of a mesh file beside its views."""
+def _read_mesh_model(path: Path) -> MeshModel:
+    """The mesh model of a file, stored beside its views."""
     mesh = load_mesh(path)
     return mesh_model(path.stem, mesh.vertices, mesh.faces)
 
 
 def building_folder(target: Path) -> Path:
-    """Where what is done of a build is kept until all is done."""
+    """The folder of finished parts of a build."""
     return target.parent / f".{target.name}.building"
 
 
@@ -275,7 +275,7 @@ def _check_names(meshes: Sequence[Path]) -> None:
 
 
 def _make(parts: Sequence[BuildPart], jobs: int, progress: Progress | None) -> None:
-    """Make all parts that are not made yet."""
+    """Make all missing parts."""
     done, total = 0, sum(p.count for p in parts)
 
     def tell(part: BuildPart) -> None:
@@ -307,11 +307,11 @@ def _make(parts: Sequence[BuildPart], jobs: int, progress: Progress | None) -> N
 
 
 def make_part(part: BuildPart) -> None:
-    """Render a part's views and keep them in its file.
+    """Render a part's views into its file.
 
     Raises:
         DatabaseError: The mesh cannot be read, or the file cannot be written.
-        ExtraMissingError: What renders meshes is not installed.
+        ExtraMissingError: The renderer is not installed.
     """
     directions = half_sphere_directions(part.views, part.seed)[part.first : part.first + part.count]
     new = rendered(part.mesh, directions)

@@ -1,4 +1,4 @@
-"""Views: silhouettes of a mesh as seen from directions spread evenly over the sphere.
+"""Views: silhouettes of a mesh from directions spread evenly over the sphere.
 
 Conventions: a direction is the unit vector from the object to the viewer, in the mesh's own frame. The
 projection is parallel. Roll: as in `agent/model/orientation.py`.
@@ -45,11 +45,11 @@ class RenderedView:
 
 
 def sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
-    """Directions spread evenly over the sphere: a Fibonacci lattice, turned at random.
+    """Directions spread evenly over the sphere: a Fibonacci lattice, randomly rotated.
 
     Args:
         count: How many, at least 1.
-        seed: Seed of the turn; 0 leaves the lattice as it is.
+        seed: Seed of the rotation; 0 for none.
 
     Returns:
         (count, 3) float64 unit vectors.
@@ -68,15 +68,15 @@ def sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
 
 
 def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
-    """Directions spread evenly over the sphere when each stands for its opposite too.
+    """Directions that, together with their opposites, are spread evenly over the sphere.
 
-    In parallel projection the silhouette from behind is the mirror image of the one from before, and a
-    mirrored match tells of the opposite direction: half of the sphere is enough, and is covered
-    twice as densely by as many views.
+    In parallel projection the silhouette from behind is the mirror image of the one from the front, and a
+    mirrored match indicates the opposite direction: half of the sphere suffices, and the same number of
+    views covers it twice as densely.
 
     Args:
         count: How many, at least 1.
-        seed: Seed of the turn; 0 leaves them as they are.
+        seed: Seed of the rotation; 0 for none.
 
     Returns:
         (count, 3) float64 unit vectors.
@@ -87,13 +87,13 @@ def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
         24.0
     """
     lattice = sphere_directions(2 * count)[:count]
-    # Many are even enough as they are, and each step would take long.
+    # A large lattice is even enough, and each step would be slow.
     spread = _spread(lattice) if count <= _MOST_SPREAD else lattice
     return spread if seed == 0 else np.asarray(spread @ _turn(seed).T)
 
 
 def _spread(directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Let directions and their opposites push one another apart, as charges on a sphere do."""
+    """Repel directions and their opposites from one another, like charges on a sphere."""
     out, size = directions.copy(), len(directions)
     spacing = np.sqrt(2 * np.pi / size)
     for step in range(_STEPS):
@@ -109,7 +109,7 @@ def _spread(directions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _turn(seed: int) -> NDArray[np.float64]:
-    """A rotation drawn at random."""
+    """A random rotation."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     return np.asarray(q * np.sign(np.diag(r)))
 
@@ -124,7 +124,7 @@ def load_mesh(path: Path) -> Any:
         A ``trimesh.Trimesh`` with at least one triangle.
 
     Raises:
-        DatabaseError: The file is missing, is no mesh or has no triangles.
+        DatabaseError: The file is missing, is not a mesh or has no triangles.
         ExtraMissingError: trimesh is not installed.
     """
     try:
@@ -150,7 +150,7 @@ def load_mesh(path: Path) -> Any:
 
 
 def _has_size(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> bool:
-    """Whether there are triangles, between vertices that there are, at finite places that differ."""
+    """Whether all triangles refer to existing vertices, finite and not all at one point."""
     if faces.size == 0 or vertices.size == 0 or not np.isfinite(vertices).all():
         return False
     there = faces.min() >= 0 and faces.max() < len(vertices)
@@ -195,7 +195,7 @@ def _render(
     picture: int,
     size: float,
 ) -> RenderedView:
-    """One silhouette of a mesh of unit radius; `size` turns pixels back into mesh units."""
+    """One silhouette of a mesh of unit radius; `size` converts pixels back to mesh units."""
     right, up = image_axes(direction)
     u, v = points @ right, points @ up
     pixel = max(np.ptp(u), np.ptp(v), 1e-6) / picture

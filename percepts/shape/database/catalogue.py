@@ -1,8 +1,7 @@
-"""What the code sees of a database file: its views and its shapes, made when they are asked for.
+"""Lazy sequences of the views and shapes in a database file.
 
-A database of a hundred thousand views is a few arrays and one open file. `Views` and `Shapes` are
-sequences like any other; an element is made from its record when it is asked for, and the shapes asked
-for last are kept.
+A database of a hundred thousand views is a few arrays and one open file. `Views` and `Shapes` create an
+element from its record on access; recently used shapes are cached.
 """
 
 from __future__ import annotations
@@ -25,15 +24,15 @@ from visup.percepts.shape.database.file_reader import open_checked, read_content
 from visup.percepts.shape.index.view_records import Direction, InvalidRecordError, ModelView, decode
 from visup.percepts.shape.matching.shape_similarity import Shape
 
-KEPT = 4096
-"""Shapes kept in memory at most, about 20 kB each."""
+CACHED = 4096
+"""Most shapes cached in memory, about 20 kB each."""
 
 
 class Views(Sequence[ModelView]):
     """The views of a database.
 
     Args:
-        contents: What stands in the file.
+        contents: The contents of the file.
     """
 
     def __init__(self, contents: FileContents) -> None:
@@ -44,7 +43,7 @@ class Views(Sequence[ModelView]):
         """The views of a file.
 
         Raises:
-            DatabaseError: It is no sound model database.
+            DatabaseError: It is not a valid model database.
         """
         return cls(read_contents(path))
 
@@ -56,7 +55,7 @@ class Views(Sequence[ModelView]):
     @overload
     def __getitem__(self, key: slice) -> tuple[ModelView, ...]: ...
     def __getitem__(self, key: int | slice) -> ModelView | tuple[ModelView, ...]:
-        """A view by its number in the file, from 0; or some of them."""
+        """A view by its number in the file, from 0; or a slice."""
         if isinstance(key, slice):
             return tuple(self._view(k) for k in range(len(self))[key])
         return self._view(range(len(self))[key])
@@ -65,7 +64,7 @@ class Views(Sequence[ModelView]):
         return (self._view(k) for k in range(len(self)))
 
     def name_of(self, number: int) -> str:
-        """Name of the model that a view is of, by the view's number in the file."""
+        """Name of a view's model, by the view's number in the file."""
         return self.names[int(self.records[number]["model"])]
 
     def _view(self, number: int) -> ModelView:
@@ -89,7 +88,7 @@ class Views(Sequence[ModelView]):
 
     @property
     def records(self) -> NDArray[Any]:
-        """(V,) records of `view_records.VIEW`: all that is known but the shapes."""
+        """(V,) records of `view_records.VIEW`: everything but the shapes."""
         return self._contents.views
 
     @property
@@ -106,7 +105,7 @@ class Views(Sequence[ModelView]):
         return out
 
     def named(self, names: Collection[str] | None) -> NDArray[np.intp]:
-        """Numbers of the views of these models, rising; of all when None."""
+        """Numbers of the views of these models, ascending; of all when None."""
         if names is None:
             return np.arange(len(self))
         codes = [code for code, name in enumerate(self.names) if name in names]
@@ -119,7 +118,7 @@ def _direction(vector: NDArray[np.float64]) -> Direction:
 
 
 class Shapes(Sequence[Shape]):
-    """The shapes of a database, read one by one when they are asked for. Safe in several threads.
+    """The shapes of a database, read one by one on access. Thread-safe.
 
     Args:
         path: The file.
@@ -140,7 +139,7 @@ class Shapes(Sequence[Shape]):
     @overload
     def __getitem__(self, key: slice) -> tuple[Shape, ...]: ...
     def __getitem__(self, key: int | slice) -> Shape | tuple[Shape, ...]:
-        """A shape by its view's number in the file, from 0; or some of them.
+        """A shape by its view's number in the file, from 0; or a slice.
 
         Raises:
             DatabaseError: The file is damaged there.
@@ -157,14 +156,14 @@ class Shapes(Sequence[Shape]):
 
     def _shape(self, number: int) -> Shape:
         with self._lock:
-            kept = self._kept.get(number)
-            if kept is None:
-                kept = self._kept[number] = self._read(number)
-                if len(self._kept) > KEPT:
+            cached = self._kept.get(number)
+            if cached is None:
+                cached = self._kept[number] = self._read(number)
+                if len(self._kept) > CACHED:
                     self._kept.popitem(last=False)
             else:
                 self._kept.move_to_end(number)
-            return kept
+            return cached
 
     def _read(self, number: int) -> Shape:
         stored = read_shape(self._path, self._file, number)

@@ -1,10 +1,10 @@
-"""The format of a database file: its tables, versions and check sums, and how damage is reported.
+"""The format of a database file: tables, versions, check sums, and reporting of damage.
 
-One SQLite file. What is needed of every view (its model, direction, root and sketch) stands in a few
-blocks, so that opening a hundred thousand views reads some megabytes; each shape stands in a row of its
-own and is read when it is asked for. All bytes have a check sum: what is read is what was written.
+One SQLite file. What every search needs of a view (its model, direction, root and sketch) is stored in a few
+blocks, so that opening a hundred thousand views reads some megabytes; each shape has a row of its own and is
+read on demand. All bytes are covered by check sums.
 
-Version 3 has taught views (`taught_records.py`) besides; a file of version 2 is read, and becomes one of
+Version 3 adds taught views (`taught_records.py`); a file of version 2 can be read, and is upgraded to
 version 3 when something is added to it.
 
 Read next: `file_writer.py`, `file_reader.py`.
@@ -24,16 +24,16 @@ APPLICATION_ID = 0x76697375
 """'visu' in ASCII, in the header of every database file."""
 
 VERSION = 3
-"""Version of the tables; a newer file is refused, since its meaning is not known."""
+"""Version of the tables; a newer file is refused, since its meaning is unknown."""
 
 OLDEST = 2
-"""Version of the oldest tables that are read."""
+"""Oldest version that can be read."""
 
 BLOCK = 1024
-"""Views of a block at most."""
+"""Most views in a block."""
 
 MOST_NAME = 200
-"""Characters of a model's name at most."""
+"""Most characters in a model's name."""
 
 TABLES = (
     "CREATE TABLE layout (part TEXT PRIMARY KEY, meaning TEXT NOT NULL)",
@@ -52,15 +52,15 @@ TABLES_OF = {OLDEST: TABLES[:-2], VERSION: TABLES}
 """Version -> its tables."""
 
 MOST_BYTES = 1 << 25
-"""Of a row: the picture of a large thing in a large frame has to fit."""
+"""Largest row: it must hold the picture of a large object in a large frame."""
 
-# Messages about damaged tables quote them, and are no text when what they quote is none.
+# Messages about damaged tables quote their content, which may not be valid text.
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
 BUILD_HINT = "build it anew with 'visup models build'"
 
 
 def checksum(number: int, *parts: bytes) -> int:
-    """Check sum of a row; its number is in it, so that rows cannot change places."""
+    """Check sum of a row; it includes the row's number, so that rows cannot be swapped."""
     total = number
     for part in parts:
         total = zlib.crc32(part, total)
@@ -69,10 +69,10 @@ def checksum(number: int, *parts: bytes) -> int:
 
 @dataclass(frozen=True, slots=True)
 class TaughtRow:
-    """A taught view as it stands in the file.
+    """A taught view as stored in the file.
 
     Attributes:
-        name: Of the thing.
+        name: Name of the object.
         place: x, y of the image in the picture, and the picture's width and height, pixels.
         image: PNG, three channels.
         mask: PNG, one channel, 0 and 255.
@@ -86,18 +86,18 @@ class TaughtRow:
     scene: bytes
 
     def checksum(self, number: int) -> int:
-        """Of the row with this number."""
+        """Check sum of the row with this number."""
         text = "\n".join((self.name, *map(str, self.place))).encode()
         return checksum(number, text, self.image, self.mask, self.scene)
 
 
 @dataclass(frozen=True, slots=True)
 class MeshRow:
-    """A mesh as it stands in the file; see `refinement/mesh_model.py`.
+    """A mesh as stored in the file; see `refinement/mesh_model.py`.
 
     Attributes:
-        name: Of the model.
-        radius: Of the mesh, its own units.
+        name: Name of the model.
+        radius: Radius of the mesh, in its own units.
         vertices: (V, 3) little-endian float32.
         faces: (F, 3) little-endian int32.
     """
@@ -108,21 +108,21 @@ class MeshRow:
     faces: bytes
 
     def checksum(self, number: int) -> int:
-        """Of the row with this number."""
+        """Check sum of the row with this number."""
         text = f"{self.name}\n{self.radius!r}".encode()
         return checksum(number, text, self.vertices, self.faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileContents:
-    """All that stands in a file but the shapes.
+    """The contents of a file except the shapes.
 
     Attributes:
         names: Names of the models, in the order of the file.
         views: (V,) records of `VIEW`.
-        also: (A,) records of `ALSO`, rising by view (from 0).
-        taught: What was taught, in the order of teaching.
-        meshes: What poses are fitted with.
+        also: (A,) records of `ALSO`, ascending by view (from 0).
+        taught: Taught views, in the order of teaching.
+        meshes: Meshes for pose fitting.
     """
 
     names: tuple[str, ...]
@@ -133,7 +133,7 @@ class FileContents:
 
 
 def damaged(path: Path, found: str, expected: str) -> DatabaseError:
-    """The error of a file that is a database, but not a sound one."""
+    """The error for a database that is damaged."""
     return DatabaseError(
         f"this model database is damaged: {found}",
         where=str(path),
@@ -143,7 +143,7 @@ def damaged(path: Path, found: str, expected: str) -> DatabaseError:
 
 
 def unreadable(path: Path, error: object) -> DatabaseError:
-    """The error of a file that is no database at all, or that SQLite cannot read."""
+    """The error for a file that is not a database or that SQLite cannot read."""
     return DatabaseError(
         f"this is not a model database that can be read ({error})",
         where=str(path),

@@ -1,7 +1,7 @@
-"""Reading a database file, and refusing what is not as it was written.
+"""Reading and validating a database file.
 
-A file may come from anybody: its header, tables, layout, check sums and values are looked at before any
-of it is used.
+A file may come from anybody: its header, tables, layout, check sums and values are checked before any of it
+is used.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def open_checked(path: Path) -> sqlite3.Connection:
 
 
 def _check_header(path: Path) -> None:
-    """Look at the first 100 bytes, as SQLite's file format defines them, before SQLite does."""
+    """Check the first 100 bytes, SQLite's file header, before SQLite reads them."""
     try:
         with path.open("rb") as file:
             header = file.read(100)
@@ -110,7 +110,7 @@ def _check_header(path: Path) -> None:
 
 
 def _check_tables(path: Path, file: sqlite3.Connection) -> None:
-    """Only tables as we write them: a view or a trigger of a foreign file could compute for ever."""
+    """Allow only our own tables: a view or trigger in a foreign file could run for ever."""
     file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
     file.execute("PRAGMA trusted_schema = OFF")
     file.execute("PRAGMA cell_size_check = ON")
@@ -136,10 +136,10 @@ def version_of(file: sqlite3.Connection) -> int:
 
 
 def read_contents(path: Path) -> FileContents:
-    """All that stands in a database but the shapes.
+    """Read the contents of a database except the shapes.
 
     Raises:
-        DatabaseError: As `open_checked`; or what stands there is not as it should be.
+        DatabaseError: As `open_checked`; or the contents are invalid.
     """
     with closing(open_checked(path)) as file:
         try:
@@ -162,7 +162,7 @@ def read_contents(path: Path) -> FileContents:
 def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:
     names: list[str] = []
     for code, name, crc in file.execute("SELECT code, name, crc FROM models ORDER BY code"):
-        # A damaged tree may lead round in circles: codes that do not count up end the reading.
+        # A damaged B-tree may contain cycles: reading stops unless codes count up.
         if code != len(names) or not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
             raise InvalidRecordError(f"model {len(names)} without a name")
         if crc != checksum(code, name.encode()):
@@ -189,10 +189,10 @@ def _read_blocks(file: sqlite3.Connection) -> tuple[Records, Records]:
 
 
 def _check_views(views: Records, also: Records, models: int) -> None:
-    """Refuse views that cannot be, whoever has computed their check sums.
+    """Reject impossible views, even with correct check sums.
 
     Raises:
-        NotAsExpectedError: There are some.
+        InvalidRecordError: A view is impossible.
     """
     used = np.unique(views["model"])
     if len(used) and int(used[-1]) >= models:
@@ -222,7 +222,7 @@ def _check_views(views: Records, also: Records, models: int) -> None:
 
 
 def _numbers_within(models: Records) -> Records:
-    """For each view how many views of its model come before it."""
+    """For each view, the number of earlier views of its model."""
     order = np.argsort(models, kind="stable")
     counts = np.bincount(models.astype(np.intp)) if len(models) else np.empty(0, np.intp)
     out = np.empty(len(models), dtype=np.intp)
@@ -239,7 +239,7 @@ def read_shape(path: Path, file: sqlite3.Connection, view: int) -> ShapeBytes:
         view: Number of the view in the file, from 0.
 
     Raises:
-        DatabaseError: They are not there, or not those that were written.
+        DatabaseError: They are missing or damaged.
     """
     query = "SELECT nodes, edges, contour, crc FROM shapes WHERE view = ?"
     try:

@@ -1,6 +1,6 @@
-"""Writing a database file: whole or not at all.
+"""Writing a database file atomically.
 
-Views are appended in blocks to a copy beside the file, which takes its place when all went well.
+Views are appended in blocks to a copy beside the file, which replaces it on success.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from visup.percepts.shape.silhouette.height_functions import outline_heights
 from visup.percepts.taught.view import TaughtView
 
 WHAT = "this model database"
-"""What the lock of a database's file is for."""
+"""What messages about the file lock call a database."""
 
 
 def write_new(
@@ -54,7 +54,7 @@ def write_new(
     taught: Iterable[TaughtView] = (),
     meshes: Iterable[MeshModel] = (),
 ) -> None:
-    """Write a database with these views, in place of whatever stands at the path.
+    """Write a database with these views, replacing any file at the path.
 
     Raises:
         DatabaseError: The file cannot be written; nothing is left behind.
@@ -78,24 +78,24 @@ def write_new(
 def write_more(
     path: Path, views: Iterable[NewView] = (), taught: Iterable[TaughtView] = ()
 ) -> None:
-    """Add views to a database; the file is replaced whole, or left as it was.
+    """Add views to a database; the file is replaced atomically.
 
-    A file of an older version becomes one of this version.
+    A file of an older version is upgraded.
 
     Raises:
-        DatabaseError: The file is no database that can be read, or cannot be written.
+        DatabaseError: The file is not a readable database, or cannot be written.
     """
     with only_writer(path, WHAT), _replacing(path) as temporary:
-        before = read_contents(path)  # as it is once nobody else writes
+        before = read_contents(path)  # read while holding the lock
         shutil.copyfile(path, temporary)
         with closing(sqlite3.connect(temporary)) as file:
-            _renew(file)
+            _upgrade(file)
             _insert(file, before, views)
             insert_taught(file, len(before.taught), map(encoded, taught))
 
 
-def _renew(file: sqlite3.Connection) -> None:
-    """Give an older file the tables that it lacks."""
+def _upgrade(file: sqlite3.Connection) -> None:
+    """Add the tables that an older file lacks."""
     for table in TABLES[len(TABLES_OF[version_of(file)]) :]:
         file.execute(table)
     file.execute(f"PRAGMA user_version = {VERSION}")
@@ -103,7 +103,7 @@ def _renew(file: sqlite3.Connection) -> None:
 
 @contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside the path that takes its place when all went well."""
+    """A temporary file beside the path that replaces it on success."""
     if not path.parent.is_dir():
         raise DatabaseError(
             "the database cannot be written (there is no such folder)",
@@ -154,7 +154,7 @@ def _block(
         rows[k]["border"] = np.nan if view.shape.border is None else view.shape.border
         rows[k]["areas"] = view.shape.areas
         rows[k]["root"] = node_records(view.shape.graph)[0]
-        # Of the outline as it will be read, so that it does not matter where a view comes from.
+        # Of the outline in its stored precision, so that every copy of a view gets the same sketch.
         rows[k]["sketch"] = sketch(outline_heights(np.asarray(view.shape.contour, POINT.base)))
         also += [(start + k, d) for d in view.also]
     return rows, np.array(also, dtype=ALSO)

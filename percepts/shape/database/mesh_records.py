@@ -1,4 +1,4 @@
-"""Meshes as rows of a database file: what poses are fitted with, a check sum over all."""
+"""Meshes for pose fitting as rows of a database file, with check sums."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def decoded_mesh(path: Path, row: MeshRow) -> MeshModel:
     """The mesh of a row.
 
     Raises:
-        DatabaseError: What stands there is none.
+        DatabaseError: The row holds no valid mesh.
     """
     try:
         return stored_mesh(row.name, row.radius, row.vertices, row.faces)
@@ -30,10 +30,10 @@ def decoded_mesh(path: Path, row: MeshRow) -> MeshModel:
 
 
 def read_meshes(file: sqlite3.Connection) -> tuple[MeshRow, ...]:
-    """All rows of a file, their check sums looked at.
+    """All mesh rows of a file, with verified check sums.
 
     Raises:
-        InvalidRecordError: They are not those that were written.
+        InvalidRecordError: A row is damaged.
     """
     rows: list[MeshRow] = []
     query = "SELECT number, name, radius, vertices, faces, crc FROM meshes ORDER BY number"

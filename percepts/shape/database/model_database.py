@@ -1,7 +1,6 @@
-"""The model database: names, views and shapes, and what a silhouette looks like of them.
+"""The model database: names, views and shapes, and queries by silhouette.
 
-Read `search.py` for the search, `file_format.py` for the file and `database_builder.py` for what goes
-into it.
+Read `search.py` for the search, `file_format.py` for the file and `database_builder.py` for building it.
 """
 
 from __future__ import annotations
@@ -33,20 +32,20 @@ from visup.percepts.taught.view import TaughtView
 __all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
 
 CANDIDATES = 20
-"""Views whose outlines are compared when no budget asks for fewer."""
+"""Views whose outlines are compared, unless a budget allows fewer."""
 
 
 class QueryOptions(TypedDict, total=False):
-    """What may be asked of a ranking.
+    """Options of a ranking.
 
     Attributes:
-        top: How many matches are wanted; 10 unless told.
-        per_name: How many views of one model may be among them; any number when None, as usual.
-        threshold: Least similarity; 0 unless told.
-        restrict: Names that alone are searched; all when None, as usual.
+        top: Number of matches; default 10.
+        per_name: Most views of one model among them; unlimited when None, the default.
+        threshold: Least similarity; default 0.
+        restrict: The only names to search; all when None, the default.
         try_first: Names whose likeliest views are compared whatever the index says.
-        mirror: Whether a view is also recognised by its mirror image, which is what is seen from
-            behind; so unless told.
+        mirror: Whether a view also matches by its mirror image, which is its silhouette from behind;
+            default True.
     """
 
     top: int
@@ -58,13 +57,13 @@ class QueryOptions(TypedDict, total=False):
 
 
 class ModelDatabase:
-    """Views of models, read from one file; each shape is read when it is first looked at.
+    """Views of models in one file; each shape is read on first use.
 
     Args:
         path: The file.
-        views: The views of meshes and silhouettes that stand in it.
-        taught: What was taught, as it stands in it.
-        meshes: Meshes, as they stand in it.
+        views: The views of meshes and silhouettes in it.
+        taught: Taught views, as stored.
+        meshes: Meshes, as stored.
     """
 
     def __init__(
@@ -92,10 +91,10 @@ class ModelDatabase:
 
     @classmethod
     def open_or_new(cls, path: Path | str) -> ModelDatabase:
-        """Open a database file; where none is, one without views is written.
+        """Open a database file; create an empty one if there is none.
 
         Raises:
-            DatabaseError: What is there is no sound database, or none can be written there.
+            DatabaseError: The file is not a valid database, or cannot be written.
         """
         with only_writer(Path(path), WHAT):
             return cls.open(path) if Path(path).exists() else cls.create(path)
@@ -107,12 +106,12 @@ class ModelDatabase:
         views: Iterable[NewView] = (),
         meshes: Iterable[MeshModel] = (),
     ) -> ModelDatabase:
-        """Write a database with these views, in place of whatever stands at the path, and open it.
+        """Write a database with these views, replacing any file at the path, and open it.
 
         Args:
-            path: Where.
+            path: The file.
             views: In the order in which they are numbered.
-            meshes: What the poses of models are fitted with, each model's once.
+            meshes: Meshes for pose fitting, at most one per model.
 
         Raises:
             DatabaseError: The file cannot be written.
@@ -121,12 +120,12 @@ class ModelDatabase:
         return cls.open(path)
 
     def names(self) -> tuple[str, ...]:
-        """Names of the models, in the order of the file; those that were only taught come last."""
+        """Names of the models, in the order of the file; those only taught come last."""
         return tuple(dict.fromkeys((*self.views.names, *(row.name for row in self._taught))))
 
     @cached_property
     def taught(self) -> tuple[TaughtView, ...]:
-        """What was taught, in the order of teaching.
+        """Taught views, in the order of teaching.
 
         Raises:
             DatabaseError: The file is damaged there.
@@ -144,7 +143,7 @@ class ModelDatabase:
 
     @cached_property
     def shapes(self) -> Shapes:
-        """Shapes of all views, in the order of `views`; each is read when it is asked for."""
+        """Shapes of all views, in the order of `views`; each is read on access."""
         return Shapes(self.path, self.views)
 
     @cached_property
@@ -152,15 +151,15 @@ class ModelDatabase:
         return ViewSearch(self.views, self.shapes)
 
     def neighbours(self, view: ModelView) -> tuple[ModelView, ...]:
-        """Views of the same model that are next to a view on the sphere of directions.
+        """Views of the same model adjacent to a view on the sphere of directions.
 
-        Each view stands for its directions and, mirrored, for the opposite ones.
+        Each view covers its directions and, mirrored, the opposite ones.
 
         Args:
             view: One of this database.
 
         Returns:
-            Its neighbours, rising by number; none when its direction is not known.
+            Its neighbours, ascending by number; none when its direction is unknown.
         """
         own = self.views.named({view.name})
         if view.name not in self._neighbours:
@@ -175,14 +174,14 @@ class ModelDatabase:
         budget: float = 0.1,
         **options: Unpack[QueryOptions],
     ) -> tuple[Ranking, ...]:
-        """Rank the views that each of several shapes looks like, such as all regions of a frame.
+        """Rank the views for each of several shapes, such as all regions of a frame.
 
         Args:
-            shapes: Masks (H, W) bool of what no border cuts, silhouettes or shapes.
-            budget_ms: Milliseconds for all together on the machine of the benchmarks, shared evenly;
+            shapes: Masks (H, W) bool not cut by a border, silhouettes or shapes.
+            budget_ms: Milliseconds for all shapes on the benchmark machine, shared evenly;
                 the likeliest views are compared first. See `time_budget.py`.
             budget: See `query`.
-            options: For each shape, as for `query`.
+            options: As for `query`, applied to each shape.
 
         Returns:
             A ranking for each shape.
@@ -192,7 +191,7 @@ class ModelDatabase:
         return tuple(self.query(shape, budget=budget, **options) for shape in shapes)
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
-        """Add views, to names new or known; the database as it is then. See `database_builder.py`.
+        """Add views, to new or known names, and return the updated database.
 
         Raises:
             DatabaseError: The file cannot be written; it stays as it was.
@@ -201,22 +200,22 @@ class ModelDatabase:
         return ModelDatabase.open(self.path)
 
     def teach(self, views: Iterable[TaughtView], *, silhouettes: bool = False) -> ModelDatabase:
-        """Add what was taught, all of it or nothing; the database as it is then.
+        """Add taught views, all or none, and return the updated database.
 
-        A view that is there already is not added once more.
+        Views already present are not added again.
 
         Args:
-            views: Of things new or known.
-            silhouettes: Whether each outline is stored as a view of a silhouette besides, with its shock
-                graph. Not unless told: what was taught is recognised by its appearance, and by
-                shape alone things that look alike lend each other votes, and fragments take names.
+            views: Views of new or known objects.
+            silhouettes: Whether each outline is also stored as a silhouette view with its shock graph.
+                Off by default: taught objects are recognised by appearance, and by shape alone similar
+                objects exchange votes and fragments take names.
 
         Raises:
             DatabaseError: The file cannot be written, or a view is too large; it stays as it was.
         """
         new = {encoded(v).checksum(0): v for v in views}
         with only_writer(self.path, WHAT):
-            # Somebody else may have taught the same since this database was opened.
+            # Another process may have taught the same since this database was opened.
             known = {row.checksum(0) for row in read_contents(self.path).taught}
             fresh = [view for key, view in new.items() if key not in known]
             if not fresh:
@@ -233,20 +232,20 @@ class ModelDatabase:
         budget: float = 0.1,
         **options: Unpack[QueryOptions],
     ) -> Ranking:
-        """Rank the views that a shape looks like.
+        """Rank the views by similarity to a shape.
 
-        A cut shape is compared with cut views as it is, and with whole views as they look when they are
-        cut in the same way; one of which it is not known where the border lies, as it is.
+        A cut shape is compared with cut views as it is, and with whole views after cutting them in the same
+        way; if the position of its border is unknown, with all views as it is.
 
         Args:
             shape: A mask (H, W) bool, a silhouette or a shape.
-            cut: Whether the image border cuts the mask; a silhouette or shape has its own mark.
+            cut: Whether the image border cuts the mask; silhouettes and shapes have their own flag.
             budget: Share of the views that may be compared in full: at least 16 are (4 when less than
-                the usual tenth is asked for), and at most `CANDIDATES`. With 1, all are.
+                the default tenth is asked for), and at most `CANDIDATES`. With 1, all are.
             options: See `QueryOptions`.
 
         Returns:
-            The matches, best first; empty when the mask shows nothing.
+            The matches, best first; empty when the mask has no shape.
         """
         query = as_shape(shape, cut)
         if query is None or not self.views:
@@ -272,20 +271,20 @@ class ModelDatabase:
 
 
 def candidates_wanted(views: int, budget: float = 0.1) -> int:
-    """How many of so many views are compared in full: a share of them, within limits (see `query`)."""
+    """How many of `views` are compared in full: a share of them, within limits (see `query`)."""
     if budget >= 1:
         return views
     return int(min(CANDIDATES, max(16 if budget >= 0.1 else 4, budget * views)))
 
 
 def taught_silhouette(view: TaughtView) -> NewView | None:
-    """The silhouette of a taught outline as a view; None when it has no shape."""
+    """A taught outline as a silhouette view; None when it has no shape."""
     shape = as_shape(view.mask, looks_cut(view.mask))
     return None if shape is None else NewView(view.name.strip(), None, None, shape)
 
 
 def as_shape(shape: NDArray[np.bool_] | Silhouette | Shape, cut: bool = False) -> Shape | None:
-    """The shape of a mask, a silhouette or itself; None when a mask shows nothing."""
+    """The shape of a mask or silhouette, or itself; None when a mask has no shape."""
     if isinstance(shape, Shape):
         return shape
     silhouette = shape if isinstance(shape, Silhouette) else normalise(shape, cut=cut)

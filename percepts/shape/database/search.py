@@ -1,9 +1,9 @@
-"""The search: from a shape to the views that it looks like, best first.
+"""The search: from a shape to its most similar views, best first.
 
-Whole shapes: the index leaves the likeliest views; their areas and outlines are compared at once, then
-their shock graphs, until no other view can do better. Shapes that the image border cuts: the views that
-look most like it once they are cut in the same way (`truncated_views.py`) are compared likewise, their
-graphs as a whole of which the shape is a part.
+Whole shapes: the index selects the likeliest views; their areas and outlines are compared first, then their
+shock graphs, until no other view can do better. Shapes cut by the image border: the views most similar to it
+after the same cut (`truncated_views.py`) are compared in the same way, with the shape's graph as a part of
+theirs.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from visup.percepts.shape.matching.truncated_views import CutIndex, CutLine, que
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
 
 CUT_SHARE = 0.95
-"""What a likeness counts for which a whole view had to be cut: where to cut is free to fit."""
+"""Factor of a similarity for which a whole view had to be cut, since the cut is a free parameter."""
 
 CUT_SHARES = (0.05, 0.8, 0.15)
-"""Shares of graph, outline and area in that likeness: what a line takes away changes a skeleton most, and the
-area has had its say in where to cut."""
+"""Shares of graph, outline and area in that similarity: a cut changes a skeleton most, and the area already
+decided where to cut."""
 
 CUT_BREADTH = 6
-"""Times as many views as of whole silhouettes whose outlines are compared: with the border to begin at, that
-is as quick, and a part looks like more things than a whole."""
+"""Factor of outlines compared relative to whole silhouettes: starting at the border they are as quick to
+compare, and a part resembles more objects than a whole."""
 
 CUT_VIEWS = 1000
-"""Whole views that are cut for one silhouette at most; of more, those whose areas lie best on it."""
+"""Most whole views cut for one silhouette; of more, those of best area overlap."""
 
 _PART_WEIGHTS = MatchWeights(
     kind=0.3, length=0.8, profile=3.5, context=0.0, signature=0.0, root=0.0
@@ -56,12 +56,12 @@ _PART_WEIGHTS = MatchWeights(
 
 @dataclass(frozen=True, slots=True)
 class ViewMatch:
-    """A view that a silhouette looks like.
+    """A view that matches a silhouette.
 
     Attributes:
         view: The view.
-        likeness: How alike the two are, and why; pairs of nodes are (query, view, similarity).
-        cut: Where the view was cut to look like a silhouette that the image border cuts.
+        likeness: Their similarity and its terms; pairs of nodes are (query, view, similarity).
+        cut: Where the view was cut to match a silhouette cut by the image border.
     """
 
     view: ModelView
@@ -77,17 +77,17 @@ class ViewMatch:
     def rotation(self) -> float:
         """In-plane rotation from view to query, radians (positive from x towards y, y down).
 
-        Of a mirrored match, the rotation from the view's left-right mirror image, which is what is seen
+        For a mirrored match, the rotation from the view's left-right mirror image, which is the silhouette
         from the opposite direction.
         """
         return self.likeness.rotation
 
     @property
     def direction(self) -> tuple[float, float, float] | None:
-        """Unit vector from the object to the viewer, model frame; None when it is not known.
+        """Unit vector from the object to the viewer, model frame; None when unknown.
 
-        In parallel projection the silhouette from behind is the mirror image of the one from before,
-        so that a mirrored match tells of the opposite direction.
+        In parallel projection the silhouette from behind is the mirror image of the one from the front, so
+        a mirrored match indicates the opposite direction.
         """
         if self.view.direction is None or not self.likeness.mirrored:
             return self.view.direction
@@ -101,7 +101,7 @@ class Ranking:
 
     Attributes:
         matches: Best first.
-        compared: How many views were compared in full.
+        compared: Number of views compared in full.
     """
 
     matches: tuple[ViewMatch, ...]
@@ -110,13 +110,13 @@ class Ranking:
 
 @dataclass(frozen=True, slots=True)
 class SearchLimits:
-    """What is wanted of a search.
+    """Limits of a search.
 
     Attributes:
-        top: How many matches.
-        per_name: How many of one model at most; any number when None.
+        top: Number of matches.
+        per_name: Most matches of one model; unlimited when None.
         threshold: Least similarity.
-        most: How many views may be compared in full.
+        most: Most views compared in full.
         mirror: Whether mirror images count.
     """
 
@@ -127,22 +127,22 @@ class SearchLimits:
     mirror: bool
 
     def best(self, found: Iterable[ViewMatch]) -> list[ViewMatch]:
-        """The best matches, no more than so many of one model."""
+        """The best matches, at most `per_name` of one model."""
         seen: dict[str, int] = {}
-        kept = []
+        chosen = []
         for m in sorted(found, key=lambda m: (-m.similarity, m.view.id)):
             seen[m.view.name] = seen.get(m.view.name, 0) + 1
             within = self.per_name is None or seen[m.view.name] <= self.per_name
             if within and m.similarity >= self.threshold:
-                kept.append(m)
-        return kept[: self.top]
+                chosen.append(m)
+        return chosen[: self.top]
 
     def least(self, found: Sequence[ViewMatch], name: str) -> float:
-        """What a further match of a model must reach to change the result.
+        """The similarity that a further match of a model must exceed to change the result.
 
         Args:
             found: The best matches so far, best first.
-            name: Of the model.
+            name: Name of the model.
         """
         least = found[-1].similarity if len(found) >= self.top else self.threshold
         if self.per_name is None:
@@ -165,7 +165,7 @@ class ViewSearch:
 
     @cached_property
     def index(self) -> ViewIndex:
-        """The sieves that leave the likeliest views."""
+        """The index that selects the likeliest views."""
         rows = self._views.records
         return ViewIndex(self._shapes, summaries=ViewSummaries.read(rows))
 
@@ -184,13 +184,13 @@ class ViewSearch:
         wanted: SearchLimits,
         favoured: NDArray[np.intp] | None = None,
     ) -> Ranking:
-        """The views that a shape looks like as it is.
+        """The views most similar to a shape as it is.
 
         Args:
             query: The shape.
-            among: Numbers of the views to be searched, rising.
-            wanted: What is wanted.
-            favoured: Numbers of views of which as many are compared, whatever the index says.
+            among: Numbers of the views to search, ascending.
+            wanted: Limits.
+            favoured: Numbers of views of which as many again are compared, whatever the index says.
         """
         likely = self.index.candidates(query, among, wanted.most, favoured)
         shapes = [self._shapes[k] for k in likely.numbers]
@@ -215,7 +215,7 @@ class ViewSearch:
         return Ranking(tuple(found), len(likely.numbers))
 
     def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> GraphMatch:
-        """Graphs matched in their own order, so that the result does not depend on who asks."""
+        """Match graphs in a canonical order, so that the result does not depend on the caller."""
         a, b = query.graph, self._shapes[number].graph
         root = self.index.weights.root
         if b.key < a.key:
@@ -223,12 +223,12 @@ class ViewSearch:
         return match_nodes(a, b, similar, root)
 
     def cut(self, query: Shape, among: NDArray[np.intp], wanted: SearchLimits) -> Ranking:
-        """The whole views that a shape looks like which the image border cuts.
+        """The whole views most similar to a shape cut by the image border.
 
         Args:
             query: The shape; its border must be known.
-            among: Numbers of whole views to be searched, rising.
-            wanted: What is wanted.
+            among: Numbers of the whole views to search, ascending.
+            wanted: Limits.
         """
         border = query.border
         if border is None or not len(among):
@@ -255,11 +255,11 @@ class ViewSearch:
     def _cut_looks(
         self, contour: NDArray[np.floating], border: float, likely: Sequence[tuple[int, CutLine]]
     ) -> OutlineAreaSimilarities:
-        """How a cut silhouette's outline and area are like those of views, each cut by its line."""
+        """Outline and area similarities of a cut silhouette with views, each cut by its line."""
         views = [self._shapes[number].contour for number, _ in likely]
         lines = np.array([(c.bearing, c.offset, c.mirrored) for _, c in likely]).reshape(-1, 3)
         mirrored = lines[:, 2] > 0
-        # The border tells the rotation.
+        # The border fixes the rotation.
         turned = np.where(mirrored, border + lines[:, 0] - np.pi, border - lines[:, 0])
         return OutlineAreaSimilarities(
             compare_cut_outlines(contour, border, views, lines),
@@ -272,7 +272,7 @@ class ViewSearch:
     def _part(self, query: Shape, number: int, cut: CutLine, least: float) -> GraphMatch:
         """The query's graph as a part of a view's, in the view's unit of length.
 
-        Where they cannot give so much to the similarity as is needed, nothing is matched.
+        Not matched when an upper bound shows that the similarity cannot reach `least`.
         """
         graph = _scaled(query.graph, (1.0 - cut.share) ** 0.5)
         bounds, similar = self._part_index.bounds(graph, np.array([number]), part=True)

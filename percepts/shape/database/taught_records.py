@@ -1,7 +1,7 @@
-"""Taught views as rows of a database file: pictures as PNG, the rest as numbers, a check sum over all.
+"""Taught views as rows of a database file: pictures as PNG, numbers, and a check sum.
 
-The rows are read and their check sums looked at when a database is opened; the pictures are decoded when
-they are first asked for, since a search by shape alone needs none of them.
+Rows are read and their check sums verified when a database is opened; pictures are decoded on first use,
+since a search by shape alone needs none.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from visup.percepts.shape.index.view_records import InvalidRecordError
 from visup.percepts.taught.view import LEAST_PIXELS, SCENE_WIDTH, TaughtView
 
 MOST_PICTURE = 1 << 25
-"""Pixels of a stored picture at most: a small file may unpack to a huge picture."""
+"""Most pixels of a stored picture: a small file may unpack to a huge picture."""
 
 _COLUMNS = "name, x, y, width, height, image, mask, scene, crc"
 _PNG_HEADER = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 
 def checked_name(name: str) -> str:
-    """A thing's name as it is stored, without blanks around it.
+    """An object's name as stored, without surrounding blanks.
 
     Raises:
-        DatabaseError: It is none.
+        DatabaseError: The name is not valid.
     """
     bare = name.strip()
     if not 0 < len(bare) <= MOST_NAME or not bare.isprintable():
@@ -73,7 +73,7 @@ def decoded(path: Path, number: int, row: TaughtRow) -> TaughtView:
     """The view of a row.
 
     Raises:
-        DatabaseError: What stands there is none.
+        DatabaseError: The row holds no valid view.
     """
     try:
         image, scene = _colours(row.image), _colours(row.scene)
@@ -96,7 +96,7 @@ def _colours(data: bytes) -> NDArray[np.uint8]:
 
 
 def _decode(data: bytes, kind: int) -> NDArray[np.uint8]:
-    """The picture of a PNG of likely size."""
+    """Decode a PNG, refusing implausible sizes."""
     if not data.startswith(_PNG_HEADER) or len(data) < 33:
         raise InvalidRecordError("a picture that is none")
     width, height = (int.from_bytes(data[a : a + 4], "big") for a in (16, 20))
@@ -128,10 +128,10 @@ def _check(
 
 
 def read_taught(file: sqlite3.Connection) -> tuple[TaughtRow, ...]:
-    """All rows of a file, their check sums looked at.
+    """All taught rows of a file, with verified check sums.
 
     Raises:
-        InvalidRecordError: They are not those that were written.
+        InvalidRecordError: A row is damaged.
     """
     rows: list[TaughtRow] = []
     query = f"SELECT number, {_COLUMNS} FROM taught ORDER BY number"
@@ -151,7 +151,7 @@ def read_taught(file: sqlite3.Connection) -> tuple[TaughtRow, ...]:
 
 
 def insert_taught(file: sqlite3.Connection, before: int, rows: Iterable[TaughtRow]) -> None:
-    """Append rows to a file in which so many stand already."""
+    """Append rows to a file that already has `before` rows."""
     with file:
         for number, row in enumerate(rows, start=before):
             columns = (row.name, *row.place, row.image, row.mask, row.scene)

@@ -1,8 +1,8 @@
-"""A budget in time as an amount of work: what may be compared in so many milliseconds.
+"""A time budget converted to an amount of work: how many views may be compared.
 
-What a step costs is told by constants, measured once (docs/benchmarks.md), never by a clock: a run must
-repeat, whatever else the machine does. A search looks at the likeliest views first, so that a small
-budget loses the unlikely ones.
+Costs are constants, measured once (docs/benchmarks.md), never a clock: a run must be reproducible whatever
+else the machine does. A search compares the likeliest views first, so a small budget loses the unlikely
+ones.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ SHAPE_MS = 3.0
 """From a mask to its shock graph."""
 
 SEARCH_MS = 2.0
-"""The sieves of the index, and what comes after the comparisons."""
+"""The index, and the work after the comparisons."""
 
 VIEW_MS = 0.35
-"""A view compared in full."""
+"""One view compared in full."""
 
 
 def share_within(milliseconds: float, views: int) -> float:
-    """Share of a database's views that one silhouette may be compared with in so many milliseconds.
+    """Share of a database's views that one silhouette may be compared with in a time budget.
 
     Args:
         milliseconds: For the silhouette, from mask to ranking.
-        views: Of the database, at least 1.
+        views: Number of views in the database, at least 1.
 
     Returns:
         Above 0, whatever the budget: something is always compared.

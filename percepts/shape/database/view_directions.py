@@ -1,8 +1,8 @@
-"""Directions of views: symmetric views merged, and which views are neighbours.
+"""Directions of views: merging of symmetric views, and neighbourhood.
 
-Two views are one when their outlines, turned in the plane or mirrored, lie upon each other. In parallel
-projection the silhouette from behind is the mirror image of the one from before: a view that looks
-like the mirror image of another is seen, unmirrored, from the opposite direction.
+Two views are merged when their outlines, rotated in the plane or mirrored, coincide. In parallel projection
+the silhouette from behind is the mirror image of the one from the front: a view that matches the mirror image
+of another shows it, unmirrored, from the opposite direction.
 """
 
 from __future__ import annotations
@@ -17,56 +17,56 @@ from visup.percepts.shape.index.view_records import Direction, NewView
 from visup.percepts.shape.silhouette.silhouette import resample_closed
 
 ALIKE = 0.005
-"""Distance of outlines below which two views are one, in square roots of their area."""
+"""Distance of outlines below which two views are merged, in square roots of their area."""
 
 ALIKE_AREA = 0.01
-"""Their areas then differ by less than this share: a model's size is the same from all sides."""
+"""Largest relative difference of their areas: a model's size is the same from all sides."""
 
 _POINTS = 384
 
 
 def merge_symmetric(views: Sequence[NewView]) -> list[NewView]:
-    """Views of one model, those that are seen from several directions stored once.
+    """Merge views of one model that look the same from several directions.
 
     Args:
-        views: In order; a view joins the first one that it is alike. Views of unknown direction or
-            size stay as they are.
+        views: In order; a view joins the first one that it matches. Views of unknown direction or size
+            stay as they are.
 
     Returns:
-        The views that are left, in order; `also` holds the directions of those that joined them.
+        The remaining views, in order; `also` holds the directions of those merged into them.
     """
     waves = [frequencies(v.shape.contour) for v in views]
     areas = np.array([v.area or np.nan for v in views])
-    kept: list[int] = []
+    retained: list[int] = []
     also: dict[int, tuple[Direction, ...]] = {}
     for k, view in enumerate(views):
-        first = None if view.direction is None else _first_alike(k, kept, waves, areas)
+        first = None if view.direction is None else _first_match(k, retained, waves, areas)
         if first is None or view.direction is None:
-            kept.append(k)
+            retained.append(k)
             continue
         number, mirrored = first
         x, y, z = view.direction
         seen = (-x, -y, -z) if mirrored else view.direction
         also[number] = (*also.get(number, ()), seen)
-    return [replace(views[k], also=(*views[k].also, *also.get(k, ()))) for k in kept]
+    return [replace(views[k], also=(*views[k].also, *also.get(k, ()))) for k in retained]
 
 
 def frequencies(contour: NDArray[np.floating]) -> NDArray[np.complex128]:
-    """An outline (N, 2) by its frequencies (P,): points evenly spaced along it, as complex numbers."""
+    """Fourier coefficients (P,) of an outline (N, 2), resampled evenly as complex numbers."""
     points = resample_closed(np.asarray(contour, dtype=np.float64), count=_POINTS)
     return np.asarray(np.fft.fft(points[:, 0] + 1j * points[:, 1]))
 
 
-def _first_alike(
+def _first_match(
     number: int,
-    kept: Sequence[int],
+    retained: Sequence[int],
     waves: Sequence[NDArray[np.complex128]],
     areas: NDArray[np.float64],
 ) -> tuple[int, bool] | None:
-    """The first of the kept views that this one is alike, and whether mirrored."""
-    near = np.abs(areas[list(kept)] / areas[number] - 1) < ALIKE_AREA
+    """The first retained view that this one matches, and whether mirrored."""
+    near = np.abs(areas[list(retained)] / areas[number] - 1) < ALIKE_AREA
     for k in np.flatnonzero(near):
-        other = kept[int(k)]
+        other = retained[int(k)]
         straight, mirror = outline_gap(waves[number], waves[other])
         if min(straight, mirror) < ALIKE:
             return other, mirror < straight
@@ -74,7 +74,7 @@ def _first_alike(
 
 
 def outline_gap(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> tuple[float, float]:
-    """How far apart two outlines lie when the one is turned upon the other.
+    """Distance between two outlines at their best rotation.
 
     Args:
         one: `frequencies` of an outline about its centroid.
@@ -82,11 +82,11 @@ def outline_gap(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> t
 
     Returns:
         Root mean squared distance of corresponding points at the best rotation and starting point;
-        and the same with the mirror image of the other.
+        and the same for the mirror image of the other.
     """
     size = len(one)
     energy = float((np.abs(one) ** 2).sum() + (np.abs(other) ** 2).sum()) / size
-    # Mirrored, the outline runs the other way: conjugate points in opposite order.
+    # A mirrored outline runs backwards: conjugate points in opposite order.
     gaps = []
     for theirs in (other, np.conj(other)):
         alike = np.abs(np.fft.ifft(np.conj(one) * theirs)).max()
@@ -101,10 +101,10 @@ def neighbours(seen_from: Sequence[Sequence[Direction]]) -> list[tuple[int, ...]
     of the convex hull of all these joins them (the Delaunay triangulation of the sphere).
 
     Args:
-        seen_from: For each view the directions from which it is seen; none when they are unknown.
+        seen_from: For each view the directions that show it; none when unknown.
 
     Returns:
-        For each view the numbers of its neighbours, rising.
+        For each view the numbers of its neighbours, ascending.
 
     Example:
         Three views along the axes cover the six corners of an octahedron.

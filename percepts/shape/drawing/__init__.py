@@ -1,5 +1,5 @@
-"""Pictures of shapes, for people.
+"""Pictures of shapes and matches.
 
-`contact_sheet.py` shows all that a database knows, `pictures.py` why a silhouette matches a view, and
-`sheet.py` is what they are drawn on.
+`contact_sheet.py` shows the content of a database, `pictures.py` explains a match, and `sheet.py` is the
+drawing surface of both.
 """

@@ -1,4 +1,4 @@
-"""A contact sheet of a model database: what it knows each model by."""
+"""A contact sheet of a model database."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _counts(views: Sequence[ModelView], taught: int) -> list[str]:
 
 
 def _spread(every: Sequence[Item], most: int) -> list[Item]:
-    """At most so many of a sequence, evenly spread over it."""
+    """At most `most` items, evenly spaced over a sequence."""
     if len(every) <= most:
         return list(every)
     return [every[i * len(every) // most] for i in range(most)]

@@ -1,4 +1,4 @@
-"""Pictures of shapes, for people: why a silhouette matches a view.
+"""Pictures that explain why a silhouette matches a view.
 
 Colours follow the kinds of shock: protrusions orange, necks red, bends green, seeds blue.
 """
@@ -45,7 +45,7 @@ def placed(
     side: float,
     turn: NDArray[np.float64] | None = None,
 ) -> Place:
-    """How points of a shape come to lie in a square of this side, turned or mirrored."""
+    """The mapping of a shape's points into a square of this side, rotated or mirrored."""
     matrix = np.eye(2) if turn is None else turn
     turned = contour @ matrix.T
     low, high = turned.min(axis=0), turned.max(axis=0)
@@ -59,17 +59,17 @@ def placed(
 
 
 def draw_shape(sheet: Sheet, contour: NDArray[np.floating], place: Place) -> None:
-    """A shape's body with its outline, where `place` puts it."""
+    """Draw a shape's body with its outline, positioned by `place`."""
     sheet.polygon(place(contour), BODY, OUTLINE)
 
 
 def draw_graph(sheet: Sheet, graph: ShockGraph, place: Place, radius: float = 3.0) -> None:
-    """The nodes of a shock graph in their colours, and its edges."""
+    """Draw the nodes of a shock graph in their colours, and its edges."""
     at = place(graph.positions)
     for parent, child in graph.edges:
         if parent > 0:
             sheet.line([at[parent], at[child]], PALE, 1.0)
-    # Small parts first, so that what counts most lies on top.
+    # Small parts first, so that the most important lie on top.
     for node in sorted(range(1, len(graph)), key=lambda n: float(graph.weights[n])):
         size = radius * (0.7 + 1.2 * float(graph.weights[node]) ** 0.5)
         sheet.dot(at[node], size, _colour(graph, node))
@@ -81,7 +81,7 @@ def _colour(graph: ShockGraph, node: int) -> Colour:
 
 @dataclass(frozen=True, slots=True)
 class _Panel:
-    """Where a shape lies on the sheet."""
+    """A shape and its position on the sheet."""
 
     shape: Shape
     place: Place
@@ -90,18 +90,18 @@ class _Panel:
 def match_picture(
     database: ModelDatabase, silhouette: Silhouette, ranking: Ranking, title: str, best: int = 5
 ) -> NDArray[np.uint8]:
-    """Why a silhouette looks like views: its labelled shock graph, and the best views beside it.
+    """Explain a ranking: the silhouette's labelled shock graph, and the best views beside it.
 
     Args:
-        database: What was searched.
-        silhouette: What was asked for.
-        ranking: What was answered.
-        title: Above the picture.
-        best: How many views are shown.
+        database: The searched database.
+        silhouette: The query.
+        ranking: Its result.
+        title: Title above the picture.
+        best: Number of views to show.
 
     Returns:
         (H, W, 3) uint8, BGR: to the left the silhouette with its skeleton and numbered nodes; to the
-        right a row for each view, turned as the silhouette is, with lines between corresponding
+        right a row for each view, rotated like the silhouette, with lines between corresponding
         nodes.
     """
     shown = ranking.matches[:best]
@@ -182,7 +182,7 @@ def _draw_levels(sheet: Sheet, graph: ShockGraph, corner: Point, other: Point) -
 def _draw_match(
     sheet: Sheet, database: ModelDatabase, query: Shape, match: ViewMatch, row: int
 ) -> None:
-    """One view: how alike, and which part of the silhouette is which part of it."""
+    """Draw one view: its similarity and the corresponding parts."""
     top = _HEAD + row * _ROW
     middle = top + _ROW / 2
     sheet.line([(500, top), (1120, top)], RULE)
@@ -196,11 +196,11 @@ def _draw_match(
     sheet.fitted((x, top + 42), f"{row + 1}. {match.view.name}", 180, 15)
     sheet.box((x, top + 52), (x + 170, top + 60), RULE, 4)
     sheet.box((x, top + 52), (x + max(8.0, 170 * match.similarity), top + 60), (38, 108, 214), 4)
-    for k, line in enumerate(_told(match)):
+    for k, line in enumerate(_caption(match)):
         sheet.text((x, top + 80 + 17 * k), line, 12, INK if k == 0 else PALE)
 
 
-def _told(match: ViewMatch) -> list[str]:
+def _caption(match: ViewMatch) -> list[str]:
     turn = f"turned by {math.degrees(match.rotation):.0f}°"
     terms = match.likeness
     return [
@@ -212,14 +212,14 @@ def _told(match: ViewMatch) -> list[str]:
 
 
 def _turn(match: ViewMatch) -> NDArray[np.float64]:
-    """The view as the silhouette shows it: mirrored if it is, then turned."""
+    """The transform from the view to the silhouette: mirrored if it is, then rotated."""
     angle = match.rotation
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return turn @ np.diag([-1.0, 1.0]) if match.likeness.mirrored else turn
 
 
 def _draw_pairs(sheet: Sheet, own: _Panel, theirs: _Panel, match: ViewMatch) -> None:
-    """Lines between corresponding nodes, the stronger the more alike they are; the rest pale."""
+    """Lines between corresponding nodes, stronger for more similar pairs; other nodes pale."""
     here = own.place(own.shape.graph.positions)
     there = theirs.place(theirs.shape.graph.positions)
     for panel, at in ((own, here), (theirs, there)):
@@ -239,18 +239,18 @@ def _draw_pairs(sheet: Sheet, own: _Panel, theirs: _Panel, match: ViewMatch) -> 
 
 
 def _faded(colour: Colour, strength: float) -> Colour:
-    """A colour that is the paler the weaker."""
+    """A colour blended towards white as strength falls."""
     share = 0.3 + 0.6 * min(1.0, max(0.0, strength))
     red, green, blue = (round(255 + (c - 255) * share) for c in colour)
     return (red, green, blue)
 
 
 def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
-    """A silhouette as text: ':' inside, and each skeleton point's kind of shock by number.
+    """A silhouette as text: ':' inside, and the number of each skeleton point's kind of shock.
 
     Args:
         silhouette: In normal form.
-        columns: Width of the text; a character is taken to be twice as high as wide.
+        columns: Width of the text; characters are assumed twice as high as wide.
 
     Returns:
         Lines without trailing blanks.
@@ -299,7 +299,7 @@ def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
 
 
 def _labelled_points(silhouette: Silhouette) -> list[tuple[NDArray[np.float64], ShockKind]]:
-    """Points along the skeleton with their kinds; necks and seeds last, so that they show on top."""
+    """Points along the skeleton with their kinds; necks and seeds last, to be drawn on top."""
     skeleton = skeletonise(silhouette.contour)
     found: list[tuple[NDArray[np.float64], ShockKind]] = []
     for branch in skeleton.branches:

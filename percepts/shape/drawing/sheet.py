@@ -50,18 +50,21 @@ class Sheet:
     def text(
         self, at: Point, text: str, size: int = 13, colour: Colour = INK, anchor: str = "ls"
     ) -> None:
-        """Write a line; `anchor` as Pillow has it: 'ls' is left at the base line, 'mm' the middle."""
+        """Write a line; `anchor` as in Pillow: 'ls' is left at the baseline, 'mm' the middle."""
         spot = (at[0] * _FINE, at[1] * _FINE)
         self._draw.text(spot, text, fill=colour, font=_font(size * _FINE), anchor=anchor)
 
     def fitted(
         self, at: Point, text: str, width: float, size: int = 13, colour: Colour = INK
     ) -> None:
-        """Write a line that ends in three dots where it would be wider than this."""
-        font, kept = _font(size * _FINE), text
-        while kept and font.getlength(kept + ("…" if kept != text else "")) > width * _FINE:
-            kept = kept[:-1]
-        self.text(at, kept + ("…" if kept != text else ""), size, colour)
+        """Write a line, truncated with three dots to this width."""
+        font, shortened = _font(size * _FINE), text
+        while (
+            shortened
+            and font.getlength(shortened + ("…" if shortened != text else "")) > width * _FINE
+        ):
+            shortened = shortened[:-1]
+        self.text(at, shortened + ("…" if shortened != text else ""), size, colour)
 
     def polygon(self, points: Sequence[Point], fill: Colour, outline: Colour | None = None) -> None:
         """A filled polygon with a fine outline."""
@@ -69,7 +72,7 @@ class Sheet:
         self._draw.polygon(spots, fill=fill, outline=outline, width=_FINE)
 
     def box(self, corner: Point, other: Point, fill: Colour, radius: float = 0.0) -> None:
-        """A filled rectangle, with round corners."""
+        """A filled rectangle with rounded corners."""
         spots = [(x * _FINE, y * _FINE) for x, y in (corner, other)]
         self._draw.rounded_rectangle(spots, radius * _FINE, fill=fill)
 
@@ -79,7 +82,7 @@ class Sheet:
         self._draw.line(spots, fill=colour, width=max(1, round(width * _FINE)), joint="curve")
 
     def dot(self, at: Point, radius: float, colour: Colour, rim: Colour = PAPER) -> None:
-        """A dot with a rim, which keeps it apart from what lies below."""
+        """A dot with a rim that sets it off from what is below."""
         for r, fill in ((radius + 1.0, rim), (radius, colour)):
             x, y = at[0] * _FINE, at[1] * _FINE
             self._draw.ellipse((x - r * _FINE, y - r * _FINE, x + r * _FINE, y + r * _FINE), fill)
@@ -94,7 +97,7 @@ class Sheet:
         self._image.paste(image.resize((width, height), Image.Resampling.BICUBIC), spot)
 
     def picture(self) -> NDArray[np.uint8]:
-        """What was drawn, (H, W, 3) uint8, BGR."""
+        """The drawing, (H, W, 3) uint8, BGR."""
         small = self._image.resize(self.size, Image.Resampling.LANCZOS)
         return np.ascontiguousarray(np.asarray(small, dtype=np.uint8)[:, :, ::-1])
 

@@ -1,8 +1,8 @@
-"""Sketches: a shape's outline in a hundred bytes, to tell at once which views cannot be meant.
+"""Sketches: a shape's outline in a hundred bytes, to reject unlikely views quickly.
 
-A sketch is the outline's height functions (see `height_functions.py`) at a few points. Two sketches are
-compared at all rotations at once, mirrored too, by one product; the magnitudes of a sketch's lowest
-frequencies, its spectrum, do not depend on the starting point at all and can be compared as vectors.
+A sketch holds the outline's height functions (see `height_functions.py`) at a few points. Two sketches are
+compared at all rotations, mirrored too, by one product; the magnitudes of a sketch's lowest frequencies, its
+spectrum, do not depend on the starting point and can be compared as vectors.
 
 Read next: `view_index.py`.
 """
@@ -48,7 +48,7 @@ def sketch(heights: NDArray[np.floating]) -> NDArray[np.int8]:
 
 
 def spectra(sketches: NDArray[np.int8]) -> NDArray[np.float32]:
-    """What a sketch looks like wherever it starts and whether it is mirrored or not.
+    """Descriptors of sketches, invariant to starting point and mirroring.
 
     Args:
         sketches: (V, POINTS, HEIGHTS) int8.
@@ -73,7 +73,7 @@ def sketch_distances(query: NDArray[np.int8], sketches: NDArray[np.int8]) -> NDA
         sketches: (V, POINTS, HEIGHTS) int8.
 
     Returns:
-        (V,) float32, 0 for equal sketches; plain outlines are taken apart by smaller differences.
+        (V,) float32, 0 for equal sketches; for plain outlines smaller differences count more.
     """
     own, others = query.astype(np.float32) / _UNIT, sketches.astype(np.float32) / np.float32(_UNIT)
     # The mirror image has both axes reversed.

@@ -1,17 +1,17 @@
 """The index: which views of the database are worth a full comparison.
 
-Three sieves, each finer and dearer than the one before:
+Three stages, each finer and more expensive than the previous:
 
-1. *Roots.* A view's root carries its topological signature vector (Shokoufandeh et al. 2005), how much
-   of the shape lies how far from its middle, and its greatest radius; its outline's spectrum stands
-   beside it. One product of the query's vector with all views' leaves the nearest `NEAREST`.
-2. *Sketches.* Of these, the outlines are compared at a few points at all rotations, the areas are laid
-   on each other, and the roots again: that leaves as many as are to be compared in full. A quarter of
-   them are views of models that would have none otherwise, so that a ranking of models is full.
-3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every
-   node takes its best partner, whoever else wants it and whatever hangs below. The matching of
-   `graph_matching.py` can only do worse, so that views can be matched best bound first until no bound left
-   can change the result.
+1. *Roots.* A view's root carries its topological signature vector (Shokoufandeh et al. 2005), the radial
+   distribution of the shape's area, and its greatest radius; its outline's spectrum is appended. One product
+   of the query's vector with those of all views selects the nearest `NEAREST`.
+2. *Sketches.* Of these, outlines are compared at a few points at all rotations, areas are overlaid, and roots
+   compared again; that selects as many as are to be compared in full. A quarter of the places goes to models
+   that would have none otherwise, so that a ranking of models is complete.
+3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every node
+   takes its best partner, regardless of other claims and of hierarchy. The matching of `graph_matching.py`
+   can only do worse, so views are matched in order of their bounds until no remaining bound can change the
+   result.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from visup.percepts.shape.silhouette.area_overlap import AreaIndex, AreaOverlaps
 NEAREST = 500
 """Views whose sketches are compared."""
 
-KEPT = 4096
-"""Views whose nodes' features are kept in memory at most."""
+CACHED = 4096
+"""Most views whose node features are cached in memory."""
 
-# What makes squared distances of roots, squared ones of spectra, and distances of sketches comparable:
+# Scales that make squared distances of roots, squared ones of spectra, and distances of sketches comparable:
 # medians over pairs of 39 meshes' views.
 _ROOT_SCALE = 1.35
 _SPECTRUM_SCALE = 0.106
@@ -58,10 +58,10 @@ class Candidates:
     """Views worth a full comparison.
 
     Attributes:
-        numbers: (C,) numbers of the views, rising.
-        bounds: (C,) what the similarity of the graphs cannot exceed.
+        numbers: (C,) numbers of the views, ascending.
+        bounds: (C,) upper bounds of the graphs' similarities.
         similar: For each view the (N, M) similarities of the query's nodes with the view's.
-        overlaps: How the query's area lies on theirs.
+        overlaps: Area overlaps of the query with them.
     """
 
     numbers: NDArray[np.intp]
@@ -72,13 +72,13 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewSummaries:
-    """What the first two sieves need to know of views.
+    """What the first two stages need of views.
 
     Attributes:
         roots: (V,) records of `view_records.NODE`.
         sketches: (V, POINTS, HEIGHTS) int8.
         areas: (V, RINGS, ANGLES) uint8.
-        models: (V,) whole numbers, which views are of one model.
+        models: (V,) integers, equal for views of one model.
     """
 
     roots: Records
@@ -88,12 +88,12 @@ class ViewSummaries:
 
     @classmethod
     def read(cls, views: Records) -> ViewSummaries:
-        """Those of views in a file, (V,) records of `view_records.VIEW`."""
+        """The summaries of views in a file, (V,) records of `view_records.VIEW`."""
         return cls(views["root"], views["sketch"], views["areas"], views["model"])
 
     @classmethod
     def of(cls, shapes: Sequence[Shape]) -> ViewSummaries:
-        """Those of shapes in memory, at least one; each is taken for a model of its own."""
+        """The summaries of shapes in memory, at least one; each counts as a model of its own."""
         roots = np.concatenate([node_records(s.graph)[:1] for s in shapes])
         sketches = np.stack([sketch(s.heights) for s in shapes])
         areas = np.stack([s.areas for s in shapes])
@@ -101,12 +101,12 @@ class ViewSummaries:
 
 
 class ViewIndex:
-    """What is compared of many views before any is compared in full.
+    """Selects the views worth a full comparison.
 
     Args:
-        shapes: The views' shapes; only those of candidates are looked at when `summaries` are given.
+        shapes: The views' shapes; only those of candidates are read when `summaries` are given.
         weights: How much each node feature counts.
-        summaries: Of the same views; from the shapes when None.
+        summaries: Summaries of the same views; computed from the shapes when None.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class ViewIndex:
 
     @cached_property
     def _roots(self) -> NDArray[np.float32]:
-        """(V, D) vectors of the first sieve: the roots' features, then the outlines' spectra."""
+        """(V, D) vectors of the first stage: the roots' features, then the outlines' spectra."""
         parts = [
             _vectors(self._summaries, slice(k, k + 4096), self.weights)
             for k in range(0, len(self), 4096)
@@ -143,15 +143,15 @@ class ViewIndex:
     def likeliest(
         self, query: Shape, among: NDArray[np.intp] | None, most: int
     ) -> NDArray[np.intp]:
-        """The views that a shape is likeliest to look like, by roots and sketches.
+        """The views likeliest to match a shape, by roots and sketches.
 
         Args:
             query: A shape.
-            among: Numbers of views, rising; all views when None.
-            most: How many are wanted.
+            among: Numbers of views, ascending; all views when None.
+            most: How many to return.
 
         Returns:
-            At most so many of the numbers, rising.
+            At most `most` of the numbers, ascending.
         """
         size = len(self) if among is None else len(among)
         if size <= most:
@@ -163,7 +163,7 @@ class ViewIndex:
             kept.sort()
             among, apart = (kept if among is None else among[kept]), apart[kept]
         among = np.arange(size) if among is None else among
-        # The spectrum has done its part: the sketches tell the same better.
+        # The spectrum is dropped: the sketches contain the same information in more detail.
         features = len(own) - SPECTRUM
         squares = ((self._roots[among, :features] - own[:features]) ** 2).sum(axis=1)
         outlines = sketch_distances(sketch(query.heights), self._summaries.sketches[among])
@@ -179,7 +179,7 @@ class ViewIndex:
     def _apart(
         self, own: NDArray[np.float32], among: NDArray[np.intp] | None
     ) -> NDArray[np.float32]:
-        """Squared distances from views' vectors, but for the query's own square."""
+        """Squared distances from views' vectors, without the constant term of the query."""
         if among is None or len(among) == len(self):
             return self._squares - 2 * (self._roots @ own)
         return np.asarray(self._squares[among] - 2 * (self._roots[among] @ own))
@@ -195,9 +195,9 @@ class ViewIndex:
 
         Args:
             query: A shape.
-            among: Numbers of views, rising; all views when None.
-            most: How many are wanted.
-            favoured: Numbers of views of which as many come along, whatever the others are like.
+            among: Numbers of views, ascending; all views when None.
+            most: How many to return.
+            favoured: Numbers of views of which as many are added, whatever the others.
         """
         numbers = self.likeliest(query, among, most)
         if favoured is not None and len(favoured):
@@ -207,22 +207,24 @@ class ViewIndex:
         return Candidates(numbers, bounds, similar, self.overlaps(query, numbers))
 
     def overlaps(self, query: Shape, among: NDArray[np.intp]) -> AreaOverlaps:
-        """How a shape's area lies on those of some views."""
-        if len(self) <= KEPT:
+        """Area overlaps of a shape with some views."""
+        if len(self) <= CACHED:
             return self._areas.overlaps(query.areas, among)
         return area_overlaps(query.areas, self._summaries.areas[among])
 
     def _covered(self, query: Shape, among: NDArray[np.intp]) -> NDArray[np.float64]:
-        """How well a shape's area lies on those of some views, mirrored or not, (V,)."""
-        if len(self) <= KEPT:
+        """Best area similarity of a shape with each of some views, mirrored or not, (V,)."""
+        if len(self) <= CACHED:
             similar = self._areas.similarities(query.areas, among)
         else:
             similar = AreaIndex(self._summaries.areas[among]).similarities(query.areas)
         return np.asarray(similar.max(axis=1))
 
     def best_covered(self, query: Shape, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-        """The views whose areas lie best on a shape's: at most so many of the numbers, rising."""
-        covered = [self._covered(query, among[k : k + KEPT]) for k in range(0, len(among), KEPT)]
+        """The views of best area overlap with a shape: at most `most` of the numbers, ascending."""
+        covered = [
+            self._covered(query, among[k : k + CACHED]) for k in range(0, len(among), CACHED)
+        ]
         return np.sort(among[np.argsort(-np.concatenate(covered), kind="stable")[:most]])
 
     @cached_property
@@ -236,11 +238,11 @@ class ViewIndex:
 
         Args:
             query: A shock graph of N nodes.
-            among: Numbers of the views to look at, rising.
+            among: Numbers of the views, ascending.
             part: Whether the query is a part only, so that the views' other nodes do not count.
 
         Returns:
-            (V,) float64, for each view a number that `match_nodes` cannot exceed; and for each view the
+            (V,) float64, for each view an upper bound of `match_nodes`; and for each view the
             (N, M) similarities of the query's nodes with the view's.
         """
         if not len(among):
@@ -261,12 +263,12 @@ class ViewIndex:
         return bounds, [similar[:, a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
 
     def _nodes(self, view: int) -> NDArray[np.float32]:
-        """Features of a view's nodes, kept for the next time."""
+        """Features of a view's nodes, cached."""
         kept = self._features.get(view)
         if kept is None:
             kept = embed(self._shapes[view].graph, self.weights)
             self._features[view] = kept
-            if len(self._features) > KEPT:
+            if len(self._features) > CACHED:
                 self._features.popitem(last=False)
         return kept
 
@@ -274,7 +276,7 @@ class ViewIndex:
 def _spread(
     order: NDArray[np.intp], models: NDArray[np.integer[Any]], most: int
 ) -> NDArray[np.intp]:
-    """The first of an order; a quarter of the places goes to models that have none yet."""
+    """The first `most` of an order; a quarter of the places goes to models without one."""
     sure = most - most // 4
     later, first_of = order[sure:], np.unique(models[sure:], return_index=True)
     new = np.sort(first_of[1][~np.isin(first_of[0], models[:sure])])[: most // 4]
@@ -283,14 +285,14 @@ def _spread(
 
 
 def _vectors(summaries: ViewSummaries, part: slice, weights: MatchWeights) -> NDArray[np.float32]:
-    """Vectors of the first sieve for some of the views: roots' features, then spectra, both scaled."""
+    """Vectors of the first stage for some of the views: root features, then spectra, both scaled."""
     features = embed(_roots_as_nodes(summaries.roots[part]), weights)
     waves = spectra(summaries.sketches[part]) / np.float32(_SPECTRUM_SCALE**0.5)
     return np.hstack([features / np.float32(_ROOT_SCALE**0.5), waves])
 
 
 def _roots_as_nodes(roots: Records) -> ShockGraph:
-    """Roots of many views as the nodes of one graph: features of nodes do not depend on edges."""
+    """Roots of many views as the nodes of one graph: node features do not depend on edges."""
     return ShockGraph(
         edges=np.empty((0, 2), dtype=np.int16),
         below=np.empty((0, 0), dtype=bool),

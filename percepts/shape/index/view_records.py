@@ -1,8 +1,8 @@
-"""What stands in a database: a view, its shape, and their exact layout as bytes.
+"""Records of a database: views, shapes, and their exact byte layout.
 
-A shape is three arrays of raw little-endian bytes: the nodes of its shock graph (one record each, with
-all that a node carries), the edges, and the outline. What a byte means is told once in the file, as text
-(`LAYOUT`), and whatever does not fit it is refused before anything is allocated.
+A shape is three arrays of raw little-endian bytes: the nodes of its shock graph (one record each), the edges,
+and the outline. The file states the layout once, as text (`LAYOUT`), and data that does not fit it is refused
+before anything is allocated.
 
 Read next: `file_format.py` in `database/`.
 """
@@ -24,7 +24,7 @@ from visup.percepts.shape.silhouette.area_overlap import ANGLES, RINGS
 from visup.percepts.shape.silhouette.silhouette import SMOOTHING
 
 MOST_POINTS = 640
-"""Points of a stored outline."""
+"""Most points of a stored outline."""
 
 Records = NDArray[Any]
 """An array of records, such as of `NODE` or `VIEW`."""
@@ -32,7 +32,7 @@ Records = NDArray[Any]
 Direction = tuple[float, float, float]
 """Unit vector from the object to the viewer, in the model's frame."""
 
-# Half precision where it is far finer than a silhouette is known: an outline of unit area to 0.0005.
+# Half precision where it far exceeds a silhouette's accuracy: 0.0005 for an outline of unit area.
 NODE = np.dtype(
     [
         ("kinds", "|i1"),
@@ -64,10 +64,10 @@ VIEW = np.dtype(
         ("sketch", "|i1", (POINTS, HEIGHTS)),
     ]
 )
-"""What is known of a view without its shape; NaN stands for what is not known."""
+"""A view without its shape; NaN for unknown values."""
 
 ALSO = np.dtype([("view", "<u4"), ("direction", "<f8", (3,))])
-"""A further direction from which a view's silhouette is seen."""
+"""A further direction that shows a view's silhouette."""
 
 LAYOUT = {
     name: str(np.dtype(dtype).descr if np.dtype(dtype).names else np.dtype(dtype))
@@ -79,7 +79,7 @@ LAYOUT = {
         ("point", POINT),
     )
 }
-"""The meaning of all bytes, as text; a file that tells another is refused."""
+"""The meaning of all bytes, as text; a file with a different layout is refused."""
 
 _POSITIVE = ("weights", "lengths", "profiles", "contexts")
 
@@ -93,10 +93,10 @@ class ModelView:
         name: Name of the model.
         number: Number of the view within the model, from 0.
         direction: Unit vector from the object to the viewer in the model's frame (roll: the model's +z
-            is up in the picture, +y when looking along z), or None when it is not known.
-        area: Area of the silhouette in model units squared, or None when the size is not known.
+            is up in the picture, +y when looking along z), or None when unknown.
+        area: Area of the silhouette in model units squared, or None when unknown.
         cut: Whether the picture's border cuts the silhouette.
-        also: Further directions from which the model shows this silhouette, turned in the plane:
+        also: Further directions from which the model shows this silhouette, rotated in the plane:
             symmetric views are stored once.
         smoothing: Standard deviation of the Gaussian that smoothed it, in square roots of its area.
     """
@@ -112,21 +112,21 @@ class ModelView:
 
     @property
     def seen_from(self) -> tuple[Direction, ...]:
-        """All directions from which the model shows this silhouette; none when they are not known."""
+        """All directions from which the model shows this silhouette; none when unknown."""
         return () if self.direction is None else (self.direction, *self.also)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewView:
-    """A view to be stored; fields as in `ModelView`, with its shape.
+    """A view to store; fields as in `ModelView`, with its shape.
 
     Attributes:
         name: Name of the model.
         direction: Unit vector from the object to the viewer, or None.
         area: Model units squared, or None.
-        shape: What it looks like.
+        shape: Its shape.
         also: Further directions that show the same silhouette.
-        smoothing: Of the silhouette, in square roots of its area.
+        smoothing: Smoothing of the silhouette, in square roots of its area.
     """
 
     name: str
@@ -139,7 +139,7 @@ class NewView:
 
 @dataclass(frozen=True, slots=True)
 class ShapeBytes:
-    """A shape as it is stored."""
+    """A shape in its stored form."""
 
     nodes: bytes
     edges: bytes
@@ -147,7 +147,7 @@ class ShapeBytes:
 
 
 class InvalidRecordError(Exception):
-    """Bytes that cannot be what they should be; the message says what was found."""
+    """Bytes that are not a valid record; the message says what was found."""
 
 
 def node_records(graph: ShockGraph) -> Records:
@@ -168,14 +168,14 @@ def encode(shape: Shape) -> ShapeBytes:
 
 
 def decode(stored: ShapeBytes, view: np.void) -> Shape:
-    """A shape from its bytes, when they can be one.
+    """Decode and validate a shape.
 
     Args:
         stored: The bytes.
         view: The record of its view, of `VIEW`.
 
     Raises:
-        NotAsExpectedError: They cannot, or not of this view.
+        InvalidRecordError: The bytes are not a valid shape of this view.
     """
     nodes = records(stored.nodes, NODE, 2, MOST_NODES + 1, "nodes")
     if nodes[0].tobytes() != view["root"].tobytes():
@@ -183,7 +183,7 @@ def decode(stored: ShapeBytes, view: np.void) -> Shape:
     edges = records(stored.edges, EDGE, 1, 2 * (MOST_NODES + 1), "edges")
     contour = records(stored.contour, POINT, 8, MOST_POINTS, "points of the outline")
     check_nodes(nodes)
-    # Parents before children: the graph has no cycle.
+    # Parents precede children, so the graph has no cycle.
     if not bool(((edges[:, 0] >= 0) & (edges[:, 0] < edges[:, 1])).all()) or edges.max() >= len(
         nodes
     ):
@@ -197,10 +197,10 @@ def decode(stored: ShapeBytes, view: np.void) -> Shape:
 
 
 def records(data: object, dtype: np.dtype[Any], least: int, most: int, what: str) -> Records:
-    """Bytes as records, when they are so many.
+    """Bytes as records, validating their number.
 
     Raises:
-        NotAsExpectedError: They are no bytes, no whole records, too few or too many.
+        InvalidRecordError: They are not bytes, not whole records, too few or too many.
     """
     if not isinstance(data, bytes) or len(data) % dtype.itemsize:
         raise InvalidRecordError(f"{what} of a length that cannot be")
@@ -211,10 +211,10 @@ def records(data: object, dtype: np.dtype[Any], least: int, most: int, what: str
 
 
 def check_nodes(nodes: Records) -> None:
-    """Refuse nodes that carry what no node can.
+    """Reject nodes with impossible values.
 
     Raises:
-        NotAsExpectedError: They do.
+        InvalidRecordError: A value is impossible.
     """
     kinds = nodes["kinds"]
     if not bool(((kinds >= 0) & (kinds <= 4)).all()):

@@ -1,6 +1,6 @@
-"""How alike two shapes are.
+"""Similarity of shapes.
 
 Read `graph_matching.py` (shock graphs, by recursive bipartite matching), `shape_similarity.py` (graphs,
-outlines and areas together), `truncated_views.py` (silhouettes that the image border cuts) and
-`exemplars.py` (a few silhouettes that stand for many).
+outlines and areas combined), `truncated_views.py` (silhouettes cut by the image border) and
+`exemplars.py` (a few representative silhouettes).
 """

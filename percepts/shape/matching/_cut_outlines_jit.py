@@ -1,4 +1,4 @@
-"""Compiled loops of `cut_outlines.py`: outlines are cut, brought to a common frame, and compared there."""
+"""Compiled loops of `cut_outlines.py`: cutting outlines, aligning them to a common frame, comparing them."""
 
 from __future__ import annotations
 
@@ -17,41 +17,41 @@ from visup.percepts.shape.silhouette._height_functions_jit import (
 Doubles = NDArray[np.float64]
 
 ON_LINE = 0.03
-"""Distance from the line up to which points count as lying on it, units: smoothing rounds its ends."""
+"""Points this near to the line count as on it, units: smoothing rounds its ends."""
 
 
 @compiled
 def kept_part(contour: Doubles, cos: float, sin: float, offset: float, out: Doubles) -> int:
-    """What a line leaves of an outline, the line on the right: points (x away from what is cut, y).
+    """Clip an outline by a line and rotate it so that the line is on the right.
 
     Args:
         contour: (N, 2).
-        cos: Of the bearing of the line's outward normal.
-        sin: Of the same.
-        offset: Of the line from the origin, along the normal.
-        out: (2 N, 2), where the points go.
+        cos: Cosine of the bearing of the line's outward normal.
+        sin: Its sine.
+        offset: Distance of the line from the origin, along the normal.
+        out: (2 N, 2), receives the points.
 
     Returns:
-        How many there are.
+        The number of points.
     """
-    count, kept = len(contour), 0
+    count, remaining = len(contour), 0
     for i in range(count):
         p, q = contour[i], contour[(i + 1) % count]
         x, y = cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]
         u, v = cos * q[0] + sin * q[1], cos * q[1] - sin * q[0]
         if x <= offset:
-            out[kept, 0], out[kept, 1] = x, y
-            kept += 1
+            out[remaining, 0], out[remaining, 1] = x, y
+            remaining += 1
         if (x <= offset) != (u <= offset):
             part = (offset - x) / (u - x)
-            out[kept, 0], out[kept, 1] = offset, y + part * (v - y)
-            kept += 1
-    return kept
+            out[remaining, 0], out[remaining, 1] = offset, y + part * (v - y)
+            remaining += 1
+    return remaining
 
 
 @compiled
 def normal_form(points: Doubles, mirror: bool) -> None:
-    """Move a polygon (N, 2) to its centroid and scale it to unit area, in place; mirrored top to bottom."""
+    """Centre a polygon (N, 2), scale it to unit area and optionally mirror it top to bottom, in place."""
     count, double, x, y = len(points), 0.0, 0.0, 0.0
     for i in range(count):
         p, q = points[i], points[(i + 1) % count]
@@ -76,7 +76,7 @@ def normal_form(points: Doubles, mirror: bool) -> None:
 
 @compiled
 def evenly(points: Doubles, out: Doubles) -> None:
-    """Even spacing along a polygon (N, 2) from the lower end of its stretch on the right, into (P, 2)."""
+    """Resample a polygon (N, 2) evenly into (P, 2), from the lower end of its right edge."""
     count, wanted = len(points), len(out)
     right = points[:, 0].max()
     first = -1
@@ -103,20 +103,20 @@ def evenly(points: Doubles, out: Doubles) -> None:
 
 @compiled
 def framed(contour: Doubles, line: Doubles, mirror: bool, scratch: Doubles, out: Doubles) -> None:
-    """An outline once it is cut, in normal form, the line on the right, begun at the line's lower end.
+    """A cut outline in normal form, with the line on the right, starting at its lower end.
 
     Args:
         contour: (N, 2).
-        line: Cosine and sine of its bearing, and its offset; infinite where all is kept.
-        mirror: Whether it is mirrored top to bottom then.
+        line: Cosine and sine of its bearing, and its offset; infinite for no cut.
+        mirror: Whether to mirror it top to bottom afterwards.
         scratch: (2 N, 2) at least.
         out: (P, 2).
     """
-    kept = kept_part(contour, line[0], line[1], line[2], scratch)
-    if kept < 3:
-        kept = kept_part(contour, line[0], line[1], np.inf, scratch)
-    normal_form(scratch[:kept], mirror)
-    evenly(scratch[:kept], out)
+    remaining = kept_part(contour, line[0], line[1], line[2], scratch)
+    if remaining < 3:
+        remaining = kept_part(contour, line[0], line[1], np.inf, scratch)
+    normal_form(scratch[:remaining], mirror)
+    evenly(scratch[:remaining], out)
 
 
 @compiled
@@ -127,13 +127,13 @@ def compare_cut(
     alignment: tuple[NDArray[np.intp], int, float],
     out: Doubles,
 ) -> None:
-    """Compare a cut silhouette with views cut likewise, all in one frame, without any rotation to find.
+    """Compare a cut silhouette with views cut likewise, in a common frame, without a rotation search.
 
     Args:
         own: (P, H) heights of the silhouette's outline as `framed`.
-        contours: Points of all views one after another (M, 2), and where each begins and the last ends.
-        lines: (K, 4) cosine, sine, offset, and 1 for what is mirrored.
-        alignment: Stretches of heights, band and price of a step aside.
+        contours: Concatenated points of all views (M, 2), and the start of each and the end of the last.
+        lines: (K, 4) cosine, sine, offset, and 1 for mirrored.
+        alignment: Stretches of heights, band, and price of a sideways step.
         out: (K, 2): mean cost of the best alignment, complexity of the outline.
     """
     points, starts = contours

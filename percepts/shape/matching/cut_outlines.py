@@ -1,7 +1,8 @@
 """Outlines of cut silhouettes compared with those of cut views, in a common frame.
 
-Where the border lies, seen from either, is known: both are turned so that it is on the right, and begun where
-the outline leaves it. No rotation is left to find, which is quicker than for whole shapes, and tells more.
+The position of the border is known in either: both are rotated so that it is on the right, and start where
+the outline leaves it. Without a rotation search this is quicker than for whole shapes, and more
+discriminative.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ def compare_cut_outlines(
 
     Args:
         contour: (N, 2) outline of the silhouette in normal form, the border's stretch included.
-        border: Where the border lies, radians; see `silhouette.Silhouette`.
+        border: Bearing of the border, radians; see `silhouette.Silhouette`.
         views: K outlines in normal form.
         lines: (K, 3) bearing of each line's outward normal in the view's frame (radians from x towards
-            y), its offset along it, and 1 where what is left is mirrored, else 0.
+            y), its offset along it, and 1 where the remainder is mirrored, else 0.
 
     Returns:
         (K,) similarities, 0 to 1.
@@ -64,16 +65,16 @@ def framed_outline(
     *,
     mirrored: bool = False,
 ) -> NDArray[np.float64]:
-    """What a line leaves of an outline, in the frame in which cut outlines are compared.
+    """An outline clipped by a line, in the common frame of cut outlines.
 
     Args:
         contour: (N, 2) closed outline.
         bearing: Direction of the line's outward normal, radians from x towards y.
-        offset: Of the line along it; infinite where the outline is cut already.
+        offset: Of the line along it; infinite where the outline is already cut.
         mirrored: Whether the outline is mirrored along the line.
 
     Returns:
-        (POINTS, 2) evenly spaced from the lower end of the line's stretch, of unit area about the centroid,
+        (POINTS, 2) evenly spaced from the lower end of the line, of unit area about the centroid,
         the line on the right.
     """
     points = np.array(contour, dtype=np.float64)

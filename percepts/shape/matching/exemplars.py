@@ -1,7 +1,7 @@
-"""Exemplars: a few silhouettes that stand for many.
+"""Exemplars: a few silhouettes that represent many.
 
-The paper clusters the arm's silhouettes, one for each frame, into 4 by K-means (section 7.2). Here the
-clusters are around medoids, since shock graphs have distances but no means.
+The paper clusters the arm's silhouettes, one per frame, into 4 by K-means (section 7.2). Here the clusters
+are around medoids, since shock graphs have distances but no means.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
 
 
 def medoids(similarity: NDArray[np.float64], count: int) -> list[int]:
-    """The members that stand best for all: K-medoids, built greedily and then improved by swaps.
+    """The most representative members: K-medoids, built greedily and then improved by swaps.
 
     Args:
         similarity: (N, N), symmetric.
         count: How many exemplars; all members when there are fewer.
 
     Returns:
-        Numbers of the exemplars, rising; the same for the same input.
+        Numbers of the exemplars, ascending; deterministic.
 
     Example:
         >>> near = np.array([[1, .9, .1], [.9, 1, .1], [.1, .1, 1]])
@@ -59,7 +59,7 @@ def medoids(similarity: NDArray[np.float64], count: int) -> list[int]:
 
 
 def _covered(similarity: NDArray[np.float64], chosen: list[int]) -> float:
-    """How well all members are stood for: the sum of their similarities to the nearest exemplar."""
+    """How well all members are represented: the sum of similarities to the nearest exemplar."""
     return float(similarity[:, chosen].max(axis=1).sum())
 
 

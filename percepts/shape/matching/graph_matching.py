@@ -1,14 +1,14 @@
-"""Matching two shock graphs: which part of one is which part of the other.
+"""Matching of two shock graphs by recursive bipartite matching.
 
-After figure 3 of the paper (Shokoufandeh et al. 2005): every node of the one graph is compared with every
-node of the other, by what it looks like and by its topological signature; a maximum-cardinality,
-best-weight bipartite matching is found; its best pair is taken for true; the graphs are split at that
-pair, so that what hangs below one node should match what hangs below the other; and so on. Where two
-limbs are about as thick, noise decides which of them hangs below the other. Therefore, other than in the
-paper, a pair that contradicts a better one is not forbidden, it is worth less.
+After figure 3 of the paper (Shokoufandeh et al. 2005): every node of one graph is compared with every node of
+the other, by its features and its topological signature; a maximum-cardinality, best-weight bipartite
+matching is found; its best pair is accepted; the graphs are split at that pair, so that what is below one
+node should match what is below the other; and so on. Where two limbs are about equally thick, noise decides
+which is below the other. Therefore, unlike in the paper, a pair that contradicts a better one is not
+forbidden but worth less.
 
-Node features are embedded such that the similarity of two nodes is exp(-|a - b|^2): one matrix product
-compares a silhouette with a whole database.
+Node features are embedded so that the similarity of two nodes is exp(-|a - b|^2): one matrix product compares
+a silhouette with a whole database.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scipy.optimize import linear_sum_assignment
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
 
 BREAK = 0.9
-"""What a pair is worth that contradicts the hierarchy of a better one, for each such one."""
+"""Factor of a pair's value for each better pair whose hierarchy it contradicts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +33,9 @@ class MatchWeights:
         kind: Different kinds of shock.
         length: Square root of the length along the skeleton.
         profile: Square roots of the radii along the node.
-        context: What the shape looks like from the node.
-        signature: Topology of what hangs below.
-        root: Share of the similarity that the root has: the shape as a whole.
+        context: The shape as seen from the node.
+        signature: Topology of the subgraph below.
+        root: Share of the root, the shape as a whole, in the similarity.
     """
 
     kind: float = 0.15
@@ -51,7 +51,7 @@ WEIGHTS = MatchWeights()
 
 @dataclass(frozen=True, slots=True)
 class GraphMatch:
-    """What two graphs have in common.
+    """The result of matching two graphs.
 
     Attributes:
         similarity: 0 to 1; 1 for equal graphs.
@@ -62,7 +62,7 @@ class GraphMatch:
     pairs: tuple[tuple[int, int, float], ...]
 
     def turned(self) -> GraphMatch:
-        """The same with the graphs exchanged."""
+        """The same match with the graphs exchanged."""
         return GraphMatch(self.similarity, tuple((v, u, s) for u, v, s in self.pairs))
 
 
@@ -96,7 +96,7 @@ def match_graphs(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) 
         weights: How much each feature counts.
 
     Returns:
-        The similarity, the same whichever comes first, and the corresponding nodes.
+        The similarity, which is symmetric, and the corresponding nodes.
     """
     if b.key < a.key:
         return match_graphs(b, a, weights).turned()
@@ -112,13 +112,13 @@ def match_nodes(
     *,
     part: bool = False,
 ) -> GraphMatch:
-    """Match two graphs whose nodes are compared already.
+    """Match two graphs, given the similarities of their nodes.
 
     Args:
         a: The first graph, N nodes.
         b: The second graph, M nodes.
         similar: (N, M), similarity of each pair of nodes.
-        root: Share of the similarity that the root has.
+        root: Share of the root in the similarity.
         part: Whether the first is a part only; nodes of the second without a partner then cost nothing.
 
     Returns:
@@ -135,13 +135,13 @@ def match_nodes(
 
 
 def match_ceiling(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> float:
-    """What the similarity of `match_nodes` cannot exceed: the best matching, whatever hangs below what.
+    """An upper bound of `match_nodes`: the best matching, ignoring hierarchy.
 
     Args:
         a: The first graph, N nodes.
         b: The second graph, M nodes.
         similar: (N, M), similarity of each pair of nodes.
-        root: Share of the similarity that the root has.
+        root: Share of the root in the similarity.
     """
     worth = (0.5 * (a.weights[:, None] + b.weights[None]) * similar)[1:, 1:]
     rows, columns = linear_sum_assignment(worth, maximize=True)
@@ -153,18 +153,18 @@ def correspond(
 ) -> list[tuple[int, int, float]]:
     """Corresponding nodes by recursive bipartite matching; roots (node 0) are left out.
 
-    The best pair of a best matching is taken for true; every pair that contradicts it, one node below
-    its node and the other not, is from then on worth `BREAK` of what it was; and so on with what is
-    left. The matching is solved anew only when a pair of it has lost: what is left of a best matching
-    whose pairs keep their worth is a best matching of what is left.
+    The best pair of a best matching is accepted; every pair that contradicts it, with one node below its
+    node and the other not, is from then on worth `BREAK` of its value; and so on with the rest. The
+    matching is solved anew only when one of its pairs lost value: the rest of a best matching whose
+    pairs keep their value is a best matching of the rest.
 
     Args:
         below_a: (N, N) bool, row u marks u and its descendants.
         below_b: (M, M) bool, the same for the second graph.
-        value: (N, M), worth of each pair, 0 or more.
+        value: (N, M), value of each pair, 0 or more.
 
     Returns:
-        Pairs of nodes with what they are worth in the end, in the order found.
+        Pairs of nodes with their final values, in the order found.
     """
     left = np.array(value, dtype=np.float64)[1:, 1:]
     rows, columns = linear_sum_assignment(left, maximize=True)

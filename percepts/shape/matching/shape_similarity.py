@@ -1,8 +1,7 @@
-"""Two shapes compared: the shock graphs first, their outlines and areas for a second look.
+"""Similarity of two shapes: shock graphs, outlines and areas combined.
 
-The shock graph gives the correspondences and a share of the similarity; how the outlines run and how
-well the areas cover each other give the rest. All terms are kept apart in the result, so that a similarity
-can be explained.
+The shock graph gives the correspondences and a share of the similarity; outline alignment and area overlap
+give the rest. All terms are kept separate in the result, so that a similarity can be explained.
 
 Read next: `model_database.py`.
 """
@@ -23,35 +22,35 @@ from visup.percepts.shape.silhouette.height_functions import outline_distances, 
 from visup.percepts.shape.silhouette.silhouette import Silhouette
 
 GRAPH_SHARE = 0.25
-"""Share of the similarity that the shock graph gives when kinds of things are compared."""
+"""Share of the shock graph in the similarity when kinds of objects are compared."""
 
 AREA_SHARE = 0.2
-"""Share that the areas give then."""
+"""Share of the areas."""
 
 KIND_SHARES = (GRAPH_SHARE, 1.0 - GRAPH_SHARE - AREA_SHARE, AREA_SHARE)
-"""Shares of graph, outline and area when kinds of things are compared: their limbs bend, and differ."""
+"""Shares of graph, outline and area when kinds of objects are compared: their limbs bend and differ."""
 
 RIGID_SHARES = (0.1, 0.4, 0.5)
-"""The same when a shape is compared with a rigid thing seen from a known direction: its area lies where it
-lay, which a rough outline hardly changes; outlines and skeletons suffer more."""
+"""The same for a rigid object seen from a known direction: its area stays in place and hardly suffers from a
+rough outline; outlines and skeletons suffer more."""
 
 AREA_POWER = 8
-"""Overlaps of unlike shapes are high already; to this power they differ as the other terms do."""
+"""Overlaps of dissimilar shapes are still high; this power spreads them like the other terms."""
 
 OUTLINE_SCALE = 0.36
-"""Distance of outlines at which their similarity has fallen to 1/e."""
+"""Distance of outlines at which their similarity is 1/e."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A silhouette with what is compared of it.
+    """The comparable features of a silhouette.
 
     Attributes:
         contour: (N, 2) outline in normal form.
         graph: Its shock graph.
         areas: (RINGS, ANGLES) uint8, its area by ring and angle; see `area_overlap.area_map`.
         cut: Whether the image border cuts it.
-        border: Where that border lies, radians; see `silhouette.Silhouette`.
+        border: Bearing of that border, radians; see `silhouette.Silhouette`.
     """
 
     contour: NDArray[np.floating]
@@ -62,13 +61,13 @@ class Shape:
 
     @cached_property
     def heights(self) -> NDArray[np.float32]:
-        """Height functions of the outline; computed when first asked for."""
+        """Height functions of the outline; computed on first use."""
         return outline_heights(self.contour)
 
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """How alike two shapes are, and why.
+    """The similarity of two shapes and its terms.
 
     Attributes:
         similarity: 0 to 1; 1 for equal shapes.
@@ -76,9 +75,9 @@ class Likeness:
         of_outlines: Similarity of the outlines alone.
         of_areas: Similarity of the areas alone.
         match: Corresponding nodes.
-        mirrored: Whether it is the mirror image of the second that looks like the first.
-        rotation: Radians from x towards y (clockwise in the image) that take the second, mirrored left to
-            right before if it is, onto the first, in (-pi, pi].
+        mirrored: Whether the mirror image of the second matches the first.
+        rotation: Radians from x towards y (clockwise in the image) that take the second, first mirrored left
+            to right if `mirrored`, onto the first, in (-pi, pi].
     """
 
     similarity: float
@@ -92,14 +91,14 @@ class Likeness:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OutlineAreaSimilarities:
-    """How alike one shape is to others without their graphs, each as it is or mirrored.
+    """Similarities of one shape with others without their graphs, each as it is or mirrored.
 
     Attributes:
         of_outlines: (B,) in [0, 1].
         of_areas: (B,) in [0, 1].
         mirrored: (B,) bool.
         rotation: (B,) radians, as in `Likeness`.
-        shares: (B, 3) what graph, outline and area give to the similarity.
+        shares: (B, 3) shares of graph, outline and area in the similarity.
     """
 
     of_outlines: NDArray[np.float64]
@@ -110,13 +109,13 @@ class OutlineAreaSimilarities:
 
     @property
     def worth(self) -> NDArray[np.float64]:
-        """(B,) what outlines and areas give to the similarity; the graph gives the rest."""
+        """(B,) contribution of outlines and areas to the similarity; the graph gives the rest."""
         return self.shares[:, 1] * self.of_outlines + self.shares[:, 2] * self.of_areas
 
     def joined(self, number: int, graphs: GraphMatch) -> Likeness:
-        """The likeness of one of the others, once its graph is matched."""
+        """The similarity with one of the others, given the match of its graph."""
         similarity = float(self.shares[number, 0] * graphs.similarity + self.worth[number])
-        # Features are of single precision: further digits mean nothing, and equal shapes give exactly 1.
+        # Features are in single precision: rounded, so that equal shapes give exactly 1.
         return Likeness(
             min(1.0, round(similarity, 5)),
             graphs.similarity,
@@ -129,20 +128,20 @@ class OutlineAreaSimilarities:
 
 
 def shape_of(silhouette: Silhouette) -> Shape:
-    """What is compared of a silhouette in normal form."""
+    """The comparable features of a silhouette in normal form."""
     graph = shock_graph(silhouette)
     return Shape(silhouette.contour, graph, silhouette.areas, silhouette.cut, silhouette.border)
 
 
 def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True, rigid: bool = False) -> Likeness:
-    """Compare two shapes; the similarity is the same whichever comes first.
+    """Compare two shapes; the similarity is symmetric.
 
     Args:
         a: The first shape.
         b: The second shape.
-        mirror: Whether a shape is also like its mirror image; the shock graph by itself does not tell
-            the two apart.
-        rigid: Whether one is a view of a rigid thing (`RIGID_SHARES`); else kinds are compared.
+        mirror: Whether a shape also matches its mirror image, which the shock graph alone cannot
+            distinguish.
+        rigid: Whether one is a view of a rigid object (`RIGID_SHARES`); else kinds are compared.
 
     Example:
         >>> from visup.percepts.shape.silhouette.silhouette import normalise
@@ -170,9 +169,9 @@ def compare_outlines_and_areas(
     Args:
         query: The shape.
         others: B shapes.
-        overlaps: How its area lies on theirs.
+        overlaps: Overlaps of its area with theirs.
         mirror: Whether mirror images count.
-        rigid: (B,) which of the others are views of a rigid thing (`RIGID_SHARES`); none when None.
+        rigid: (B,) which of the others are views of a rigid object (`RIGID_SHARES`); none when None.
     """
     outlines, areas = _outline_similarities(query, others), overlaps.similarity**AREA_POWER
     is_rigid = np.zeros(len(others), dtype=bool) if rigid is None else rigid
@@ -188,7 +187,7 @@ def compare_outlines_and_areas(
 def _outline_similarities(query: Shape, others: Sequence[Shape]) -> NDArray[np.float64]:
     """Similarity of one outline with many, as they are and mirrored, (B, 2) in [0, 1].
 
-    Alignment is not quite the same in both directions; the shapes' own order decides on one.
+    Alignment is slightly asymmetric; a canonical order of the shapes makes the result symmetric.
     """
     if not others:
         return np.empty((0, 2))

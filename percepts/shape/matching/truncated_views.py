@@ -1,12 +1,11 @@
-"""Silhouettes that the image border cuts: known views are cut in the same way and compared with them.
+"""Silhouettes cut by the image border: known views are cut in the same way and compared with them.
 
-Where the border lies, seen from a cut silhouette, is known; how much of the object lies beyond is not. So
-each view is cut by a line from all sides and by several shares, and what is left is sampled in rings about
-its centroid, the line always on the right. A cut silhouette, turned so that its border is on the right too,
-is compared with all of these without any rotation left to find. Between the
-lines that were tried, the best is found by a parabola.
+A cut silhouette shows the bearing of the border, but not how much of the object lies beyond. So each view is
+cut by a line from all sides and by several shares, and the remainder is sampled in rings about its centroid,
+the line always on the right. A cut silhouette, rotated so that its border is on the right too, is compared
+with all of these without a rotation search. Between the tested lines the best is interpolated by a parabola.
 
-A view is prepared when a cut silhouette is first asked for, in about a millisecond, and takes 31 kB.
+A view is prepared on first use, in about a millisecond, and takes 31 kB.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ BEARINGS = 32
 """Directions in which a view is cut."""
 
 SHARES = (0.06, 0.11, 0.18, 0.28, 0.45)
-"""Shares of a view's area that are cut off."""
+"""Shares of a view's area that are cut off, one line each."""
 
-KEPT = 4096
-"""Views that are kept prepared at most."""
+CACHED = 4096
+"""Most views kept prepared."""
 
 _EDGES = np.concatenate([np.linspace(0.0, 1.2, 11), np.linspace(1.45, 2.95, 7)])
 _RADII = 0.5 * (_EDGES[1:] + _EDGES[:-1])
@@ -50,8 +49,8 @@ class CutLine:
         bearing: Direction of its outward normal in the view's frame, radians from x towards y.
         offset: Distance of the line from the view's centroid, units; negative beyond it.
         share: Share of the view's area beyond it.
-        similarity: How well what is left covers the cut silhouette, 0 to 1; see `area_overlap.AreaOverlaps`.
-        mirrored: Whether the silhouette is held against what is left mirrored.
+        similarity: Overlap of the remainder with the cut silhouette, 0 to 1; see `area_overlap.AreaOverlaps`.
+        mirrored: Whether the silhouette is compared with the mirrored remainder.
     """
 
     bearing: float
@@ -62,7 +61,7 @@ class CutLine:
 
 
 class _PaintedShape:
-    """A shape ready to be cut: painted, and as points spread over its area.
+    """A shape prepared for cutting: rasterised, and as points spread over its area.
 
     Args:
         contour: (N, 2) outline in normal form.
@@ -74,7 +73,7 @@ class _PaintedShape:
         self.points = (np.stack([columns, rows], axis=1) + 0.5) / _SAMPLE - _HALF
 
     def cut(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """What is left by cuts from all `BEARINGS`, each by all `SHARES`.
+        """The remainders of cuts from all `BEARINGS`, each by all `SHARES`.
 
         Returns:
             (B, S, R * A) float64, the weighted map of each, the line on the right; and the lines' offsets
@@ -104,18 +103,18 @@ class _PaintedShape:
         x = centres[..., 0, None, None] + reach * np.cos(around)[:, None]
         y = centres[..., 1, None, None] + reach * np.sin(around)[:, None]
         beyond = x * normals[:, None, None, None, 0] + y * normals[:, None, None, None, 1]
-        kept = np.clip((offsets[..., None, None] - beyond) / _BLUR + 0.5, 0.0, 1.0)
-        tone = _looked_up(self.tone, x, y)
-        weighted = tone * kept * _WEIGHTS[:, None]
+        inside = np.clip((offsets[..., None, None] - beyond) / _BLUR + 0.5, 0.0, 1.0)
+        tone = _interpolated(self.tone, x, y)
+        weighted = tone * inside * _WEIGHTS[:, None]
         return np.asarray(weighted.reshape(*offsets.shape, -1), dtype=np.float64)
 
 
 def query_map(contour: NDArray[np.floating], border: float) -> NDArray[np.float64]:
-    """The map of a cut silhouette, turned so that its border is on the right.
+    """The map of a cut silhouette, rotated so that its border is on the right.
 
     Args:
         contour: (N, 2) outline in normal form, the border's stretch included.
-        border: Where the border lies, radians; see `silhouette.Silhouette`.
+        border: Bearing of the border, radians; see `silhouette.Silhouette`.
 
     Returns:
         (R * A,) float64.
@@ -123,7 +122,7 @@ def query_map(contour: NDArray[np.floating], border: float) -> NDArray[np.float6
     tone = _blurred(contour)
     around = border + np.arange(_ANGLES) * (2 * np.pi / _ANGLES)
     x, y = _RADII[:, None] * np.cos(around), _RADII[:, None] * np.sin(around)
-    return np.asarray((_looked_up(tone, x, y) * _WEIGHTS[:, None]).ravel(), dtype=np.float64)
+    return np.asarray((_interpolated(tone, x, y) * _WEIGHTS[:, None]).ravel(), dtype=np.float64)
 
 
 def mirrored_map(whole: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -133,7 +132,7 @@ def mirrored_map(whole: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class CutIndex:
-    """Known views, cut from all sides; each is prepared when it is first asked for.
+    """Known views, cut from all sides; each is prepared on first use.
 
     Args:
         shapes: The views' shapes, uncut.
@@ -143,7 +142,7 @@ class CutIndex:
         self._shapes = shapes
         self._slots = np.full(len(shapes), -1, dtype=np.intp)
         self._used = 0
-        size = (min(len(shapes), KEPT), BEARINGS, len(SHARES))
+        size = (min(len(shapes), CACHED), BEARINGS, len(SHARES))
         self._codes = np.zeros((*size, _basis().shape[1]), dtype=np.float32)
         self._powers = np.zeros(size, dtype=np.float32)
         self._offsets = np.zeros(size, dtype=np.float32)
@@ -151,16 +150,16 @@ class CutIndex:
     def likeliest(
         self, query: NDArray[np.float64], among: NDArray[np.intp], most: int, *, mirror: bool = True
     ) -> list[tuple[int, CutLine]]:
-        """The views that, cut somewhere, look most like a cut silhouette.
+        """The views that, after some cut, are most similar to a cut silhouette.
 
         Args:
             query: Its map, see `query_map`.
-            among: Numbers of the views to look at, `KEPT` at most.
-            most: How many are wanted.
+            among: Numbers of the views to search, `CACHED` at most.
+            most: How many to return.
             mirror: Whether mirror images count.
 
         Returns:
-            (number of the view, its best cut), the best first.
+            (number of the view, its best cut), best first.
         """
         slots = self._prepared(among)
         both = np.stack([query, mirrored_map(query)] if mirror else [query], axis=1)
@@ -178,7 +177,7 @@ class CutIndex:
         return list(zip(among[order].tolist(), cuts, strict=True))
 
     def _prepared(self, among: NDArray[np.intp]) -> NDArray[np.intp] | slice:
-        """Where views stand, prepared; neighbours as a slice, so that nothing is copied."""
+        """Slots of the prepared views; contiguous ones as a slice, to avoid a copy."""
         missing = among[self._slots[among] < 0]
         if self._used + len(missing) > len(self._codes):
             self._slots[:] = -1
@@ -206,13 +205,13 @@ class CutIndex:
         best: NDArray[np.intp],
         power: float,
     ) -> list[CutLine]:
-        """The best cut of each view, between those that were tried.
+        """The best cut of each view, interpolated between the tested ones.
 
         Args:
-            slots: (K,) where the views stand.
+            slots: (K,) slots of the views.
             apart: (K, BEARINGS, SHARES, S) squared distances.
-            best: (K,) numbers of the least of them.
-            power: Of the query's map.
+            best: (K,) flat indices of their minima.
+            power: Power of the query's map.
         """
         turn, share, side = np.unravel_index(best, apart.shape[1:])
         each = np.arange(len(slots))
@@ -240,7 +239,7 @@ class CutIndex:
 
 
 def _lowest(three: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where parabolas through three values (K, 3) are lowest, in steps from the middle, and by how much."""
+    """Minima of parabolas through three values (K, 3): offset from the middle, in steps, and depth."""
     before, middle, after = three.astype(np.float64).T
     bend = before - 2 * middle + after
     hollow = bend > 1e-9
@@ -250,15 +249,15 @@ def _lowest(three: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np
 
 
 def cut_outline(contour: NDArray[np.floating], cut: CutLine) -> NDArray[np.float64]:
-    """The outline of a view once it is cut, in normal form of its own.
+    """The outline of a cut view, in its own normal form.
 
     Args:
         contour: (N, 2) outline in normal form.
         cut: The line.
 
     Returns:
-        (M, 2) float64, the line's stretch included; of pieces that the line parts, all, joined along it.
-        The outline itself when nothing would be left.
+        (M, 2) float64, the line's stretch included; all pieces that the line separates, joined along
+        it. The outline itself when nothing would remain.
     """
     points = np.asarray(contour, dtype=np.float64)
     height = points @ (np.cos(cut.bearing), np.sin(cut.bearing)) - cut.offset
@@ -267,11 +266,11 @@ def cut_outline(contour: NDArray[np.floating], cut: CutLine) -> NDArray[np.float
     part = np.where(crosses, height / np.where(crosses, height - after, 1.0), 0.0)
     crossing = points + part[:, None] * (following - points)
     both = np.stack([points, crossing], axis=1).reshape(-1, 2)
-    kept = both[np.stack([height <= 0, crosses], axis=1).ravel()]
-    if len(kept) < 3:
+    clipped = both[np.stack([height <= 0, crosses], axis=1).ravel()]
+    if len(clipped) < 3:
         return points
-    area, centroid = polygon_moments(kept)
-    return resample_closed((kept - centroid) / max(abs(area), 1e-9) ** 0.5)
+    area, centroid = polygon_moments(clipped)
+    return resample_closed((clipped - centroid) / max(abs(area), 1e-9) ** 0.5)
 
 
 def _bearings() -> NDArray[np.float64]:
@@ -280,7 +279,7 @@ def _bearings() -> NDArray[np.float64]:
 
 @lru_cache(maxsize=1)
 def _basis() -> NDArray[np.float64]:
-    """Slow waves along the rings and round them, orthonormal: maps' coarse form; (R * A, D)."""
+    """An orthonormal basis of low frequencies along and around the rings, (R * A, D)."""
     ring = np.arange(len(_RADII)) + 0.5
     rings = np.cos(np.pi / len(_RADII) * np.outer(ring, np.arange(_RING_WAVES)))
     phase = np.outer(np.arange(_ANGLES), np.arange(_TURN_WAVES + 1)) * (2 * np.pi / _ANGLES)
@@ -295,7 +294,7 @@ def _blurred(contour: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.asarray(tone, dtype=np.float32)
 
 
-def _looked_up(
+def _interpolated(
     tone: NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Tones at positions in units, of any shape."""

@@ -1,9 +1,9 @@
-"""Compiled loops of `pose_fit.py`: a mesh drawn with a depth buffer, and how well the drawing fits.
+"""Compiled loops of `pose_fit.py`: rendering a mesh with a depth buffer, and scoring the fit.
 
-A drawing is moved and scaled to the centroid and the area of what is seen, so that only the orientation
-is searched for. Within both outlines, grey values are explained by the normals of the surface that is
-drawn there, through the nine spherical harmonics of second order: what any distant light on a matt
-surface gives, whatever the light (Basri and Jacobs, Lambertian Reflectance and Linear Subspaces, 2003).
+The rendering is moved and scaled to the centroid and area of the observed region, so that only the
+orientation is searched. Within both outlines, grey values are regressed on the normals of the rendered
+surface, through the nine spherical harmonics of second order, which cover any distant light on a matt surface
+(Basri and Jacobs, Lambertian Reflectance and Linear Subspaces, 2003).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from visup.compiled import compiled
 
 HARMONICS = 8
-"""The constant is taken off as the mean."""
+"""Without the constant, which the mean removes."""
 
 _RIDGE = 2e-3
 _FEWEST = 30
@@ -28,7 +28,7 @@ def _project(
     place: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """Vertices (V, 3) in the square, (V, 3): x, y, depth; `place` is x, y and scale."""
+    """Project vertices (V, 3) into the square, (V, 3): x, y, depth; `place` is x, y and scale."""
     for i in range(len(vertices)):
         p = vertices[i]
         x = turn[0, 0] * p[0] + turn[0, 1] * p[1] + turn[0, 2] * p[2]
@@ -62,7 +62,7 @@ def _draw(
         x1 = min(side - 1, int(np.floor(max(ax, bx, cx) - 0.5)))
         y0 = max(0, int(np.ceil(min(ay, by, cy) - 0.5)))
         y1 = min(side - 1, int(np.floor(max(ay, by, cy) - 0.5)))
-        # Shares of the corners a and b at a pixel change evenly from pixel to pixel.
+        # Barycentric coordinates of corners a and b change linearly from pixel to pixel.
         a_right, a_down = (by - cy) / double, (cx - bx) / double
         b_right, b_down = (cy - ay) / double, (ax - cx) / double
         za, zb, zc = points[i, 2], points[j, 2], points[m, 2]
@@ -81,7 +81,7 @@ def _draw(
 
 @compiled
 def _moments(cover: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Area and centroid of what is covered, pixels of the square."""
+    """Area and centroid of the covered part, pixels of the square."""
     area, across, down = 0.0, 0.0, 0.0
     for y in range(cover.shape[0]):
         for x in range(cover.shape[1]):
@@ -121,7 +121,7 @@ def _shading(
     cover: NDArray[np.float64],
     tone: NDArray[np.float64],
 ) -> float:
-    """Share of the grey values' variance that the drawn normals explain, 0 to 1."""
+    """Share of the grey values' variance that the rendered normals explain, 0 to 1."""
     products = np.zeros((HARMONICS, HARMONICS))
     along, sums, h = np.zeros(HARMONICS), np.zeros(HARMONICS), np.empty(HARMONICS)
     count, grey, squares = 0.0, 0.0, 0.0
@@ -148,9 +148,7 @@ def _shading(
                 for j in range(i + 1):
                     products[i, j] += h[i] * h[j]
     total = squares - grey * grey / max(count, 1.0)
-    if (
-        count < _FEWEST or total < count
-    ):  # of a tone within one grey value there is nothing to explain
+    if count < _FEWEST or total < count:  # tones within one grey level: nothing to explain
         return 0.0
     for i in range(HARMONICS):
         along[i] -= sums[i] * grey / count
@@ -162,7 +160,7 @@ def _shading(
 
 @compiled
 def _overlap(cover: NDArray[np.float64], number: NDArray[np.int32]) -> float:
-    """Intersection over union of what is covered and what is drawn."""
+    """Intersection over union of the covered and the rendered part."""
     both, either = 0.0, 0.0
     for row in range(cover.shape[0]):
         for column in range(cover.shape[1]):
@@ -174,7 +172,7 @@ def _overlap(cover: NDArray[np.float64], number: NDArray[np.int32]) -> float:
 
 @compiled
 def start_place(cover: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where a drawing begins to be fitted: x, y and pixels of the radius."""
+    """Initial placement of a rendering: x, y and the radius in pixels."""
     area, x, y = _moments(cover)
     return np.array([x, y, area**0.5])
 
@@ -188,9 +186,9 @@ def fit_of(
     place: NDArray[np.float64],
     scratch: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
 ) -> tuple[float, float]:
-    """How well a drawn mesh fits: overlap of the outlines (IoU), and share of the tone explained.
+    """The fit of a rendered mesh: overlap of the outlines (IoU), and share of the tone explained.
 
-    `place` (x, y and pixels of the radius) is moved so that centroid and area come nearer to those seen.
+    `place` (x, y and radius in pixels) is updated so that centroid and area approach the observed ones.
     """
     vertices, faces, normals = mesh
     cover, tone = seen
@@ -212,7 +210,7 @@ def fit_of(
 
 @compiled
 def _about(axis: int, angle: float) -> NDArray[np.float64]:
-    """Rotation about one of the camera's axes."""
+    """Rotation about a camera axis."""
     turn = np.eye(3)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     turn[i, i] = turn[j, j] = np.cos(angle)
@@ -230,19 +228,19 @@ def climb(
     steps: NDArray[np.float64],
     shading: float,
 ) -> tuple[NDArray[np.float64], float, float, float]:
-    """The orientation from which no turn of the last step about a camera axis fits better.
+    """Hill climbing to an orientation that no rotation by the last step improves.
 
     Args:
         mesh: Vertices (V, 3), faces (F, 3), normals (F, 3).
         seen: `cover` and `tone` of a `RegionPicture`.
         start: (3, 3) orientation, model to camera.
         distance: From the viewer to the mesh's centre, in units of its radius.
-        steps: Turns to try, radians, largest first; each up to three rounds.
-        shading: Weight of the tone explained beside the overlap.
+        steps: Rotations to try, radians, largest first; each for up to three rounds.
+        shading: Weight of the explained tone relative to the overlap.
 
     Returns:
-        Orientation (3, 3), its overlap, the share of tone explained, and pixels of the square that the
-        mesh's radius takes at its centre.
+        Orientation (3, 3), its overlap, the share of tone explained, and the mesh's radius at its
+        centre, pixels of the square.
     """
     side = len(seen[0])
     scratch = (

@@ -1,4 +1,4 @@
-"""What is kept of a mesh so that it can be drawn at run time: few triangles, in a unit sphere."""
+"""Mesh models for rendering at run time: few triangles, in a unit sphere."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import DatabaseError
 
 MOST_FACES = 2500
-"""A mesh of more triangles is simplified: at the size at which poses are fitted nobody can tell."""
+"""Meshes with more triangles are simplified, which is invisible at the size at which poses are fitted."""
 
 _CELLS = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshModel:
-    """A mesh that poses are fitted with.
+    """A mesh for pose fitting.
 
     Attributes:
         name: Of the model.
         vertices: (V, 3) float32, in units of `radius` about the centre of the mesh's box, mesh axes.
         faces: (F, 3) int32, numbers of vertices.
         radius: Distance of the farthest vertex from that centre, mesh units (metres where those are).
-        normals: (F, 3) float64 unit normals; which side is out is not relied on.
+        normals: (F, 3) float64 unit normals; their sign is not relied on.
     """
 
     name: str
@@ -41,7 +41,7 @@ class MeshModel:
 
 
 def mesh_model(name: str, vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> MeshModel:
-    """What is kept of a mesh.
+    """Make the model of a mesh.
 
     Args:
         name: Of the model.
@@ -49,8 +49,8 @@ def mesh_model(name: str, vertices: NDArray[np.floating], faces: NDArray[np.inte
         faces: (F, 3), numbers of vertices.
 
     Returns:
-        The mesh in its unit sphere; of more than `MOST_FACES` triangles, vertices within a cell of
-        a coarse grid are drawn together, which moves a surface by a fortieth of the diameter at most.
+        The mesh in its unit sphere; beyond `MOST_FACES` triangles, vertices within a cell of a coarse
+        grid are merged, which moves a surface by at most a fortieth of the diameter.
     """
     points = np.asarray(vertices, dtype=np.float64)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -77,15 +77,15 @@ def _clustered(
 
 
 def mesh_bytes(model: MeshModel) -> tuple[bytes, bytes]:
-    """Vertices and faces as they are stored: little-endian, row by row."""
+    """Vertices and faces in stored form: little-endian, row by row."""
     return model.vertices.astype("<f4").tobytes(), model.faces.astype("<i4").tobytes()
 
 
 def stored_mesh(name: str, radius: float, vertices: bytes, faces: bytes) -> MeshModel:
-    """The mesh that `mesh_bytes` gave.
+    """The inverse of `mesh_bytes`.
 
     Raises:
-        DatabaseError: The bytes are of no mesh.
+        DatabaseError: The bytes are not a mesh.
     """
     if len(vertices) % 12 or len(faces) % 12 or not vertices or not faces or not radius > 0.0:
         raise DatabaseError(f"the mesh of '{name}' is damaged")

@@ -1,10 +1,10 @@
-"""Orientations fitted to what is seen: a model's mesh is drawn, compared, turned a little, drawn again.
+"""Pose fitting by analysis by synthesis: a mesh is rendered, compared, rotated a little, and so on.
 
-What is compared is the outline (overlap) and what is inside it (how much of the shading the drawn surface
-explains); the second tells apart the directions from which a symmetric object has the same outline.
-Approximations: the light is distant, the surface matt and of one colour or nearly so, nothing casts a shadow
-on it; where that does not hold the shading explains less, and the outline decides alone. The camera is
-taken to look at the object's centre, with the focal length of a usual lens where none is told.
+The score combines the outline (overlap) and its inside (how much of the shading the rendered surface
+explains); the latter separates directions from which a symmetric object has the same outline. Approximations:
+the light is distant, the surface matt and of nearly one colour, without cast shadows; where that fails the
+shading explains less, and the outline decides alone. The camera is assumed to look at the object's centre,
+with the focal length of a usual lens where none is given.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.refinement.region_picture import RegionPicture
 
 SHADING = 0.3
-"""Weight of the share of shading explained beside the overlap."""
+"""Weight of the explained shading relative to the overlap."""
 
 COARSE = np.radians([16.0, 8.0, 4.0])
-"""Steps of a whole search from the orientations of views, radians; what it leads to is searched finely."""
+"""Steps of a full search from the orientations of views, radians; its results are then refined."""
 
 FINE = np.radians([2.0, 1.0, 0.5])
-"""Steps of the search from an orientation fitted a moment ago, radians; a coarser last one would lag
-behind what turns slowly."""
+"""Steps of the search from a recently fitted orientation, radians; a coarser last step would lag behind slow
+rotation."""
 
 USUAL_FOCAL = 1.2
 """Focal length of a usual lens, in widths of the picture (a horizontal field of view of 45 degrees)."""
 
 SAME = np.radians(12.0)
-"""Orientations nearer to each other than this are one."""
+"""Orientations closer than this are the same, radians."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseFit:
-    """An orientation, and how well it fits.
+    """A fitted orientation and its quality.
 
     Attributes:
-        orientation: (3, 3) model to a camera that looks at the object.
+        orientation: (3, 3) model to a camera looking at the object.
         overlap: Intersection over union of the outlines.
         explained: Share of the shading explained, 0 to 1.
-        area: Of the silhouette, mesh units squared, were it seen from so far that nothing is foreshortened
-            by perspective.
+        area: Area of the silhouette in parallel projection, without perspective foreshortening, mesh units
+            squared.
         start: Number of the orientation from which the search began.
     """
 
@@ -57,7 +57,7 @@ class PoseFit:
 
     @property
     def worth(self) -> float:
-        """What fits are ranked by."""
+        """The score by which fits are ranked."""
         return self.overlap + SHADING * self.explained
 
 
@@ -69,13 +69,13 @@ def fitted_poses(
     steps: NDArray[np.float64] = COARSE,
     focal_px: float,
 ) -> list[PoseFit]:
-    """The orientations that searches from several others lead to, best first, each once.
+    """Search from several orientations; distinct results, best first.
 
     Args:
         model: The mesh.
-        picture: What is seen.
+        picture: The observed region.
         starts: (3, 3) orientations, model to camera.
-        steps: Turns that are tried, radians.
+        steps: Rotations to try, radians.
         focal_px: Focal length, pixels of the frame.
     """
     mesh = (model.vertices, model.faces, model.normals)
@@ -92,10 +92,10 @@ def fitted_poses(
 
 
 def _distance(picture: RegionPicture, focal_px: float) -> float:
-    """About how far away the object is, in units of its radius; no nearer than two.
+    """Approximate distance of the object, in units of its radius; at least two.
 
-    Its radius is taken for half its longer side in the picture, which a view along a long axis belies;
-    perspective then is taken too weak, as a parallel projection would.
+    Its radius is taken as half its longer side in the picture, which is too small for a view along a
+    long axis; perspective is then underestimated, towards a parallel projection.
     """
     rows, columns = np.nonzero(picture.cover > 0.5)
     longer = max(np.ptp(rows), np.ptp(columns)) + 1 if len(rows) else 1
@@ -103,11 +103,11 @@ def _distance(picture: RegionPicture, focal_px: float) -> float:
 
 
 def _distinct(fits: Sequence[PoseFit]) -> list[PoseFit]:
-    kept: list[PoseFit] = []
+    distinct: list[PoseFit] = []
     for fit in fits:
-        if all(_apart(fit.orientation, other.orientation) > SAME for other in kept):
-            kept.append(fit)
-    return kept
+        if all(_apart(fit.orientation, other.orientation) > SAME for other in distinct):
+            distinct.append(fit)
+    return distinct
 
 
 def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -1,4 +1,4 @@
-"""View hypotheses with the orientations that fit what is seen, in place of those of stored views."""
+"""Refinement of view hypotheses: orientations fitted to the image replace those of stored views."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from visup.percepts.shape.refinement.pose_fit import (
 from visup.percepts.shape.refinement.region_picture import RegionPicture, region_picture
 
 SizedHypothesis = tuple[Hypothesis, float | None]
-"""A hypothesis with the area of its silhouette, model units squared, where that is known."""
+"""A hypothesis with the area of its silhouette, model units squared, where known."""
 
 MoreViews = Callable[[str], Sequence[SizedHypothesis]]
-"""Gives further views of one model that a region looks like, best first."""
+"""Returns further matching views of one model, best first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +32,13 @@ class RefinerSettings:
     """How orientations are fitted.
 
     Attributes:
-        names: Models of a region that are fitted, the most similar first.
-        starts: Views from which a whole search begins.
-        kept: Orientations that are told and followed.
-        renew_s: Seconds after which a whole search is made again.
-        least_overlap: A fit that overlaps less is none: the region shows a part, or something else.
-        lost: Overlap lost since the last whole search that calls for another.
-        rank: What a fit that is worth 1 less loses of its similarity.
+        names: Models fitted for each region, the most similar first.
+        starts: Number of views from which a full search starts.
+        kept: Orientations reported and tracked.
+        renew_s: Seconds after which a full search is repeated.
+        least_overlap: A fit with less overlap is rejected: the region shows a part, or something else.
+        lost: Overlap lost since the last full search that triggers another.
+        rank: Loss of similarity per unit of a fit's score below the best.
     """
 
     names: int = 1
@@ -52,12 +52,12 @@ class RefinerSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedModel:
-    """What was fitted of a model to a region.
+    """The last fit of a model to a region.
 
     Attributes:
-        time: Seconds of the last whole search.
-        overlap: Of the best fit then.
-        orientations: (K, 3, 3), best first, as fitted last.
+        time: Seconds of the last full search.
+        overlap: Overlap of the best fit then.
+        orientations: (K, 3, 3), best first, as last fitted.
         views: (K,) numbers of the views from which each was found.
     """
 
@@ -68,15 +68,15 @@ class FittedModel:
 
 
 FitMemory = Mapping[tuple[int, str], FittedModel]
-"""(region, model) -> what was fitted."""
+"""(region, model) -> last fit."""
 
 
 class PoseRefiner:
-    """Fits the meshes of models to regions, from look to look.
+    """Fits the meshes of models to regions and tracks the fits over time.
 
     Args:
-        meshes: By the models' names.
-        settings: How.
+        meshes: Meshes by the models' names.
+        settings: Settings.
     """
 
     def __init__(
@@ -87,35 +87,35 @@ class PoseRefiner:
         self.memory: dict[tuple[int, str], FittedModel] = {}
 
     def forget(self, here: Collection[int]) -> None:
-        """Drop what is remembered of regions that are not in view."""
+        """Drop the fits of regions that are not in view."""
         self.memory = {key: fit for key, fit in self.memory.items() if key[0] in here}
 
     def refined(
-        self, frame: Frame, region: Region, said: Sequence[SizedHypothesis], more: MoreViews
+        self, frame: Frame, region: Region, hypotheses: Sequence[SizedHypothesis], more: MoreViews
     ) -> tuple[SizedHypothesis, ...]:
-        """Hypotheses of one region, those of its likeliest models with fitted orientations.
+        """Hypotheses of one region, with fitted orientations for its likeliest models.
 
         Args:
-            frame: Where it was seen.
-            region: The region; one that the image border cuts is left as it is.
-            said: Hypotheses of views, best first.
-            more: Asked for further views when a whole search is made.
+            frame: The frame that shows it.
+            region: The region; one cut by the image border is left unchanged.
+            hypotheses: Hypotheses of views, best first.
+            more: Called for further views in a full search.
 
         Returns:
-            Hypotheses, best first; the similarity of the best of each model is as it was.
+            Hypotheses, best first; the similarity of the best of each model is unchanged.
         """
-        names = self._names(said)
+        names = self._names(hypotheses)
         if not names or region.cut:
-            return tuple(said)
+            return tuple(hypotheses)
         picture = region_picture(frame, region)
-        out = [(h, area) for h, area in said if h.name not in names]
+        out = [(h, area) for h, area in hypotheses if h.name not in names]
         for name in names:
-            own = [(h, area) for h, area in said if h.name == name]
+            own = [(h, area) for h, area in hypotheses if h.name == name]
             out += self._fitted(frame, region, picture, own, more) or own
         return tuple(sorted(out, key=lambda sized: -sized[0].similarity))
 
-    def _names(self, said: Sequence[SizedHypothesis]) -> list[str]:
-        known = (h.name for h, _ in said if h.name in self.meshes and h.direction is not None)
+    def _names(self, hypotheses: Sequence[SizedHypothesis]) -> list[str]:
+        known = (h.name for h, _ in hypotheses if h.name in self.meshes and h.direction is not None)
         return list(dict.fromkeys(known))[: self.settings.names]
 
     def _fitted(
@@ -126,7 +126,7 @@ class PoseRefiner:
         own: Sequence[SizedHypothesis],
         more: MoreViews,
     ) -> list[SizedHypothesis]:
-        """Hypotheses of one model with fitted orientations; none where it does not fit."""
+        """Hypotheses of one model with fitted orientations; none if it does not fit."""
         s, best = self.settings, own[0][0]
         key = region.id, best.name
         before = self.memory.get(key)
@@ -134,7 +134,7 @@ class PoseRefiner:
             starts, numbers = list(before.orientations), before.views
             fits = self._search(frame, best.name, picture, starts, FINE)
             if fits and fits[0].overlap >= before.overlap - s.lost:
-                return self._remembered(key, before.time, before.overlap, fits, numbers, best)
+                return self._stored(key, before.time, before.overlap, fits, numbers, best)
         wide = _orientations([h for h, _ in [*own, *more(best.name)]])[: s.starts]
         starts = [turn for _, turn in wide]
         numbers = tuple(view for view, _ in wide)
@@ -144,7 +144,7 @@ class PoseRefiner:
         if not fits or fits[0].overlap < s.least_overlap:
             self.memory.pop(key, None)
             return []
-        return self._remembered(key, frame.time, fits[0].overlap, fits, numbers, best)
+        return self._stored(key, frame.time, fits[0].overlap, fits, numbers, best)
 
     def _search(
         self,
@@ -163,7 +163,7 @@ class PoseRefiner:
         fine = fitted_poses(mesh, picture, near, steps=FINE, focal_px=focal)
         return [replace(f, start=fits[f.start].start) for f in fine]
 
-    def _remembered(
+    def _stored(
         self,
         key: tuple[int, str],
         time: float,
@@ -172,7 +172,7 @@ class PoseRefiner:
         numbers: Sequence[int],
         best: Hypothesis,
     ) -> list[SizedHypothesis]:
-        """The fits as hypotheses, and remembered."""
+        """Store the fits and return them as hypotheses."""
         turns = np.stack([f.orientation for f in fits])
         chosen = tuple(numbers[f.start] for f in fits)
         self.memory[key] = FittedModel(time, overlap, turns, chosen)
@@ -194,11 +194,11 @@ class PoseRefiner:
         ]
 
 
-def _orientations(said: Sequence[Hypothesis]) -> list[tuple[int, NDArray[np.float64]]]:
-    """(view, orientation) of each view once, those alone that tell an orientation."""
+def _orientations(hypotheses: Sequence[Hypothesis]) -> list[tuple[int, NDArray[np.float64]]]:
+    """(view, orientation) of each view with a known orientation, once."""
     once = {
         (h.view, h.direction): (h.view, orientations(h.direction, h.rotation))
-        for h in said
+        for h in hypotheses
         if h.direction is not None and h.rotation is not None
     }
     return list(once.values())

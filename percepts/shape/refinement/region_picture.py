@@ -1,4 +1,4 @@
-"""What is seen of a region, reduced to the small square in which poses are fitted."""
+"""An image region reduced to the small square in which poses are fitted."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from visup.agent.model.records import Frame, Region
 
 SIDE = 52
-"""Pixels along the square: enough to tell two degrees of turn, few enough to be drawn a thousand times."""
+"""Side of the square, pixels: enough to resolve two degrees, few enough for a thousand renderings."""
 
 _MARGIN = 0.12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegionPicture:
-    """A region on a square.
+    """A region resampled to a square.
 
     Attributes:
         cover: (SIDE, SIDE) float64, share of each pixel that the region covers.
@@ -32,16 +32,16 @@ class RegionPicture:
 
 
 def region_picture(frame: Frame, region: Region) -> RegionPicture:
-    """The square about a region.
+    """Resample a region.
 
     Args:
-        frame: The frame in which it was seen.
-        region: Of a mask that lies within the frame.
+        frame: The frame that shows it.
+        region: The region; its mask lies within the frame.
     """
     x, y, w, h = region.bbox
     side = max(w, h) * (1.0 + 2.0 * _MARGIN)
     pad = int(np.ceil(side / 2)) + 1
-    # Only what is needed is converted: the square's surroundings at most.
+    # Convert no more than the square's surroundings.
     left, top = max(0, x - pad), max(0, y - pad)
     crop = frame.image[top : y + h + pad, left : x + w + pad]
     grey = np.asarray(cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY), np.float32)

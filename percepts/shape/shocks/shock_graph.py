@@ -1,11 +1,11 @@
-"""Shock graphs: a silhouette as a rooted graph of parts, from the thickest to the thinnest.
+"""Shock graphs: a silhouette as a rooted graph of parts, from thick to thin.
 
-After Siddiqi et al. (1999): every shock is a node; where two meet, the one of the greater radius (the
-one that formed later as the fire burned inwards) is the parent. A symbolic root stands above the
-shocks that have no parent. The grammar that follows: seeds hang only below the root; necks are leaves;
-a bend or protrusion has at most two parents, one for each of its ends. Each node carries what it
-looks like (radii along it, length) and what the shape looks like from it, so that nodes can be
-compared without looking at edges.
+After Siddiqi et al. (1999): every shock is a node; where two meet, the one of greater radius (which formed
+later as the fire burned inwards) is the parent. A symbolic root is the parent of shocks without one. The
+resulting
+grammar: seeds are children of the root only; necks are leaves; a bend or protrusion has at most two parents,
+one for each end. Each node carries its own shape (radii along it, length) and the shape as seen from it, so
+that nodes can be compared without looking at edges.
 
 Read next: `topological_signature.py`, then `graph_matching.py`.
 """
@@ -40,13 +40,13 @@ PROFILE = 8
 """Radii sampled along each node."""
 
 MOST_NODES = 120
-"""Nodes kept; a silhouette with more significant parts than this loses its smallest ones."""
+"""Most nodes; a silhouette with more significant parts loses its smallest ones."""
 
 POINT_LENGTH = 0.05
-"""Length that every node counts beyond its own, so that necks and seeds count too; units."""
+"""Length added to every node, so that necks and seeds count too; units."""
 
 OUTLOOK = 0.15
-"""Length of skeleton to both sides of a node's middle that tells its direction; units."""
+"""Length of skeleton on both sides of a node's middle that defines its direction; units."""
 
 AREA_STEP = 1 / 25
 """Distance between the points at which the area is sampled, units."""
@@ -61,18 +61,18 @@ class ShockGraph:
     Attributes:
         kinds: (N,) int8, `ShockKind` of each node.
         edges: (M, 2) int16, (parent, child), sorted.
-        weights: (N,) float32, share of the skeleton's length that each node stands for, every node a
-            little longer than it is; they sum to 1, and the root's is 0.
+        weights: (N,) float32, share of the skeleton's length, each node extended by `POINT_LENGTH`; they
+            sum to 1, and the root's is 0.
         lengths: (N,) float32, length along the skeleton; 0 for necks, seeds and the root.
-        profiles: (N, PROFILE) float32, radius from the node's thicker end to its thinner.
-        contexts: (N, CONTEXT) float32, how much of the shape lies how far and in which direction from
-            the node, see `skeletal_context.py`; rows but the root's sum to 1.
+        profiles: (N, PROFILE) float32, radius from the node's thicker end to its thinner end.
+        contexts: (N, CONTEXT) float32, distribution of the shape's area by distance and direction from the
+            node, see `skeletal_context.py`; rows but the root's sum to 1.
         positions: (N, 2) float32, (x, y) of the node's middle.
         directions: (N, 2) float32, unit vector along the node at its middle, away from the greater
             part of the shape; 0 for points.
         signatures: (N, topological_signature.LENGTH) float32, topological signature vectors.
         below: (N, N) bool, row u marks u and its descendants.
-        key: Digest of the content; orders graphs where an order must not depend on the caller.
+        key: Digest of the content; gives graphs a canonical order.
     """
 
     kinds: NDArray[np.int8]
@@ -91,7 +91,7 @@ class ShockGraph:
         return len(self.kinds)
 
     def to_networkx(self) -> nx.DiGraph[int]:
-        """The graph for drawing, export (GraphML, DOT) and algorithms; nodes by number, parent to child.
+        """The graph for drawing, export (GraphML, DOT) and algorithms; edges lead from parent to child.
 
         Example:
             >>> from visup.percepts.shape.silhouette.silhouette import normalise
@@ -119,7 +119,7 @@ class ShockGraph:
 
 @dataclass(frozen=True, slots=True)
 class _PlacedShock:
-    """A shock and where it lies: on which branch, between which offsets, thicker end first."""
+    """A shock and its position: branch and offsets, thicker end first."""
 
     kind: ShockKind
     branch: int
@@ -165,7 +165,7 @@ def shock_graph(silhouette: Silhouette) -> ShockGraph:
 def _parts_and_links(
     skeleton: Skeleton, tree: SkeletonTree
 ) -> tuple[list[_PlacedShock], list[tuple[int, int]]]:
-    """Shocks of the whole skeleton and (parent, child) pairs between them, without the root."""
+    """Shocks of the whole skeleton and (parent, child) pairs, without the root."""
     if not skeleton.branches:
         return [_PlacedShock(ShockKind.SEED, 0, 0.0, 0.0, (0, 0), float(skeleton.radii[0]))], []
     parts: list[_PlacedShock] = []
@@ -219,7 +219,7 @@ def _link(point: int, meeting: Sequence[int], parts: list[_PlacedShock]) -> list
 def _ordered(
     parts: list[_PlacedShock], links: list[tuple[int, int]]
 ) -> tuple[list[_PlacedShock], NDArray[np.int16]]:
-    """Parts in the order of their node numbers, and all edges, those from the root among them."""
+    """Parts in the order of their node numbers, and all edges, including those from the root."""
     order = _order(parts, links)
     number = {p: n + 1 for n, p in enumerate(order)}
     pairs = [(number[a], number[b]) for a, b in links if a in number and b in number]
@@ -229,13 +229,13 @@ def _ordered(
 
 
 def _order(parts: list[_PlacedShock], links: list[tuple[int, int]]) -> list[int]:
-    """Part numbers, parents before children, longer first; the shortest dropped when too many."""
+    """Part numbers in topological order, longer first; the shortest are dropped when too many."""
     lengths = np.array([p.length for p in parts])
     kept = set(np.argsort(-lengths, kind="stable")[:MOST_NODES].tolist())
     waiting = {p: {a for a, b in links if b == p and a in kept} for p in kept}
     order: list[int] = []
-    # networkx's lexicographical topological sort gives the same; on the 8 to 40 nodes of a silhouette it
-    # takes 0.6 to 2.5 ms where this takes 0.04 to 0.45 ms, of some 3 ms for the whole shape.
+    # networkx's lexicographical topological sort gives the same order; for the 8 to 40 nodes of a silhouette
+    # it takes 0.6 to 2.5 ms, this 0.04 to 0.45 ms, of some 3 ms for the whole shape.
     while waiting:
         free = [p for p, parents in waiting.items() if not parents]
         best = max(free, key=lambda p: (lengths[p], -p))
@@ -249,7 +249,7 @@ def _order(parts: list[_PlacedShock], links: list[tuple[int, int]]) -> list[int]
 def _assemble(
     silhouette: Silhouette, tree: SkeletonTree, parts: list[_PlacedShock], edges: NDArray[np.int16]
 ) -> ShockGraph:
-    """Measure the nodes and freeze the arrays."""
+    """Measure the nodes and build the arrays."""
     branch = np.array([p.branch for p in parts])
     thick, thin = np.array([(p.thick, p.thin) for p in parts]).T
     middle = SkeletonPlaces(branch, 0.5 * (thick + thin))
@@ -285,9 +285,9 @@ def _directions(
 
     Args:
         tree: The skeleton.
-        middle: The nodes' middles.
+        middle: The middles of the nodes.
         lengths: (N,) lengths of the nodes.
-        onwards: (N,) share of the area that lies towards the end of each node's branch.
+        onwards: (N,) share of the area towards the end of each node's branch.
     """
     reach = np.minimum(OUTLOOK, 0.5 * lengths)
     forth = tree.points_at(middle.branch, middle.offset + reach)
@@ -298,7 +298,7 @@ def _directions(
 
 
 class NodeArrays(TypedDict):
-    """Those arrays of `ShockGraph` that have a row for each node."""
+    """The arrays of `ShockGraph` with one row per node."""
 
     kinds: NDArray[np.int8]
     weights: NDArray[np.float32]
@@ -311,7 +311,7 @@ class NodeArrays(TypedDict):
 
 
 def frozen_graph(edges: NDArray[np.int16], **nodes: Unpack[NodeArrays]) -> ShockGraph:
-    """A graph from its stored arrays; what follows from them is computed. See `ShockGraph`."""
+    """A graph from its stored arrays; derived arrays are computed. See `ShockGraph`."""
     digest = hashlib.blake2b(digest_size=12)
     parts = (nodes["weights"], nodes["profiles"], nodes["contexts"], nodes["positions"])
     for array in (nodes["kinds"], edges, *parts):
@@ -323,7 +323,7 @@ def frozen_graph(edges: NDArray[np.int16], **nodes: Unpack[NodeArrays]) -> Shock
 
 
 def _sample_area(silhouette: Silhouette) -> NDArray[np.float64]:
-    """Some hundred points (P, 2) evenly spread over the silhouette's inside."""
+    """Some hundred points (P, 2) evenly spread over the silhouette."""
     low = silhouette.contour.min(axis=0) - AREA_STEP
     grid = np.round((silhouette.contour - low) / AREA_STEP * 16).astype(np.int32)
     extent = np.ceil(np.ptp(silhouette.contour, axis=0) / AREA_STEP).astype(int) + 3
@@ -336,7 +336,7 @@ def _sample_area(silhouette: Silhouette) -> NDArray[np.float64]:
 def _explain_area(
     area: NDArray[np.float64], tree: SkeletonTree
 ) -> tuple[SkeletonPlaces, NDArray[np.float64]]:
-    """The place on the skeleton whose disc holds each point of the area deepest, and its radius."""
+    """For each point of the area, the skeleton point whose disc contains it deepest, and the radius."""
     power = -2 * area @ tree.points.T
     power += (tree.points**2).sum(axis=1) - tree.radii**2
     best = power.argmin(axis=1)

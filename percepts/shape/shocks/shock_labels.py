@@ -1,9 +1,9 @@
-"""Shocks: the four kinds of skeleton piece, told apart by how the radius changes along it.
+"""Shocks: the four kinds of skeleton segment, classified by the change of radius along it.
 
 After Siddiqi, Shokoufandeh, Dickinson and Zucker, Shock Graphs and Shape Matching (1999): along a
-*protrusion* (1) the radius changes one way; at a *neck* (2) it is least; along a *bend* (3) it stays
-the same; at a *seed* (4) it is greatest. Changes smaller than a share of the radius do not count, so
-that a label does not hang on noise.
+*protrusion* (1) the radius changes monotonically; at a *neck* (2) it has a minimum; along a *bend* (3) it is
+constant; at a *seed* (4) it has a maximum. Changes smaller than a share of the radius are ignored, for
+robustness to noise.
 
 Read next: `shock_graph.py`.
 """
@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 TOLERANCE = 0.18
-"""Share of the radius by which it must change to count as changing."""
+"""Share of the radius below which a change is ignored."""
 
 LEAST_SLOPE = 0.35
 """Change of the radius per length that counts on a branch too short to change by much."""
 
 LEAST_BEND = 1.5
-"""Length of a bend inside a longer branch, in radii, to be told apart from the rest."""
+"""Least length of a bend inside a longer branch, in radii."""
 
 
 class ShockKind(IntEnum):
@@ -59,11 +59,11 @@ def label_branch(
     Args:
         radii: (N,) radius at each point, N at least 2.
         along: (N,) length along the branch at each point, in the same unit.
-        tolerance: Share of the radius below which a change does not count.
+        tolerance: Share of the radius below which a change is ignored.
 
     Returns:
-        Shocks in order along the branch: runs that share their end points, with a neck or a seed
-        between two runs where the radius turns; a neck that stays level for long is a bend.
+        Shocks in order along the branch: runs that share their end points, with a neck or seed between
+        two runs at an extremum of the radius; a neck that stays level for long is a bend.
 
     Example:
         >>> along = np.arange(5.0)
@@ -100,7 +100,7 @@ def label_branch(
 def _level_neck(
     radii: NDArray[np.float64], along: NDArray[np.float64], k: int, tolerance: float
 ) -> tuple[int, int]:
-    """The stretch around a least radius that is level and long enough to be a bend, or the point."""
+    """The level stretch around a minimum if it is long enough for a bend, else the point."""
     level = radii <= radii[k] * (1 + 0.5 * tolerance)
     a = k - int(np.argmin(level[k::-1])) + 1 if not level[: k + 1].all() else 0
     b = k + int(np.argmin(level[k:])) - 1 if not level[k:].all() else len(radii) - 1
@@ -108,11 +108,11 @@ def _level_neck(
 
 
 def turning_points(radii: NDArray[np.float64], tolerance: float) -> list[int]:
-    """Where the radius turns by more than the tolerance, inner points only.
+    """Extrema of the radius deeper than the tolerance, inner points only.
 
     Args:
         radii: (N,) radius at each point.
-        tolerance: Share of the greater radius by which it must come back to count as turned.
+        tolerance: Share of the greater radius by which it must return to count as an extremum.
 
     Returns:
         Numbers of local maxima and minima, alternating.
@@ -142,7 +142,7 @@ def turning_points(radii: NDArray[np.float64], tolerance: float) -> list[int]:
 def _split_run(
     radii: NDArray[np.float64], along: NDArray[np.float64], a: int, b: int, tolerance: float
 ) -> list[Shock]:
-    """A run on which the radius goes one way: one protrusion, one bend, or parts of both."""
+    """Split a monotonic run: one protrusion, one bend, or parts of both."""
     change, length = abs(radii[a] - radii[b]), along[b] - along[a]
     if change <= tolerance * max(radii[a], radii[b]) and change <= LEAST_SLOPE * length:
         return [Shock(ShockKind.BEND, a, b)]

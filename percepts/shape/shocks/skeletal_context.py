@@ -1,12 +1,12 @@
-"""What a shape looks like from a place on its skeleton.
+"""Skeletal contexts: the shape as seen from a point of its skeleton.
 
-Around a place, the shape's area is counted by how far away it lies along the skeleton and in which
-direction, as seen by one who stands there and looks outwards. Sources: shape contexts (Belongie, Malik
-and Puzicha, 2002), taken from skeleton points as in skeletal contexts (Xie, Heng and Shah, Shape
-Matching and Modeling Using Skeletal Context, 2008), with distances within the shape so that a bent
-limb looks as a straight one does (Ling and Jacobs, Shape Classification Using the Inner-Distance,
-2007). Ours: the distance runs along the skeleton alone; left and right are folded onto each other, so
-that a mirror image looks the same; thin parts count for more than their area.
+The context of a point is a histogram of the shape's area over distance along the skeleton and direction
+relative to the skeleton there. Sources: shape contexts (Belongie, Malik and Puzicha, 2002), taken at skeleton
+points as in skeletal contexts (Xie, Heng and Shah, Shape Matching and Modeling Using Skeletal Context, 2008),
+with distances within the shape so that a bent limb looks like a straight one (Ling and Jacobs, Shape
+Classification Using the Inner-Distance, 2007). Different here: distance runs along the skeleton alone; left
+and right are folded onto each other, so that a mirror image looks the same; thin parts count for more than
+their area.
 
 Read next: `shock_graph.py`.
 """
@@ -27,17 +27,17 @@ CONTEXT = RINGS * ANGLES
 
 NEAREST = 0.1
 FARTHEST = 2.0
-"""Distances at the middle of the first and of the last ring, units."""
+"""Distances at the middle of the first and the last ring, units."""
 
 THINNESS = 0.7
-"""Area counts by the thickness there to minus this: 0 is area, 1 is length of skeleton."""
+"""Area is weighted by local thickness to the power of minus this: 0 gives area, 1 skeleton length."""
 
-SAME_PLACE = 1e-9  # what is nearer along a branch is the same place, but for rounding
+SAME_PLACE = 1e-9  # tolerance of offsets along a branch, for rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkeletonPlaces:
-    """Places on a skeleton.
+    """Positions on a skeleton.
 
     Attributes:
         branch: (N,) intp, the branch on which each lies.
@@ -57,7 +57,7 @@ class SkeletonTree:
     Attributes:
         radii: (V,) radius at each point of the branches, one branch after another.
         points: (V, 2) their positions.
-        places: Where on the branches they lie.
+        places: Their positions on the branches.
         lengths: (B,) lengths of the branches; one of length 0 for a single point.
     """
 
@@ -77,7 +77,7 @@ class SkeletonTree:
         meeting, numbered = np.unique(ends, return_inverse=True)
         self._ends = numbered.reshape(-1, 2)
         self._between = _distances(self._ends, self.lengths, len(meeting))
-        # Branches laid end to end with gaps, so that one interpolation serves all of them.
+        # Branches are laid end to end with gaps, so that one interpolation serves all.
         self._starts = np.cumsum(self.lengths + 1.0) - self.lengths
         self._along = self._starts[branch] + self.places.offset
 
@@ -88,13 +88,13 @@ class SkeletonTree:
     def radii_at(
         self, branch: NDArray[np.intp], offset: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Radii at places; arrays that broadcast to a common shape, which is the result's."""
+        """Radii at positions; the arguments broadcast to the shape of the result."""
         return np.asarray(np.interp(self._starts[branch] + offset, self._along, self.radii))
 
     def points_at(
         self, branch: NDArray[np.intp], offset: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Positions of places, (..., 2)."""
+        """(x, y) of positions, (..., 2)."""
         at = self._starts[branch] + offset
         xy = [np.interp(at, self._along, self.points[:, k]) for k in (0, 1)]
         return np.stack(xy, axis=-1)
@@ -102,11 +102,10 @@ class SkeletonTree:
     def ways(
         self, here: SkeletonPlaces, there: SkeletonPlaces
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Ways along the skeleton from N places to M others.
+        """Paths along the skeleton from N positions to M others.
 
         Returns:
-            (N, M) lengths of the ways; and (N, M) whether each sets out towards the end of its
-            branch.
+            (N, M) path lengths; and (N, M) whether each starts towards the end of its branch.
         """
         first, last = self._ends[there.branch].T
         rest = self.lengths[there.branch] - there.offset
@@ -124,7 +123,7 @@ class SkeletonTree:
 def _distances(
     ends: NDArray[np.intp], lengths: NDArray[np.float64], size: int
 ) -> NDArray[np.float64]:
-    """Lengths of the ways between all ends of branches of a tree, (size, size)."""
+    """Path lengths between all ends of branches of a tree, (size, size)."""
     between = np.zeros((size, size))
     known, todo = [int(ends[0, 0])], list(range(len(ends)))
     while todo:
@@ -146,18 +145,18 @@ def directed_contexts(
     positions: NDArray[np.float64],
     directions: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How much of a shape lies how far and in which direction from each of some places.
+    """Histograms of a shape's area by distance and direction from each of some positions.
 
     Args:
         area: (P, 2) points evenly spread over the shape.
-        thickness: (P,) radius of the shape's disc that each point lies in.
-        ways: (N, P) distance along the skeleton from each place to each point.
-        positions: (N, 2) the places.
-        directions: (N, 2) unit vectors in which one looks there; (0, 0) sees all straight ahead.
+        thickness: (P,) radius of the shape's disc that contains each point.
+        ways: (N, P) distance along the skeleton from each position to each point.
+        positions: (N, 2) the positions.
+        directions: (N, 2) unit vectors of the skeleton there; (0, 0) puts all points straight ahead.
 
     Returns:
-        (N, CONTEXT), rows sum to 1; a point counts for the cells around it by how near their middles
-        lie, so that little changes when it moves a little.
+        (N, CONTEXT), rows sum to 1; a point is distributed over the cells around it, so that small
+        moves cause small changes.
     """
     dx = area[:, 0] - positions[:, :1]
     dy = area[:, 1] - positions[:, 1:]
@@ -181,20 +180,20 @@ def directed_contexts(
 
 
 def whole_context(area: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What a shape looks like from its centroid, whichever way one looks.
+    """The shape as seen from its centroid, invariant to rotation.
 
-    The area in each ring of distance as a function of the angle, by the magnitudes of its first
-    Fourier coefficients: these stay when the shape is turned or mirrored (generic Fourier
-    descriptors; Zhang and Lu, 2002).
+    For each ring of distance, the magnitudes of the first Fourier coefficients of the area as a function
+    of angle, which are invariant to rotation and mirroring (generic Fourier descriptors; Zhang and Lu,
+    2002).
 
     Args:
         area: (P, 2) points evenly spread over the shape.
 
     Returns:
-        (CONTEXT,), the coefficients of order 0 summing to 1; what is not needed stays 0.
+        (CONTEXT,), the coefficients of order 0 sum to 1; unused entries are 0.
 
     Example:
-        All of a disc lies alike in every direction: orders 1 and above are all but zero.
+        A disc is the same in every direction: orders 1 and above are nearly zero.
 
         >>> y, x = np.mgrid[-20:21, -20:21] / 35
         >>> disc = np.stack([x, y], axis=-1)[np.hypot(x, y) < 0.5]
@@ -214,7 +213,7 @@ def whole_context(area: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _rings(distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Ring in which each distance lies, as a number from 0 to RINGS - 1 with a fraction."""
+    """Fractional ring of each distance, from 0 to RINGS - 1."""
     scale = (RINGS - 1) / np.log(FARTHEST / NEAREST)
     ring = np.log(np.maximum(distance, NEAREST) / NEAREST) * scale
     return np.asarray(np.minimum(ring, RINGS - 1.0))

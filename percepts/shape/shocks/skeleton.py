@@ -1,12 +1,11 @@
-"""Skeletons: where the fires lit on an outline meet, with the branches that matter.
+"""Skeletons: the medial axis of an outline, pruned to its significant branches.
 
-The skeleton is taken from the Delaunay triangles of the outline's points, whose circumcentres lie on
-it: positions and radii are sub-pixel, and nothing depends on how the pixel grid lies. A piece of it is
-significant by how much longer the outline is between the two points that touch there than the arc of
-the inscribed circle (the circularity residual of Ogniewicz and Kubler, Hierarchic Voronoi Skeletons,
-1995). The residual only grows towards the middle of a shape, so that pruning by it leaves a connected
-tree; on a disc it is zero everywhere and the centre alone is left.
-
+The skeleton is computed from the Delaunay triangles of the outline's points, whose circumcentres lie on it:
+positions and radii are sub-pixel and independent of the pixel grid. A piece of it is significant by how much
+longer the outline is between the two touching points than the arc of the inscribed circle (the circularity
+residual of Ogniewicz and Kubler, Hierarchic Voronoi Skeletons, 1995). The residual grows monotonically
+towards the middle of a shape, so that pruning by it leaves a connected tree; on a disc it is zero everywhere
+and only the centre remains.
 Read next: `shock_labels.py`.
 """
 
@@ -24,11 +23,11 @@ SIGNIFICANCE = 0.08
 """Least residual of a piece of skeleton, in units of the square root of the area."""
 
 JOIN = 0.3
-"""Two branching points nearer than this share of their radius are one."""
+"""Branching points closer than this share of their radius are merged."""
 
 
 LONGEST_EDGE = 0.05
-"""Distance of neighbouring points of a skeleton at most, units."""
+"""Most distance between neighbouring points of a skeleton, units."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +37,8 @@ class Skeleton:
     Attributes:
         points: (V, 2) float64, (x, y) in the silhouette's units.
         radii: (V,) float64, radius of the largest disc inside the outline at each point.
-        branches: Each a run of point numbers from one branching or end point to the next; together
-            they are a tree. Empty when the skeleton is a single point (a disc).
+        branches: Runs of point numbers, each from one branching or end point to the next; together they
+            form a tree. Empty when the skeleton is a single point (a disc).
     """
 
     points: NDArray[np.float64]
@@ -82,7 +81,7 @@ def _single_point(contour: NDArray[np.float64]) -> Skeleton:
 def _voronoi_tree(
     contour: NDArray[np.float64], significance: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]] | None:
-    """Centres, radii and edges of the significant part; or its one best centre without edges."""
+    """Centres, radii and edges of the significant part; or its single best centre without edges."""
     try:
         mesh = Delaunay(contour)
     except QhullError:
@@ -124,10 +123,10 @@ def _circumcircles(
 
 
 def _inside(contour: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Which triangles between points of an outline it encloses, (T,) bool.
+    """Which triangles between points of an outline lie inside it, (T,) bool.
 
-    Neighbours on the outline are joined by a side of some triangle, so that none lies across the
-    outline; one inside has its corners, by their numbers, in the same sense as the outline runs.
+    Neighbours on the outline share a side of some triangle, so that no triangle crosses the outline; one
+    inside has its corner numbers in the same sense as the outline runs.
     """
     a, b, c = (contour[corner] for corner in np.sort(triangles, axis=1).T)
     u, v = b - a, c - a
@@ -140,7 +139,7 @@ def _residual(
     j: NDArray[np.intp],
     centre: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Outline between two touching points minus the circle's arc, the smaller of both sides."""
+    """Outline length between two touching points minus the circle's arc, the smaller of both sides."""
     steps = np.hypot(*(np.roll(contour, -1, axis=0) - contour).T)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     total = along[-1]
@@ -154,10 +153,10 @@ def _residual(
 def _largest_tree(
     points: NDArray[np.float64], edges: NDArray[np.intp], touched: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The edges of the largest connected part, with the outline point that each touches."""
+    """The edges of the largest connected part, with the outline point that each edge touches."""
     size = len(points)
     if len(np.unique(edges)) == len(edges) + 1:
-        # There are no cycles: with one edge less than points, all hangs together already.
+        # Without cycles, one edge less than points means that all is connected.
         return edges, touched
     ones = np.ones(len(edges))
     _, part = connected_components(coo_matrix((ones, edges.T), shape=(size, size)), directed=False)
@@ -175,8 +174,8 @@ def _subdivide(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
     """The tree with points along its long edges, renumbered from 0.
 
-    Between two dents of the outline an edge may be long, and the radius is least in its middle: a neck
-    would be missed if only its ends were looked at.
+    Between two dents of the outline an edge may be long with the least radius in its middle: a neck that
+    its ends alone would miss.
     """
     used, numbers = np.unique(edges, return_inverse=True)
     edges = numbers.reshape(-1, 2).astype(np.intp)
@@ -199,7 +198,7 @@ def _subdivide(
 def _chains(
     edges: NDArray[np.intp], inner: NDArray[np.intp], first: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Edges replaced by chains over their inner points, numbered on from `first`."""
+    """Edges replaced by chains through their inner points, numbered from `first`."""
     piece_of = np.repeat(np.arange(len(edges)), inner + 1)
     piece = np.arange(len(piece_of)) - (np.cumsum(inner + 1) - inner - 1)[piece_of]
     start = np.where(piece == 0, edges[piece_of, 0], first[piece_of] + piece - 1)
@@ -230,7 +229,7 @@ def _trace(edges: NDArray[np.intp], size: int) -> list[list[int]]:
 def _join_near(
     points: NDArray[np.float64], radii: NDArray[np.float64], runs: list[list[int]]
 ) -> Skeleton:
-    """Make one of branching points that lie close together, and drop what no run uses."""
+    """Merge branching points that are close together, and drop unused points."""
     moved = np.arange(len(points))
     ends = [r[0] for r in runs] + [r[-1] for r in runs]
     degree = np.bincount(ends, minlength=len(points)) if ends else np.zeros(len(points), int)

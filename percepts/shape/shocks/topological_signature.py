@@ -1,10 +1,10 @@
-"""Topological signature vectors: what the shape of a graph looks like to its eigenvalues.
+"""Topological signature vectors: the structure of a graph, described by eigenvalues.
 
 After Shokoufandeh, Macrini, Dickinson, Siddiqi and Zucker, Indexing Hierarchical Structures Using Graph
-Spectra (2005): each child of a node stands for the subgraph rooted at it, and contributes the sum of
-the greatest eigenvalue magnitudes of that subgraph's antisymmetric {0, 1, -1} adjacency matrix, as
-many as the child has children. The sums, greatest first, are the node's vector: its length is the
-breadth of the graph at the node and its entries tell of what hangs below.
+Spectra (2005): each child of a node represents the subgraph rooted at it, and contributes the sum of the
+greatest eigenvalue magnitudes of that subgraph's antisymmetric {0, 1, -1} adjacency matrix, as many as the
+child has children. The sums, greatest first, are the node's vector: its length is the breadth of the graph at
+the node and its entries describe what is below.
 
 Read next: `view_index.py`.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 LENGTH = 6
-"""Entries kept of each vector; further, smaller ones are dropped."""
+"""Entries of each vector; smaller ones are dropped."""
 
 
 def adjacency(edges: NDArray[np.int16], size: int) -> NDArray[np.float64]:
@@ -35,14 +35,14 @@ def adjacency(edges: NDArray[np.int16], size: int) -> NDArray[np.float64]:
 
 
 def descendants(edges: NDArray[np.int16], size: int) -> NDArray[np.bool_]:
-    """Which nodes lie below which.
+    """Which nodes are below which.
 
     Args:
         edges: (M, 2) int16, (parent, child); no cycles.
         size: Number of nodes.
 
     Returns:
-        (size, size) bool; row u marks u itself and all that hangs below u.
+        (size, size) bool; row u marks u and its descendants.
     """
     below = np.eye(size, dtype=bool)
     below[edges[:, 0], edges[:, 1]] = True
@@ -57,10 +57,10 @@ def signatures(edges: NDArray[np.int16], size: int, length: int = LENGTH) -> NDA
     Args:
         edges: (M, 2) int16, (parent, child); no cycles.
         size: Number of nodes, at least 1.
-        length: Entries kept of each vector.
+        length: Entries of each vector.
 
     Returns:
-        (size, length) float32, entries falling, zero for leaves.
+        (size, length) float32, entries descending, zero for leaves.
 
     Example:
         A root with two children, of which the first has one leaf. The first child's subgraph is a
@@ -91,5 +91,5 @@ def signatures(edges: NDArray[np.int16], size: int, length: int = LENGTH) -> NDA
 
 
 def _star(leaves: int) -> float:
-    """The sum for a node whose children are leaves: the eigenvalues are +-i sqrt(leaves) and 0."""
+    """The sum for a node whose children are all leaves: its eigenvalues are +-i sqrt(leaves) and 0."""
     return float(min(leaves, 2) * leaves**0.5)

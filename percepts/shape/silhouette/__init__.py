@@ -1,6 +1,5 @@
-"""Silhouettes in normal form, and what is compared of them without a graph.
+"""Silhouettes in normal form, and their comparison without graphs.
 
-Read `silhouette.py` (a mask brought to normal form), `fragments.py` (which islands of a mask belong
-together), `area_overlap.py` (areas laid on each other at all rotations) and `height_functions.py` (outlines
-compared point by point).
+Read `silhouette.py` (normalisation of a mask), `fragments.py` (joining islands of a mask), `area_overlap.py`
+(area overlap at all rotations) and `height_functions.py` (point-by-point comparison of outlines).
 """

@@ -14,7 +14,7 @@ Floats = NDArray[np.float32]
 def heights_along(points: NDArray[np.float64], stops: NDArray[np.intp], out: Floats) -> None:
     """Height functions of an outline of P points, as `outline_heights` defines them, into (P, H)."""
     count, heights = len(points), len(stops) - 1
-    # The outline twice over: what follows a point is then a stretch without an end to wrap round.
+    # The outline is repeated, so that the stretch after any point needs no wrap-around.
     x, y = np.empty(2 * count), np.empty(2 * count)
     for i in range(count):
         x[i] = x[i + count] = points[i, 0]
@@ -74,7 +74,7 @@ def point_costs(first: Floats, second: Floats, costs: Floats) -> None:
     Args:
         first: (P, H).
         second: (H, P).
-        costs: Where they go.
+        costs: Output, (P, P).
     """
     count, width = first.shape
     share = np.float32(1.0 / width)
@@ -91,13 +91,13 @@ def point_costs(first: Floats, second: Floats, costs: Floats) -> None:
 
 @compiled
 def aligned(costs: Floats, diagonal: int, band: int, skip: float, lanes: Floats) -> float:
-    """Least mean cost of an alignment within a band about a diagonal: straight on, or aside for a price.
+    """Least mean cost of an alignment within a band about a diagonal; sideways steps cost `skip`.
 
     Args:
         costs: (P, P).
-        diagonal: Point of the second outline that the band's middle begins at.
+        diagonal: Point of the second outline where the middle of the band starts.
         band: Diagonals on either side.
-        skip: Price of a step aside.
+        skip: Price of a sideways step.
         lanes: (3, 2 * band + 1), scratch.
     """
     count, width = len(costs), 2 * band + 1
@@ -125,15 +125,15 @@ def aligned(costs: Floats, diagonal: int, band: int, skip: float, lanes: Floats)
 
 @compiled
 def best_diagonals(costs: Floats, sums: NDArray[np.float64], best: NDArray[np.intp]) -> int:
-    """The diagonals whose sums are least among their neighbours', the least first.
+    """The diagonals whose sums are local minima, smallest first.
 
     Args:
         costs: (P, P).
         sums: (P,), scratch.
-        best: Where their numbers go, as many as fit.
+        best: Receives their numbers, as many as fit.
 
     Returns:
-        How many there are.
+            How many were found.
     """
     count, wanted = len(costs), len(best)
     for d in range(count):
@@ -162,14 +162,14 @@ def best_diagonals(costs: Floats, sums: NDArray[np.float64], best: NDArray[np.in
 def alignments(
     first: Floats, second: Floats, rotations: int, band: int, skip: float, out: NDArray[np.float64]
 ) -> None:
-    """Least mean costs of pairs of outlines, as they are and mirrored, each at its best few rotations.
+    """Least mean costs of pairs of outlines, as they are and mirrored, over the best few rotations.
 
     Args:
-        first: (B, P, H), or (1, P, H) for one that is compared with all.
+        first: (B, P, H), or (1, P, H) to compare one with all.
         second: (B, P, H).
         rotations: How many rotations of each are tried.
         band: Diagonals on either side of each.
-        skip: Price of a step aside.
+        skip: Price of a sideways step.
         out: (B, 2).
     """
     size, count, width = second.shape

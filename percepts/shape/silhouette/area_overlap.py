@@ -1,9 +1,9 @@
-"""Areas laid on each other: how much of two silhouettes covers the same ground at their best rotation.
+"""Area overlap of two silhouettes at their best rotation.
 
-A silhouette is sampled in rings about its centroid, holes and islands as they are, a little blurred. Turning
-it shifts each ring, so that the overlap at all rotations, mirrored or not, is one correlation by Fourier
-transform. It costs microseconds a view and hardly minds a rough outline, which makes it the first look at a
-database; thin limbs weigh little in it, which is why the outline and the shock graph have their say too.
+A silhouette is sampled in rings about its centroid, holes and islands included, slightly blurred. A rotation
+shifts each ring, so that the overlap at all rotations, mirrored or not, is one correlation by Fourier
+transform. It costs microseconds per view and tolerates rough outlines, which makes it the first filter of a
+database; thin limbs weigh little in it, which is why outlines and shock graphs count too.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 RINGS = 14
 ANGLES = 48
-"""Samples of a map: rings, the innermost first, times angles from x towards y."""
+"""Samples of a map: rings, innermost first, times angles from x towards y."""
 
 _FREQUENCIES = 17
 _EDGES = np.concatenate([np.linspace(0.0, 1.2, 10), np.linspace(1.56, 3.0, 5)])
@@ -28,12 +28,12 @@ _PIXELS = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AreaOverlaps:
-    """How one map lies on others: as they are, and mirrored.
+    """Overlaps of one map with others, as they are and mirrored.
 
     Attributes:
-        similarity: (V, 2) float64, 0 to 1: twice what both cover over the sum of what each covers.
-        rotation: (V, 2) float64, radians from x towards y that take the other (mirrored left to right
-            before, in the second column) onto the one, in (-pi, pi].
+        similarity: (V, 2) float64, 0 to 1: the Dice coefficient.
+        rotation: (V, 2) float64, radians from x towards y that take the other (first mirrored left to right
+            in the second column) onto the one, in (-pi, pi].
     """
 
     similarity: NDArray[np.float64]
@@ -44,10 +44,10 @@ def area_map(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """A silhouette's area by ring and angle about its centroid, in units of its area's square root.
 
     Args:
-        mask: (H, W) bool with something in it; y down.
+        mask: (H, W) bool, not empty; y down.
 
     Returns:
-        (RINGS, ANGLES) uint8, 255 where all is covered. What lies beyond 3 units is left out.
+        (RINGS, ANGLES) uint8, 255 where fully covered. Area beyond 3 units is ignored.
     """
     scale = _PIXELS / float(np.count_nonzero(mask)) ** 0.5
     tone = _reduced(mask, scale)
@@ -74,12 +74,12 @@ def _reduced(mask: NDArray[np.bool_], scale: float) -> NDArray[np.float32]:
 
 
 def paint_outline(contour: NDArray[np.floating], pixels: int, half: float) -> NDArray[np.float32]:
-    """A shape painted on a square about its centroid.
+    """A shape rasterised on a square about its centroid.
 
     Args:
         contour: (N, 2) outline in normal form.
         pixels: Pixels per unit.
-        half: Half the side of the square, units; what lies further out is lost.
+        half: Half the side of the square, units; anything further out is lost.
 
     Returns:
         (S, S) float32, 0 to 1.
@@ -88,13 +88,13 @@ def paint_outline(contour: NDArray[np.floating], pixels: int, half: float) -> ND
     canvas = np.zeros((side, side), dtype=np.uint8)
     spots = np.round((np.asarray(contour) + half) * pixels * 16 - 8).astype(np.int32)
     cv2.fillPoly(canvas, [spots], 255, shift=4)
-    # The pixels along the outline are painted whole, but only half of them is inside.
+    # Pixels along the outline are painted at half intensity, since half of each is inside.
     cv2.polylines(canvas, [spots], True, 128, shift=4)
     return np.asarray(canvas.astype(np.float32) / np.float32(255), dtype=np.float32)
 
 
 class AreaIndex:
-    """Area maps of many views, ready to be compared with one.
+    """Area maps of many views, prepared for comparison with one.
 
     Args:
         maps: (V, RINGS, ANGLES) uint8.
@@ -102,7 +102,7 @@ class AreaIndex:
 
     def __init__(self, maps: NDArray[np.uint8]) -> None:
         spectra, self._powers = _spectra(maps)
-        # One matrix for each frequency: a query meets all views in one product.
+        # One matrix per frequency, so that a query is compared with all views in one product.
         self._spectra = np.ascontiguousarray(np.moveaxis(spectra.conj(), 2, 0))
 
     def __len__(self) -> int:
@@ -111,11 +111,11 @@ class AreaIndex:
     def overlaps(
         self, query: NDArray[np.uint8], among: NDArray[np.intp] | None = None
     ) -> AreaOverlaps:
-        """Lay one map on many.
+        """Overlap one map with many.
 
         Args:
             query: (RINGS, ANGLES) uint8.
-            among: Numbers of the views to look at; all when None.
+            among: Numbers of the views to compare; all when None.
         """
         return _best(*self._turned(query, among))
 
@@ -129,7 +129,7 @@ class AreaIndex:
     def _turned(
         self, query: NDArray[np.uint8], among: NDArray[np.intp] | None
     ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-        """What is covered by both at all rotations, (ANGLES, V, 2), and the sums of what each covers."""
+        """Common area at all rotations, (ANGLES, V, 2), and the sums of both areas."""
         known, powers = self._spectra, self._powers
         if among is not None:
             known, powers = known[:, among], powers[among]
@@ -140,7 +140,7 @@ class AreaIndex:
 
 
 def area_overlaps(query: NDArray[np.uint8], others: NDArray[np.uint8]) -> AreaOverlaps:
-    """Lay one map (RINGS, ANGLES) on others (V, RINGS, ANGLES), uint8 both."""
+    """Overlap one map (RINGS, ANGLES) with others (V, RINGS, ANGLES), both uint8."""
     return AreaIndex(others).overlaps(query)
 
 
@@ -160,14 +160,14 @@ def _best(turned: NDArray[np.floating], powers: NDArray[np.float64]) -> AreaOver
     before, after = (
         np.take_along_axis(turned, (best[None] + step) % ANGLES, axis=0)[0] for step in (-1, 1)
     )
-    # The top of the parabola through the best step and its neighbours.
+    # The vertex of the parabola through the best step and its neighbours.
     bend = np.maximum(2 * chosen - before - after, 1e-9)
     angle = (best + 0.5 * (after - before) / bend) * (2 * np.pi / ANGLES)
-    # A mirror image left to right is one top to bottom, turned by half a turn.
+    # Mirroring left to right is mirroring top to bottom and a half turn.
     angle[:, 1] = np.pi - angle[:, 1]
     return AreaOverlaps(_shares(chosen, powers), np.angle(np.exp(1j * angle)))
 
 
 def _shares(common: NDArray[np.floating], powers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Twice what both cover over the sum of what each covers, (V, 2)."""
+    """Dice coefficients, (V, 2)."""
     return np.clip(2.0 * common.astype(np.float64) / np.maximum(powers, 1e-12)[:, None], 0.0, 1.0)

@@ -1,8 +1,8 @@
-"""Islands of a silhouette: those that belong together are joined, specks are left out.
+"""Joining of silhouette fragments: nearby islands are bridged, specks dropped.
 
 Segmentation breaks thin limbs. Where the largest part does not hold nearly all of a mask, gaps are bridged:
-the mask is closed by the smallest disc that joins nearly all of it, and of what the closing adds only
-bridges are kept, so that bays and gaps within a part stay as they were.
+the mask is closed by the smallest disc that joins nearly all of it, and only the bridges of the closing are
+kept, so that bays and gaps within a part stay as they were.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 ENOUGH = 0.98
-"""Share of the mask that must hang together before gaps are left alone."""
+"""Connected share of the mask from which gaps are not bridged."""
 
 REACHES = (0.015, 0.03, 0.06, 0.1)
 """Radii of the closing discs that are tried, in units of the square root of the area."""
@@ -22,13 +22,13 @@ _MOST_ISLANDS = 2000
 
 
 def join_fragments(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """The largest part of a mask, with the islands that lie near enough.
+    """The largest part of a mask, with the islands near enough to be bridged.
 
     Args:
         mask: (H, W) uint8, 0 or 1.
 
     Returns:
-        (H, W) bool, one 8-connected part; nothing set when the mask is empty.
+        (H, W) bool, one 8-connected part; empty when the mask is.
 
     Example:
         >>> broken = np.zeros((30, 60), dtype=np.uint8)
@@ -53,18 +53,22 @@ def join_fragments(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
 def _largest(
     whole: NDArray[np.uint8], counted: NDArray[np.uint8]
 ) -> tuple[NDArray[np.bool_], float, int]:
-    """The part of a mask that holds most of the counted pixels, its share of them, and how many parts."""
+    """The part of a mask with most of the counted pixels, its share of them, and the number of parts."""
     count, labels = cv2.connectedComponents(whole, connectivity=8)
     if count <= 1:
         return np.zeros(whole.shape, dtype=bool), 0.0, 0
-    held = np.bincount(labels[counted > 0], minlength=count)
-    held[0] = 0
-    best = int(np.argmax(held))
-    return np.asarray(labels == best), float(held[best]) / max(1, int(held.sum())), count - 1
+    inside = np.bincount(labels[counted > 0], minlength=count)
+    inside[0] = 0
+    best = int(np.argmax(inside))
+    return (
+        np.asarray(labels == best),
+        float(inside[best]) / max(1, int(inside.sum())),
+        count - 1,
+    )
 
 
 def _distance(of: NDArray[np.uint8], margin: int) -> NDArray[np.float32]:
-    """Distance of each pixel that is set to the nearest that is not; a margin of set ones around."""
+    """Distance of each set pixel to the nearest unset one, with a margin of set pixels."""
     padded = np.pad(of, margin, constant_values=1)
     return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5), dtype=np.float32)
 
@@ -72,7 +76,7 @@ def _distance(of: NDArray[np.uint8], margin: int) -> NDArray[np.float32]:
 def _closed(
     mask: NDArray[np.uint8], outside: NDArray[np.float32], reach: float
 ) -> NDArray[np.uint8]:
-    """The mask closed by a disc: grown by its radius and shrunk again."""
+    """The mask closed by a disc (dilated, then eroded)."""
     grown = np.asarray(outside <= reach, dtype=np.uint8)
     shrunk = cv2.distanceTransform(grown, cv2.DIST_L2, 5) > reach
     margin = (outside.shape[0] - mask.shape[0]) // 2
@@ -81,7 +85,7 @@ def _closed(
 
 
 def _bridged(own: NDArray[np.bool_], hull: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The islands and those pieces of the hull between them that touch at least two."""
+    """The islands and the pieces of the hull between them that touch at least two."""
     count, islands = cv2.connectedComponents(own.astype(np.uint8), connectivity=8)
     if count <= 2:
         return own
@@ -90,9 +94,9 @@ def _bridged(own: NDArray[np.bool_], hull: NDArray[np.bool_]) -> NDArray[np.bool
     highest = cv2.dilate(numbers, near)
     lowest = count - cv2.dilate(np.where(own, count - numbers, 0), near)
     pieces, gaps = cv2.connectedComponents((hull & ~own).astype(np.uint8), connectivity=8)
-    beside = np.arange(pieces)
-    most = np.asarray(ndimage.maximum(highest, gaps, beside))
-    least = np.asarray(ndimage.minimum(np.where(lowest > 0, lowest, count), gaps, beside))
+    numbers_of_gaps = np.arange(pieces)
+    most = np.asarray(ndimage.maximum(highest, gaps, numbers_of_gaps))
+    least = np.asarray(ndimage.minimum(np.where(lowest > 0, lowest, count), gaps, numbers_of_gaps))
     bridges = most > least
     bridges[0] = False
     return np.asarray(own | bridges[gaps])

@@ -1,10 +1,9 @@
-"""Outlines compared point by point: the second look at views that the shock graph thinks likely.
+"""Comparison of outlines point by point, by height functions.
 
-Every point of an outline is described by how high the rest of the outline stands over the tangent
-there, in order along the outline (height functions; Wang, Bai, You, Liu and Latecki, Shape Matching
-and Classification Using Height Functions, 2012). Two outlines are aligned by dynamic programming in a
-band around the best few rotations, mirrored ones too. Where ours differs: squared distances, and a band
-of slopes.
+Every point of an outline is described by the heights of the rest of the outline over the tangent there, in
+order along the outline (height functions; Wang, Bai, You, Liu and Latecki, Shape Matching and Classification
+Using Height Functions, 2012). Two outlines are aligned by dynamic programming in a band around the best few
+rotations, mirrored ones too. Different here: squared distances, and a band of slopes.
 """
 
 from __future__ import annotations
@@ -21,16 +20,16 @@ POINTS = 96
 """Points along an outline."""
 
 HEIGHTS = 24
-"""Heights that describe a point."""
+"""Heights describing a point."""
 
 SKIP = 0.2
-"""Cost of a step that is not straight on, per step."""
+"""Cost of each sideways step."""
 
 BAND = 12
-"""Points by which an alignment may be ahead of, or behind, a rotation."""
+"""Points by which an alignment may lead or lag a rotation."""
 
 BETA = 0.2
-"""What distances are divided by beside how much both outlines vary: plain ones differ little."""
+"""Constant added to the outlines' complexity, the divisor of distances: plain outlines differ little."""
 
 _ROTATIONS = 3
 
@@ -54,7 +53,7 @@ def outline_heights(contour: NDArray[np.floating]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def stretches() -> NDArray[np.intp]:
-    """Where each stretch of the points that follow one begins, and where the last ends, (HEIGHTS + 1,)."""
+    """Starts of the stretches of points after a point, and the end of the last, (HEIGHTS + 1,)."""
     return np.linspace(0, POINTS - 1, HEIGHTS + 1).round().astype(np.intp)
 
 
@@ -64,12 +63,12 @@ def outline_distances(
     """Distances of pairs of outlines, each at its best rotation, as they are and mirrored.
 
     Args:
-        first: (B, POINTS, HEIGHTS) or, for one that is compared with all, (1, POINTS, HEIGHTS).
+        first: (B, POINTS, HEIGHTS), or (1, POINTS, HEIGHTS) to compare one with all.
         second: (B, POINTS, HEIGHTS), the other outlines.
 
     Returns:
         (B, 2) float64, 0 for equal outlines; about 0.2 within a class and 0.45 between. The second
-        column is that of the mirror image.
+        column is for the mirror image.
     """
     least = np.empty((len(second), 2))
     one, other = np.ascontiguousarray(first), np.ascontiguousarray(second)

@@ -1,9 +1,8 @@
 """Silhouettes in normal form: one outline of unit area, smoothed, and a map of the area itself.
 
-The normal form is what makes a rendered model and a region of an image comparable. Its unit of
-length is the square root of the silhouette's area; its origin is the silhouette's centroid; x points
-right and y down, as in the image. Gaussian smoothing removes the fine detail that a model shows and
-an image does not (paper, section 7.2).
+The normal form makes a rendered model and an image region comparable. Its unit of length is the square root
+of the silhouette's area; its origin is the centroid; x points right and y down, as in the image. Gaussian
+smoothing removes fine detail that a model shows and an image does not (paper, section 7.2).
 
 Read next: `skeleton.py`.
 """
@@ -31,7 +30,7 @@ SPACING = 0.04
 """Distance between neighbouring points of the outline, units."""
 
 LEAST_AREA = 24
-"""Pixels below which a mask has no shape to speak of."""
+"""Fewest pixels of a mask with a meaningful shape."""
 
 SIDES = ("right", "bottom", "left", "top")
 """Sides of an image."""
@@ -54,7 +53,7 @@ class Silhouette:
         areas: (RINGS, ANGLES) uint8, the mask's own area by ring and angle, with its holes and islands;
             see `area_overlap.area_map`.
         cut: Whether the border of the source image cuts the silhouette.
-        border: Where the border that cuts lies as seen from the silhouette: 0 right, pi/2 below, pi
+        border: Bearing of the cutting border from the silhouette: 0 right, pi/2 below, pi
             left, -pi/2 above, radians; None when nothing is cut.
     """
 
@@ -77,19 +76,19 @@ def normalise(
     """Bring a mask to normal form.
 
     Args:
-        mask: (H, W) bool, what belongs to the object.
+        mask: (H, W) bool, the object.
         cut: Whether the image border cuts the object.
-        sides: Sides of the mask's array that are the image border, of `SIDES`; of these, the one along
-            which most of a cut object lies is taken for the border that cuts it. An object cut by two
-            sides, in a corner, is so taken for one that ends there at the other.
+        sides: Sides of the mask's array that are the image border, of `SIDES`; the one that most of a
+            cut object touches is taken as the border that cuts it. An object cut by two sides, in a
+            corner, is therefore assumed to end at the other.
         smoothing: Standard deviation of the Gaussian in units of the square root of the area.
 
     Returns:
-        The silhouette of the largest part with the islands that lie near (`fragments.py`), its holes
-        filled, or None when nothing of at least `LEAST_AREA` pixels is there.
+        The silhouette of the largest part with the islands near it (`fragments.py`), holes filled, or
+        None when it has fewer than `LEAST_AREA` pixels.
 
     Raises:
-        SettingsError: The mask is no picture of yes and no.
+        SettingsError: The mask is not a binary picture.
 
     Example:
         >>> disc = np.hypot(*np.mgrid[-30:31, -30:31]) <= 25
@@ -121,7 +120,7 @@ def normalise(
 
 
 def _border(mask: NDArray[np.generic], sides: Collection[str]) -> float | None:
-    """Where the side lies along which most of a mask touches, radians; None when it touches none."""
+    """Bearing of the side that most of a mask touches, radians; None when it touches none."""
     along = {"right": mask[:, -1], "bottom": mask[-1], "left": mask[:, 0], "top": mask[0]}
     touched = {side: int(np.count_nonzero(along[side])) for side in SIDES if side in sides}
     longest = max(touched, key=lambda side: touched[side], default=None)
@@ -129,7 +128,7 @@ def _border(mask: NDArray[np.generic], sides: Collection[str]) -> float | None:
 
 
 def _as_bytes(mask: NDArray[np.generic]) -> NDArray[np.uint8]:
-    """A mask as bytes that are zero outside; whole numbers count as yes when they are not zero."""
+    """A mask as bytes that are zero outside; nonzero integers are inside."""
     given = np.asarray(mask)
     if given.ndim != 2 or given.dtype.kind not in "biu":
         raise SettingsError(
@@ -142,7 +141,7 @@ def _as_bytes(mask: NDArray[np.generic]) -> NDArray[np.uint8]:
 
 
 def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], float] | None:
-    """The part that holds the mask, its corner and how much it was shrunk to a workable size."""
+    """The mask's bounding crop, its corner, and the factor by which it was reduced."""
     columns = np.asarray(mask.any(axis=0))
     rows = np.asarray(mask.any(axis=1))
     if not columns.any():
@@ -160,7 +159,7 @@ def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], 
 
 
 def _solid(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """What belongs together, holes filled, and where its corner lies."""
+    """The joined parts, holes filled, and the corner."""
     whole = join_fragments(part)
     x, y, w, h = cv2.boundingRect(whole.astype(np.uint8))
     inside = whole[y : y + h, x : x + w]
@@ -172,7 +171,7 @@ def _solid(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]
 def _smooth_field(
     solid: NDArray[np.uint8], area: float, smoothing: float
 ) -> tuple[NDArray[np.float32], float, int]:
-    """The silhouette at working resolution, blurred: its outline is where the field is one half."""
+    """The silhouette at working resolution, blurred: the outline is where the field is one half."""
     zoom = min(RESOLUTION / area**0.5, _MOST_EXTENT / max(solid.shape))
     sigma = smoothing * zoom * area**0.5
     margin = int(np.ceil(3 * sigma / zoom)) + 2
@@ -186,7 +185,7 @@ def _smooth_field(
 
 
 def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
-    """The sub-pixel outline of the largest part, (N, 2) as (x, y); None when the blur left nothing."""
+    """The sub-pixel outline of the largest part, (N, 2) as (x, y); None when the blur leaves nothing."""
     level = 0.5 if field.max() > 0.55 else 0.5 * float(field.max())
     solid = (field > level).astype(np.uint8)
     found, _ = cv2.findContours(solid, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
@@ -199,7 +198,7 @@ def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
 def _on_level(
     field: NDArray[np.float32], pixels: NDArray[np.intp], level: float
 ) -> NDArray[np.float64]:
-    """Pixels moved along the slope to where a smooth field is at a level: one step of Newton's method."""
+    """Pixels moved along the gradient to a level of a smooth field: one step of Newton's method."""
     x, y = pixels.T
     across = 0.5 * (
         field[y, np.minimum(x + 1, field.shape[1] - 1)] - field[y, np.maximum(x - 1, 0)]
@@ -207,7 +206,7 @@ def _on_level(
     down = 0.5 * (field[np.minimum(y + 1, field.shape[0] - 1), x] - field[np.maximum(y - 1, 0), x])
     slope = np.maximum(across**2 + down**2, 1e-6)
     step = (level - field[y, x]) / slope
-    # On a ridge the slope vanishes: the outline is never further than a pixel from the pixel inside.
+    # On a ridge the gradient vanishes, but the outline is within a pixel of the inner pixel.
     step *= np.minimum(1.0, 1.0 / np.maximum(np.abs(step) * np.sqrt(slope), 1e-6))
     moved = np.stack([x + step * across, y + step * down], axis=1)
     return np.asarray(moved, dtype=np.float64)
@@ -218,7 +217,7 @@ def _in_units(
 ) -> tuple[NDArray[np.float64], tuple[float, float]] | None:
     """An outline in pixels scaled to unit area around its centroid, and the centroid.
 
-    None of an outline that encloses next to nothing: a line one pixel wide, which both sides share.
+    None for an outline that encloses almost nothing, such as a line one pixel wide.
     """
     outer, centroid = polygon_moments(outline)
     if outer < 0:
@@ -254,7 +253,7 @@ def resample_closed(
 
     Args:
         polygon: (N, 2) points (x, y).
-        spacing: Distance between neighbours wanted; the number of points is kept within 48 and 640.
+        spacing: Desired distance between neighbours; the number of points is limited to 48 to 640.
         count: Number of points, instead of a spacing.
 
     Returns:
@@ -272,8 +271,8 @@ def resample_closed(
 def looks_cut(mask: NDArray[np.bool_]) -> bool:
     """Whether a picture's border seems to cut its silhouette.
 
-    A picture cropped tightly touches all four sides and is not taken for cut; one that touches some
-    sides along at least 3 pixels is.
+    A tightly cropped picture touches all four sides and does not count as cut; one that touches some sides
+    along at least 3 pixels does.
 
     Args:
         mask: (H, W) bool, the whole picture.
@@ -283,7 +282,7 @@ def looks_cut(mask: NDArray[np.bool_]) -> bool:
 
 
 def binary_picture(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """A silhouette picture as a mask, whichever of object and background is the brighter.
+    """A silhouette picture as a mask, whether object or background is brighter.
 
     Args:
         image: (H, W) uint8.
