@@ -31,7 +31,7 @@ from visup.rules.wording import RelationEventReasoner, RelationEventSettings
 
 @dataclass(frozen=True, slots=True)
 class ReasonerSettings:
-    """Settings of all reasoners of rules/, one group for each."""
+    """Settings of all reasoners of rules/, one group each."""
 
     objects: ObjectSettings = field(default_factory=ObjectSettings)
     votes: VoteSettings = field(default_factory=VoteSettings)
@@ -51,7 +51,7 @@ class ReasonerSet:
     """Reasoners by phase, in order.
 
     Attributes:
-        update: Percepts enter the mind.
+        update: Enters percepts into the mind.
         cogitate: Presence, votes, questions, poses, depth, relations, traits, zones, couplings, narrative,
             rules.
     """
@@ -70,14 +70,14 @@ def default_reasoners(
     """The reasoners that ship with visup.
 
     Args:
-        settings: Their settings; the defaults when left out.
-        rules: Rules to watch; those of `safety.rules` when left out.
-        early: Whether what rules say of the future is told as soon as it is decided.
-        traits: Whether colours, sizes and first places of objects are remembered.
+        settings: Their settings; defaults when omitted.
+        rules: Rules to monitor; those of `safety.rules` when omitted.
+        early: Whether verdicts about the future are reported as soon as they are decided.
+        traits: Whether colours, sizes and initial positions of objects are remembered.
 
     Returns:
         The reasoners of the update and cogitate phases. Each is a pure function of mind and
-        observation, so that one set may serve many agents.
+        observation, so one set may serve many agents.
     """
     s = settings or ReasonerSettings()
     return ReasonerSet(

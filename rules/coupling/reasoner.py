@@ -57,7 +57,14 @@ from visup.rules.coupling.relative_motion import (
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics
-from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
+from visup.rules.wording.conditions import (
+    Condition,
+    DecisionLog,
+    ExplainableReasoner,
+    Subject,
+    at_least,
+    decide,
+)
 from visup.rules.wording.sentences import sentence
 
 
@@ -101,32 +108,24 @@ class CouplingSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class CouplingReasoner:
-    """Reasoner of the cogitate phase, after the relations: couplings and the `coupled` relation."""
+class CouplingReasoner(ExplainableReasoner):
+    """Reasoner of the cogitate phase, after the relations: couplings and the `coupled` relation.
+
+    It explains the decisions 'coupled' and 'decoupled' for every pair.
+    """
 
     settings: CouplingSettings = field(default_factory=CouplingSettings)
 
-    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
-        return self._judged(mind, observation, None)
-
-    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
-        """What the decisions 'coupled' and 'decoupled' of a step hang on, for every pair.
-
-        Args:
-            mind: As this reasoner got it in that step.
-            observation: What was perceived.
-        """
-        log = DecisionLog()
-        self._judged(mind, observation, log)
+    def _preconditions(
+        self, mind: Mind, after: Mind, observation: Observation
+    ) -> Iterator[tuple[Subject, tuple[Condition, ...]]]:
         coupled = {c.objects for c in mind.couplings}
         for pair in combinations(sorted(mind.objects), 2):
             there = Condition("both are believed to be present", _both_present(pair, mind))
-            log.setdefault(("coupled", pair), (there, _coupling_is(pair in coupled, False)))
-            log.setdefault(("decoupled", pair), (there, _coupling_is(pair in coupled, True)))
-        return log
+            yield ("coupled", pair), (there, _coupling_is(pair in coupled, False))
+            yield ("decoupled", pair), (there, _coupling_is(pair in coupled, True))
 
-    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+    def _reason(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
         old = mind.recall(COUPLING)
         coupled = {c.objects: c for c in mind.couplings}
         table = relation_table(mind)

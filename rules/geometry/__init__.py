@@ -1,7 +1,6 @@
 """Geometry of outlines and fits over time, shared by all reasoners.
 
-Read in this order: `regions.py` (boxes, masks, support functions), `outlines.py` (what is worked out
-once for a region or a pair) and `pairs.py` (pairs of objects as one flat list). `_outlines_jit.py` and
-`_fit_jit.py` hold the compiled loops: nearest points and iterated closest points; Theil-Sen lines and
-velocities of outlines.
+Read in this order: `regions.py` (boxes, masks, support functions), `outlines.py` (cached computations per
+region and pair) and `pairs.py` (pairs of objects as one flat list). `_outlines_jit.py` and `_fit_jit.py` hold
+the compiled loops: nearest points and iterated closest points; Theil-Sen lines and velocities of outlines.
 """

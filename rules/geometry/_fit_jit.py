@@ -1,7 +1,7 @@
-"""Robust fits over time, compiled: trends of distances, velocities of outlines.
+"""Compiled robust fits over time: trends of distances, velocities of outlines.
 
-A dozen objects are some fifty pairs with thirty samples each: little for loops, and hundreds of calls
-for arrays. NaN stands for what is missing or unknown, and every comparison with it fails.
+A dozen objects are some fifty pairs with thirty samples each: little work for loops, but hundreds of array
+calls. NaN marks missing or unknown values, and every comparison with it fails.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Flags = NDArray[np.bool_]
 
 @compiled
 def _below(part: Floats, pivot: float, other: float) -> int:
-    """Puts those below a pivot, or at another one, first; how many they are. Without a branch."""
+    """Partition by `< pivot or == other`, branch-free; returns the number of elements moved first."""
     count = 0
     for k in range(len(part)):
         value = part[k]
@@ -29,7 +29,7 @@ def _below(part: Floats, pivot: float, other: float) -> int:
 
 @compiled
 def median(values: Floats, count: int) -> float:
-    """Median of the first values, which it puts into another order; NaN for none."""
+    """Median of the first `count` values, which are reordered; NaN for none."""
     if count == 0:
         return np.nan
     at, low, high = count // 2, 0, count
@@ -43,7 +43,7 @@ def median(values: Floats, count: int) -> float:
         if at < low:
             low, high = at, at + 1
     few, middle = values[low:high], values[low]
-    for i in range(len(few)):  # among a few, counting is quicker
+    for i in range(len(few)):  # for a few, counting is quicker
         less = most = 0
         for k in range(len(few)):
             less += few[k] < few[i]
@@ -63,18 +63,18 @@ def median(values: Floats, count: int) -> float:
 def theil_sen(times: Floats, values: Floats, count: int, rises: Floats) -> tuple[float, float]:
     """Slope of a line through samples, by the median of the slopes of all pairs of samples.
 
-    Up to 29 % of the samples may be wild without moving it far (Theil 1950, Sen 1968).
+    Robust to up to 29 % of outliers (Theil 1950, Sen 1968).
 
     Args:
-        times: Seconds, increasing; written over.
-        values: Any unit; NaN where there is no sample; written over.
-        count: How many samples there are.
-        rises: Room for a number of each pair of them.
+        times: Seconds, increasing; overwritten.
+        values: Any unit; NaN where there is no sample; overwritten.
+        count: Number of samples.
+        rises: Scratch, one number per pair of samples.
 
     Returns:
-        Slope and its standard deviation, in units per second; NaN where fewer than four samples stand.
-        The deviation comes from the spread of the residuals (their median absolute deviation) as if
-        they were independent, so that it is too small for slow wobbles.
+        Slope and its standard deviation, in units per second; NaN with fewer than four samples.
+        The deviation is from the median absolute deviation of the residuals as if they were
+        independent, so it is too small for slow wobbles.
     """
     n = 0
     for k in range(count):
@@ -97,23 +97,23 @@ def theil_sen(times: Floats, values: Floats, count: int, rises: Floats) -> tuple
     for k in range(n):
         values[k] = abs(values[k] - offset)
     spread = 1.4826 * median(values, n) * np.sqrt(n / (n - 2))
-    # Medians need pi/2 times as many samples as means for the same variance of their result.
+    # A median needs pi/2 times as many samples as a mean for the same variance.
     return slope, np.sqrt(np.pi / 2) * spread / max(np.sqrt(lever), 1e-9)
 
 
 @compiled
 def binned(times: Floats, values: Floats, bins: int, moments: Floats, means: Floats) -> int:
-    """Means of neighbouring samples, so that a fit over all pairs of them stays cheap.
+    """Means of neighbouring samples, so that a fit over all pairs stays cheap.
 
     Args:
         times: (T,) seconds, increasing.
         values: (T,) any unit; NaN where there is no sample.
-        bins: Most samples wanted.
-        moments: (bins,) written: times of means of equally many neighbours; the newest bin is full.
-        means: (bins,) written: their values, NaN where a whole bin has no sample.
+        bins: Most bins.
+        moments: (bins,) output: mean times of equal numbers of neighbours; the newest bin is full.
+        means: (bins,) output: mean values, NaN where a whole bin has no sample.
 
     Returns:
-        How many means there are.
+        The number of means.
     """
     size = max(1, (len(times) + bins - 1) // bins)
     count, begin, end = 0, 0, len(times) % size
@@ -136,7 +136,7 @@ def binned(times: Floats, values: Floats, bins: int, moments: Floats, means: Flo
 
 @compiled
 def binned_trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
-    """Lines through binned samples (T, N): their slopes and deviations, (N,) each; see `theil_sen`."""
+    """Slopes of lines through binned samples (T, N) and their deviations, (N,) each; see `theil_sen`."""
     count = values.shape[1]
     slope, sigma, series = np.empty(count), np.empty(count), np.empty(len(times))
     moments, means, rises = np.empty(bins), np.empty(bins), np.empty(bins * bins)
@@ -150,7 +150,7 @@ def binned_trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Flo
 
 @compiled
 def slope_noise(times: Floats, noise: float) -> float:
-    """Deviation of the slope of a line through samples (T,) of that noise; NaN for fewer than two."""
+    """Standard deviation of a slope from samples (T,) of this noise; NaN for fewer than two."""
     count = len(times)
     if count < 2:
         return np.nan
@@ -167,7 +167,7 @@ def slope_noise(times: Floats, noise: float) -> float:
 def _reach_slope(
     times: Floats, support: Floats, free: Flags, span: tuple[int, int], at: tuple[int, int]
 ) -> tuple[float, bool]:
-    """How fast one body's reach in one direction changes over a span of samples, if that is known."""
+    """Slope of one body's support in one direction over a span of samples, and whether it is known."""
     begin, end = span
     i, k = at
     middle, count = 0.0, 0
@@ -191,22 +191,22 @@ def _reach_slope(
 def common_motion(
     slopes: Floats, usable: Flags, directions: Floats, misfit: float
 ) -> tuple[float, float]:
-    """The velocity that explains best how the reach of one outline changes.
+    """The velocity that best explains the changes of an outline's support.
 
-    A body that moves by v changes its reach in direction n by v . n; v is fitted over the directions
-    robustly (iteratively reweighted least squares, one norm), so that a hidden side or a turning corner
-    has little say.
+    A body moving by v changes its support in direction n by v . n; v is fitted over the directions by
+    iteratively reweighted least squares (L1 norm), so that a hidden side or a rotating corner has
+    little influence.
 
     Args:
-        slopes: (K,) pixels per second, and
-        usable: whether each is known, in
+        slopes: (K,) pixels per second.
+        usable: (K,) whether each is known.
         directions: (K, 2) unit vectors.
-        misfit: Mean deviation of the directions from a common motion up to which the outline moves as
-            one, pixels per second; a third of the speed is allowed anyway.
+        misfit: Tolerated mean deviation of the directions from a common motion, pixels per second; a
+            third of the speed is tolerated in any case.
 
     Returns:
-        (x, y) pixels per second; NaN where fewer than three directions serve, or where the outline does
-        not move as one, as when one body passes before another.
+        (x, y) pixels per second; NaN with fewer than three usable directions, or where the outline does
+        not move as one, as when one body passes in front of another.
     """
     count = 0
     for k in range(len(slopes)):
@@ -244,7 +244,7 @@ def velocities(
     directions: Floats,
     misfit: float,
 ) -> Floats:
-    """(S, M, 2) velocities of all bodies over spans of samples (first, one after the last), (S, 2)."""
+    """(S, M, 2) velocities of all bodies over spans of samples (first, last + 1), (S, 2)."""
     count = support.shape[1]
     found = np.empty((len(spans), count, 2))
     slopes = np.empty(len(directions))

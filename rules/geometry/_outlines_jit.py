@@ -1,9 +1,9 @@
-"""Geometry of outlines, compiled: how far they reach, how near they are, how one lies upon another.
+"""Compiled geometry of outlines: support functions, distances, registration.
 
-An outline is a ring of points. Every `RUN` of them in a row have a box; what is nearest to a point is
-looked for in the runs whose boxes are nearer than what was found already, beginning with the run in
-which the point before found its own. Neighbours on one outline have neighbours on another, so that
-hardly more than one run is gone through; the answer is exact.
+An outline is a ring of points, with a bounding box per run of `RUN` points. A nearest-point search visits
+only runs whose boxes are nearer than the best so far, starting from the run of the previous point's result.
+Neighbours on one outline have neighbours on the other, so hardly more than one run is visited; the result is
+exact.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ def outline_support(
     support: Floats,
     free: NDArray[np.bool_],
 ) -> None:
-    """How far an outline reaches in each direction, and whether it is clear of the border there.
+    """Support function of an outline, and whether it is clear of the border there.
 
     Args:
         points: (N, 2) pixels.
         directions: (K, 2) unit vectors.
-        width: Of the image, pixels.
-        height: Of the image, pixels.
-        support: (K,) written: the most of p . n, pixels.
-        free: (K,) written: whether the furthest point is clear of the image border.
+        width: Image width, pixels.
+        height: Image height, pixels.
+        support: (K,) output: max of p . n, pixels.
+        free: (K,) output: whether the farthest point is clear of the image border.
     """
     for k in range(len(directions)):
         nx, ny = directions[k, 0], directions[k, 1]
@@ -72,7 +72,7 @@ def outline_support(
 def _in_run(
     x: float, y: float, points: Floats, run: int, best: float, found: int
 ) -> tuple[float, int]:
-    """The nearer of what was found and of what is in a run: squared distance, and which point."""
+    """The nearer of the best so far and the points of a run: squared distance and point."""
     for n in range(run * RUN, min(len(points), run * RUN + RUN)):
         dx, dy = points[n, 0] - x, points[n, 1] - y
         far = dx * dx + dy * dy
@@ -91,9 +91,9 @@ def _nearest(
         x: Pixels.
         y: Pixels.
         points: (N, 2) pixels.
-        boxes: (R, 4) of its runs.
-        start: The run that is looked at first.
-        bound: Squared distance; what is not nearer is not found.
+        boxes: (R, 4) boxes of its runs.
+        start: The run to visit first.
+        bound: Squared distance beyond which points are ignored.
 
     Returns:
         Squared distance and number of the point; the bound and -1 when there is none.
@@ -111,7 +111,7 @@ def _nearest(
 def least_distance(
     first: Floats, first_boxes: Floats, second: Floats, second_boxes: Floats, bound: float
 ) -> float:
-    """Distance of the nearest points of two outlines, pixels; infinite when it is beyond the bound."""
+    """Distance of the nearest points of two outlines, pixels; infinite beyond the bound."""
     best = np.nextafter(bound * bound, np.inf)
     for k in range(len(first_boxes)):
         box = first_boxes[k]
@@ -128,19 +128,19 @@ def least_distance(
 def signed_extent(
     points: Floats, step: int, other: Floats, boxes: Floats, mask: NDArray[np.bool_], x: int, y: int
 ) -> tuple[float, float]:
-    """How far every so manieth point of an outline lies outside a region: least and greatest.
+    """Least and greatest signed distance of an outline's points to a region.
 
     Args:
         points: (N, 2) pixels.
-        step: Each of so many points is looked at.
+        step: Only every `step`-th point is used.
         other: (K, 2) outline of the region.
-        boxes: (R, 4) of its runs.
+        boxes: (R, 4) boxes of its runs.
         mask: (h, w) the region.
         x: Left of the mask, pixels.
-        y: Its top.
+        y: Top of the mask, pixels.
 
     Returns:
-        Pixels, negative within.
+        Pixels, negative inside.
     """
     least, most, start = np.inf, -np.inf, 0
     height, width = mask.shape
@@ -157,7 +157,7 @@ def signed_extent(
 
 @compiled
 def near_outline(points: Floats, other: Floats, boxes: Floats, bound: float) -> NDArray[np.bool_]:
-    """(N,) whether points are nearer to an outline than a bound, pixels."""
+    """(N,) whether points are within a bound, pixels, of an outline."""
     near = np.empty(len(points), np.bool_)
     start = 0
     for n in range(len(points)):
@@ -169,7 +169,7 @@ def near_outline(points: Floats, other: Floats, boxes: Floats, bound: float) -> 
 
 @compiled
 def resampled(points: Floats, count: int) -> Floats:
-    """A closed outline (N, 2) as `count` points evenly spaced along it."""
+    """A closed outline (N, 2) resampled to `count` evenly spaced points."""
     size = len(points)
     along = np.empty(size + 1)
     along[0] = 0.0
@@ -203,17 +203,17 @@ def longest_edge(points: Floats) -> float:
 
 @compiled
 def icp_step(normals: Floats, off: Floats, count: int, wild: float) -> tuple[bool, float, float]:
-    """The move that brings points onto an outline, by weighted least squares across it.
+    """The translation that moves points onto an outline, by weighted least squares across it.
 
     Args:
         normals: (N, 2) unit vectors across the outline.
-        off: (N, 2) from each point to its place on the outline, pixels.
-        count: How many of them there are.
-        wild: Pixels beyond which a point counts less.
+        off: (N, 2) from each point to its match on the outline, pixels.
+        count: Number of matches.
+        wild: Distance beyond which a point is down-weighted, pixels.
 
     Returns:
-        Whether it is known, and (x, y) pixels. It is not where the outline has but one direction, so
-        that nothing tells of motion along it.
+            Whether it is determined, and (x, y) pixels. It is not where the outline has a single
+            direction, so that motion along it is unobservable.
     """
     xx = xy = yy = bx = by = 0.0
     for n in range(count):
@@ -239,19 +239,19 @@ def register(
     boxes: Floats,
     limits: tuple[float, float, float],
 ) -> tuple[bool, float, float]:
-    """Lay a kept outline upon a later one, by iterated closest points.
+    """Register an outline to a later one, by iterated closest points.
 
     Args:
         points: (N, 2) pixels.
         normals: (N, 2) unit vectors across the outline.
-        shift: (x, y) of the points so far, pixels.
+        shift: (x, y) initial translation, pixels.
         target: (K, 2) the later outline.
-        boxes: (R, 4) of its runs.
-        limits: How far a point may be from its place, pixels; how many must have one; pixels beyond
-            which one counts less.
+        boxes: (R, 4) boxes of its runs.
+        limits: Most distance of a match, pixels; fewest matches; distance beyond which a point is
+            down-weighted, pixels.
 
     Returns:
-        Whether enough of it finds its place, and the new shift.
+        Whether enough points match, and the new translation.
     """
     reach, least, wild = limits
     x, y = shift
@@ -261,7 +261,7 @@ def register(
         found = start = 0
         for n in range(len(points)):
             px, py = points[n, 0] + x, points[n, 1] + y
-            # Before the first move no point has a run of its own; its neighbour's is the next best.
+            # In the first iteration points have no run yet; their neighbour's is the next best.
             start = last[n] if last[n] >= 0 else start
             _, at = _nearest(px, py, target, boxes, start, reach * reach)
             if at >= 0:

@@ -1,8 +1,8 @@
-"""How things move now: lines over the longest window in which samples go on as they do now, compiled.
+"""Compiled fits of current motion, over the longest window consistent with it.
 
-What has gone on for long is known best from a long window, and what has just changed only from a short one.
-The window is chosen for each quantity by itself (Lepski 1990): it is the longest whose estimate agrees with
-those of all shorter ones, within their noise.
+Steady motion is best estimated over a long window, a recent change only over a short one. The window is
+chosen for each quantity separately (Lepski 1990): the longest whose estimate agrees with those of all shorter
+ones, within their noise.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from visup.rules.geometry._fit_jit import Flags, Floats, binned, slope_noise, th
 
 @compiled
 def jitter(values: Floats) -> float:
-    """Deviation of the noise of samples (T,) from one to the next, however they go on in the long run.
+    """Standard deviation of sample-to-sample noise (T,), whatever the trend.
 
-    By the mean of their second differences; NaN where fewer than three in a row are known. Noise that
-    lasts for several samples is not seen by it.
+    From the mean of second differences; NaN where fewer than three in a row are known. Noise that is
+    correlated over several samples is not captured.
     """
     total, count = 0.0, 0
     for t in range(2, len(values)):
@@ -34,15 +34,15 @@ def jitter(values: Floats) -> float:
 def longest_that_agrees(found: Floats, sigmas: Floats, limits: tuple[float, float]) -> int:
     """The longest window whose estimate agrees with those of all shorter ones (Lepski 1990).
 
-    What goes on as it did is so known from a long window, and what has just changed from a short one.
+    Steady motion is thus estimated over a long window, and a recent change over a short one.
 
     Args:
-        found: (W, D) estimates from longer and longer windows; NaN unknown.
-        sigmas: (W,) deviations of each component.
-        limits: In deviations, and in the unit of the estimates, by how much two must differ to disagree.
+        found: (W, D) estimates from longer and longer windows; NaN for unknown.
+        sigmas: (W,) standard deviations of each component.
+        limits: Least difference to disagree, in standard deviations and in the unit of the estimates.
 
     Returns:
-        The number of the window; that of the first that is known where no longer one is.
+        The number of the window; 0 when none is known.
     """
     far, least = limits
     best = -1
@@ -67,17 +67,17 @@ def steady_trend(
     limits: tuple[float, float, float],
     room: Floats,
 ) -> tuple[float, float]:
-    """Slope over the longest window in which samples go on as they do now.
+    """Slope over the longest window consistent with the current trend.
 
     Args:
         times: (T,) seconds.
         values: (T,) pixels.
         begins: (W,) first samples of longer and longer windows.
-        limits: Noise of a sample, pixels; see `longest_that_agrees`.
-        room: (bins + 2, bins) for the means to which lines are fitted, and the slopes of their pairs.
+        limits: Noise of a sample, pixels; then as in `longest_that_agrees`.
+        room: (bins + 2, bins) scratch for binned samples and the slopes of their pairs.
 
     Returns:
-        Pixels per second, and its deviation.
+        Pixels per second, and its standard deviation.
     """
     noise, far, least = limits
     bins, count = room.shape[1], len(begins)
@@ -101,7 +101,7 @@ def steady_velocities(
     directions: Floats,
     limits: tuple[float, float, float, float],
 ) -> tuple[Floats, Floats]:
-    """Velocities over the longest windows in which bodies go on as they do now.
+    """Velocities over the longest windows consistent with the current motion.
 
     Args:
         times: (T,) seconds.
@@ -109,11 +109,11 @@ def steady_velocities(
         free: (T, M, K).
         begins: (W,) first samples of longer and longer windows.
         directions: (K, 2) unit vectors.
-        limits: Least noise of an outline, pixels; misfit, see `common_motion`; and see
+        limits: Least noise of an outline, pixels; misfit, see `common_motion`; then as in
             `longest_that_agrees`.
 
     Returns:
-        (M, 2) and (M,) the deviation of a component that noise makes.
+        (M, 2) and (M,) the standard deviation of a component due to noise.
     """
     noise, misfit, far, least = limits
     count, samples = support.shape[1], len(times)
@@ -146,7 +146,7 @@ def _windows(times: Floats, longest: float) -> NDArray[np.int64]:
 
 LEAST_SAMPLES = 6
 LEAST_SHARE = 0.3
-"""Lines are fitted once so much of the window is filled."""
+"""Filled share of the window from which lines are fitted."""
 
 
 @compiled
@@ -159,7 +159,7 @@ def fit_motion(
     limits: tuple[float, float, float, float, float, float],
     bins: int,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """All lines of one step.
+    """All fits of one step.
 
     Args:
         times: (T,) seconds.
@@ -167,14 +167,14 @@ def fit_motion(
         free: (T, M, K).
         separation: (T, M, M) pixels.
         directions: (K, 2) unit vectors.
-        limits: The windows of trends and of motion, seconds; noise of an outline, pixels; by how much
-            what was must differ from what is, pixels per second, and in deviations, to count no longer;
+        limits: The windows of trends and of motion, seconds; noise of an outline, pixels; difference
+            beyond which earlier samples are dropped, pixels per second and in standard deviations;
             misfit, pixels per second.
-        bins: Most means to which lines are fitted.
+        bins: Most bins to fit lines to.
 
     Returns:
-        (P,) trends of the distances and (P,) their deviations; (3, M, 2) velocities now and in the halves
-        of the window of motion; (M,) deviations that noise makes of a component of a velocity.
+        (P,) trends of the distances and (P,) their standard deviations; (3, M, 2) velocities now and in
+        the halves of the motion window; (M,) standard deviations of a velocity component due to noise.
     """
     window, moving, noise, strong, sigmas, misfit = limits
     samples, count = len(times), support.shape[1]

@@ -1,7 +1,7 @@
-"""The floor: positions of objects on it, by image points whose positions on the floor are known.
+"""Ground plane: positions of objects on the floor, from image points of known floor position.
 
-A plane and its image are related by a homography; four points of which no three lie in a line fix it.
-A body stands where the lowest part of its outline is.
+A plane and its image are related by a homography, which four points determine unless three are collinear. A
+body stands at the lowest part of its outline.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ Floats = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
 FOOT_SHARE = 0.15
-"""What is within so much of its height from the lowest point of a body, it stands on."""
+"""Points this near to the lowest one, as a share of a body's height, are its foot points."""
 
 LEAST_SPREAD = 1e-6
-"""Points whose triangles are smaller than this, as shares of all of them, lie in a line."""
+"""Relative area of triangles below which points are collinear."""
 
 
 def homography(source: Points, target: Points) -> Floats | None:
-    """The projective map that takes some points to others, in the least squares sense.
+    """The projective map from some points to others, in the least-squares sense.
 
     Args:
         source: (N, 2), N at least 4.
         target: (N, 2).
 
     Returns:
-        (3, 3); None when three of four points lie in a line, so that there is none.
+        (3, 3); None when three of four points are collinear.
 
     Example:
         >>> square = [(0, 0), (1, 0), (1, 1), (0, 1)]
@@ -52,7 +52,7 @@ def homography(source: Points, target: Points) -> Floats | None:
 
 
 def projected(points: Points | Floats, h: Floats) -> Floats:
-    """(N, 2) points as a homography maps them; NaN for those at or beyond the horizon."""
+    """(N, 2) points mapped by a homography; NaN for those at or beyond the horizon."""
     given = np.asarray(points, dtype=float).reshape(-1, 2)
     mapped = np.column_stack((given, np.ones(len(given)))) @ h.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -68,8 +68,8 @@ def foot_points(region: Region, frame_size: tuple[int, int]) -> Floats:
         frame_size: (width, height) pixels.
 
     Returns:
-        (N, 2) pixels, from left to right; none when the lower border of the image cuts the body, so
-        that its feet are not seen.
+        (N, 2) pixels, from left to right; empty when the lower border of the image cuts the body, so
+        that its feet are invisible.
     """
     x, y, _, height = region.bbox
     if y + height >= frame_size[1] or not region.mask.any():
@@ -81,13 +81,13 @@ def foot_points(region: Region, frame_size: tuple[int, int]) -> Floats:
 
 
 def standing_point(feet: Floats) -> Floats:
-    """(2,) the middle of the points on which a body stands."""
+    """(2,) the middle of a body's foot points."""
     middle: Floats = (feet.min(axis=0) + feet.max(axis=0)) / 2.0
     return middle
 
 
 def floor_gap(one: Region, other: Region, frame_size: tuple[int, int], h: Floats) -> float:
-    """Distance on the floor between two bodies that stand on it, in its unit; NaN where not seen.
+    """Distance between two standing bodies, in floor units; NaN where feet are invisible.
 
     Args:
         one: A body.
@@ -103,7 +103,7 @@ def floor_gap(one: Region, other: Region, frame_size: tuple[int, int], h: Floats
 
 
 def _in_line(points: Points) -> bool:
-    """Whether any three of four points, or all of more, lie in a line."""
+    """Whether any three of four points, or all of more, are collinear."""
     given = np.asarray(points, dtype=float)
     size = float(np.ptp(given, axis=0).max()) or 1.0
     if len(given) > 4:
@@ -118,7 +118,7 @@ def _area(a: Floats, b: Floats, c: Floats) -> float:
 
 
 def _normalised(points: Points) -> tuple[Floats, Floats]:
-    """Points about the origin at a mean distance of 1, and the map that makes them so."""
+    """Points centred and scaled to a mean distance of 1, and the map that does it."""
     given = np.asarray(points, dtype=float)
     middle = given.mean(axis=0)
     by = 1.0 / max(1e-12, float(np.linalg.norm(given - middle, axis=1).mean()))

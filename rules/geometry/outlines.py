@@ -1,8 +1,7 @@
-"""How far outlines reach and how near they are to each other, worked out once for each region and each pair.
+"""Cached support functions and distances of outlines, computed once per region and pair.
 
-In one step several reasoners ask about the same regions: who may hide a part of whom, who touches, who
-is within whom. Regions never change, so that what was found of the most recent ones is remembered;
-nothing but time hangs on that.
+In one step several reasoners ask about the same regions: occlusion, contact, containment. Regions are
+immutable, so results for the most recent ones are cached, which affects nothing but time.
 """
 
 from __future__ import annotations
@@ -32,23 +31,23 @@ from visup.rules.geometry.regions import (
 )
 
 NEAR_SHARE = 0.05
-"""How near outlines must be for anybody to care how near they are, image diagonals."""
+"""Greatest gap that is computed exactly, image diagonals."""
 
 CACHED_REGIONS = 128
-"""Regions that are remembered: those of two steps with fifty objects."""
+"""Cached regions: those of two steps with fifty objects."""
 
 TEMPLATE_POINTS = 96
-"""Least points of an outline that another one is laid upon."""
+"""Fewest points of an outline used as a registration target."""
 
 CLOSED_STEP = 2.0
-"""Neighbouring points of an outline that are so near each other leave no gap, pixels."""
+"""Spacing of points below which an outline counts as closed, pixels."""
 
 MOST_POINTS = 200
-"""Points of an outline that are measured against another one."""
+"""Most points of an outline measured against another one."""
 
 
 class PreparedOutline:
-    """An outline made ready for looking up what is nearest to a point.
+    """An outline prepared for nearest-point searches.
 
     Args:
         region: Any region.
@@ -63,7 +62,7 @@ class PreparedOutline:
 
     @cached_property
     def boxes(self) -> Floats:
-        """Of the runs of `points`; see `_outlines_jit.py`."""
+        """Boxes of the runs of `points`; see `_outlines_jit.py`."""
         return run_boxes(self.points)
 
     @cached_property
@@ -77,31 +76,31 @@ class PreparedOutline:
 
     @cached_property
     def closed_boxes(self) -> Floats:
-        """Of the runs of `closed`."""
+        """Boxes of the runs of `closed`."""
         return self.boxes if self.closed is self.points else run_boxes(self.closed)
 
     @cached_property
     def even(self) -> Floats:
-        """(M, 2) points evenly spaced, as many as it has, `TEMPLATE_POINTS` at least."""
+        """(M, 2) the outline resampled evenly, to at least `TEMPLATE_POINTS`."""
         return resampled(self.points, max(TEMPLATE_POINTS, len(self.points)))
 
     @cached_property
     def even_boxes(self) -> Floats:
-        """Of the runs of `even`."""
+        """Boxes of the runs of `even`."""
         return run_boxes(self.even)
 
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
-        """(h, w) of the region, in the one layout that loops are compiled for."""
+        """(h, w) mask of the region, in the memory layout that loops are compiled for."""
         mask = self._region.mask
         plain = mask.flags.c_contiguous and mask.flags.writeable and mask.dtype == np.bool_
         return mask if plain else np.array(mask, dtype=np.bool_, order="C")
 
     @cached_property
     def hole_depth(self) -> NDArray[np.float32] | None:
-        """(h, w) pixels from what lies in a hole to the region, 0 elsewhere; None without holes."""
+        """(h, w) distance from points in holes to the region, pixels, 0 elsewhere; None without holes."""
         body = self.mask.astype(np.uint8)
-        # A margin joins all that lies outside, so that one fill from a corner reaches it.
+        # A margin connects the outside, so that one fill from a corner reaches it all.
         outside = cv2.copyMakeBorder(1 - body, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
         cv2.floodFill(outside, None, (0, 0), (0,))
         holes = outside[1:-1, 1:-1]
@@ -113,20 +112,20 @@ class PreparedOutline:
 
 @lru_cache(maxsize=CACHED_REGIONS)
 def prepared_outline(region: Region) -> PreparedOutline:
-    """The outline of a region, made ready."""
+    """The prepared outline of a region, cached."""
     return PreparedOutline(region)
 
 
 def write_support(
     region: Region, frame_size: tuple[int, int], support: Floats, free: NDArray[np.bool_]
 ) -> None:
-    """How far a region's outline reaches.
+    """Write the support function of a region's outline.
 
     Args:
         region: Any region.
         frame_size: (width, height), pixels.
-        support: (16,) written, pixels: max over the outline of p . n for each of `DIRECTIONS`.
-        free: (16,) written: whether the furthest point is clear of the image border, so that it
+        support: (16,) output, pixels: max over the outline of p . n for each of `DIRECTIONS`.
+        free: (16,) output: whether the farthest point is clear of the image border, so that it
             belongs to the body and not to where the image ends.
     """
     outline_support(prepared_outline(region).points, DIRECTIONS, *frame_size, support, free)
@@ -138,7 +137,7 @@ def outline_gap(a: Region, b: Region, near: float) -> float | None:
     Args:
         a: One region.
         b: Another.
-        near: Distance beyond which nobody cares, pixels.
+        near: Greatest distance of interest, pixels.
 
     Returns:
         Pixels, 0 where the masks overlap or the outlines are neighbours (1 pixel apart or less),
@@ -151,10 +150,10 @@ def outline_gap(a: Region, b: Region, near: float) -> float | None:
 
 @lru_cache(maxsize=8 * CACHED_REGIONS)
 def _gap(a: Region, b: Region, near: float) -> float | None:
-    # A pixel is as wide as 1: outlines of neighbours are so far apart.
+    # Outlines of adjacent regions are one pixel apart.
     one, two = prepared_outline(a), prepared_outline(b)
     distance = least_distance(one.points, one.boxes, two.points, two.boxes, near + 1.0)
-    # One may also lie deep within the other.
+    # One may also be deep inside the other.
     if distance > 1.5 and masks_overlap(a, b):
         return 0.0
     gap = max(0.0, distance - 1.0)
@@ -162,15 +161,15 @@ def _gap(a: Region, b: Region, near: float) -> float | None:
 
 
 def signed_distances(a: Region, b: Region) -> tuple[float, float]:
-    """How far one region lies outside another, nearest and farthest point.
+    """Signed distances of a region to another, nearest and farthest point.
 
     Args:
-        a: A region; of its outline at most `MOST_POINTS` points are looked at, and what of it covers
-            holes of the other, of which its outline tells nothing.
+        a: A region; at most `MOST_POINTS` points of its outline are used, and its part inside holes
+            of the other, which the outline misses.
         b: Another.
 
     Returns:
-        The least and the greatest distance of a's points to b's outline, pixels, negative within b.
+        The least and the greatest distance of a's points to b's outline, pixels, negative inside b.
     """
     points, body = prepared_outline(a).closed, prepared_outline(b)
     step = -(-len(points) // MOST_POINTS)
@@ -180,7 +179,7 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
 
 
 def _deepest_in_hole(a: Region, b: Region) -> float:
-    """The farthest that a lies in a hole of b, pixels; minus infinity when it covers none."""
+    """Greatest depth of a in a hole of b, pixels; minus infinity when it covers none."""
     depth = prepared_outline(b).hole_depth
     if depth is None:
         return -np.inf

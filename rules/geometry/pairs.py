@@ -24,11 +24,11 @@ def pairs(m: int) -> tuple[Indices, Indices]:
 
 @lru_cache(maxsize=32)
 def reindexing(old: tuple[int, ...], new: tuple[int, ...]) -> tuple[Indices, Indices]:
-    """Where objects, and pairs of them, stood among others.
+    """Indices of objects, and of pairs of them, in an earlier list.
 
     Args:
-        old: Ids before, increasing.
-        new: Ids now, increasing.
+        old: Ids before, ascending.
+        new: Ids now, ascending.
 
     Returns:
         For each new object its index among the old ones, for each new pair its number among the

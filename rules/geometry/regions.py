@@ -1,10 +1,9 @@
 """Plane geometry of outlines and boxes, for many objects at once.
 
-Everything is in image coordinates (pixels, x right, y down). The support function of an outline
-in direction n is how far it reaches that way, max(p . n). From the support functions of two
-outlines in a fixed fan of directions follow, by array arithmetic alone, the signed distance of
-their convex hulls (how far apart, or how deep in each other) and, over time, how fast each moves,
-without trusting the centroid of a body that the image border cuts off.
+Everything is in image coordinates (pixels, x right, y down). The support function of an outline in direction
+n is max(p . n), how far it reaches that way. From the support functions of two outlines in a fixed fan of
+directions, array arithmetic gives the signed distance of their convex hulls and, over time, their velocities,
+without relying on the centroid of a body cut off by the image border.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ RCC8 = (
 
 
 def outline(region: Region) -> Floats:
-    """Contour of a region, or the corners of its box when it has none.
+    """Contour of a region, or the corners of its box if it has none.
 
     Args:
         region: Any region.
@@ -61,7 +60,7 @@ def hull_separation(support: Floats) -> Floats:
     all directions n; with 16 of them it is at most 2 % too small for hulls that are apart.
 
     Args:
-        support: (M, 16) float, pixels, rows from `outlines.reach`; NaN rows for what is not seen.
+        support: (M, 16) float, pixels, rows from `outlines.reach`; NaN rows for invisible objects.
 
     Returns:
         (M, M) float, pixels; positive apart, negative the depth of penetration.
@@ -145,7 +144,7 @@ def shifted(box: Box, dx: float, dy: float) -> Box:
 
 
 def shifted_region(region: Region, dx: float, dy: float) -> Region:
-    """The same region at another place, in whole pixels.
+    """A region translated by whole pixels.
 
     Args:
         region: Any region.
@@ -172,7 +171,7 @@ def shifted_region(region: Region, dx: float, dy: float) -> Region:
 
 
 def densified(points: Floats, step: float = 2.0) -> Floats:
-    """A closed outline with points at most `step` pixels apart; unchanged where it has them."""
+    """A closed outline with points at most `step` pixels apart; unchanged where it already has."""
     to = np.roll(points, -1, axis=0)
     length = np.hypot(*(to - points).T)
     if length.max() <= step:
@@ -184,5 +183,5 @@ def densified(points: Floats, step: float = 2.0) -> Floats:
 
 
 def image_diagonal(frame_size: tuple[int, int]) -> float:
-    """Image diagonal, pixels; what thresholds are relative to."""
+    """Image diagonal, pixels; the unit of relative thresholds."""
     return hypot(*frame_size)

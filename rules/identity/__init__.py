@@ -1,9 +1,9 @@
-"""Who is who, and what follows from it: votes on names, questions to the operator, depth.
+"""Identity: votes on names, questions to the operator, and depth.
 
-Read in this order: `votes.py` (the weighted, time-discounted vote), `identification.py` (who is identified,
-and when),
-`operator_questions.py` (when the operator is asked), `depth.py` (how far an object is, by the size of
-its model).
+Read in this order: `votes.py` (the weighted, time-discounted vote), `identification.py` (when an object is
+identified), `operator_questions.py` (when the operator is asked), `depth.py` (the distance of an object, from
+the size of its model).
+
 """
 
 from visup.rules.identity.depth import DepthReasoner, DepthSettings

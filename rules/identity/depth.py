@@ -1,4 +1,4 @@
-"""How far objects are: the depth under the best identity, smoothed (paper, section 7.4)."""
+"""Depth of objects under their best identity, smoothed (paper, section 7.4)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from visup.rules.presence.object_tracks import visible_share
 
 @dataclass(frozen=True, slots=True)
 class DepthSettings:
-    """How depth is believed.
+    """Settings of the depth estimate.
 
     Attributes:
         tau_s: Time constant of smoothing.
-        fade_s: Depth not renewed for this long is unknown.
-        least_visible: An object of which less shows is not measured, its area being too small.
-        clear: Weight of the best identity among all, each by its votes squared, from which it tells
-            a depth.
+        fade_s: Depth not updated for this long becomes unknown.
+        least_visible: An object less visible than this is not measured, its area being too small.
+        clear: Weight of the best identity, each weighted by its votes squared, from which depth is
+            estimated.
     """
 
     tau_s: float = 0.5
@@ -34,7 +34,7 @@ class DepthSettings:
 
 @dataclass(frozen=True, slots=True)
 class DepthEstimate:
-    """A smoothed depth: model name, value, deviation, and seconds when it was last renewed."""
+    """A smoothed depth: model name, value, standard deviation, and time of the last update, seconds."""
 
     name: str
     depth: float
@@ -47,38 +47,38 @@ DEPTHS: MemoryKey[Mapping[int, DepthEstimate]] = MemoryKey("rules.depth", Mappin
 
 @dataclass(frozen=True, slots=True)
 class DepthReasoner:
-    """Reasoner of the cogitate phase, after the votes: the depth of each object.
+    """Reasoner of the cogitate phase, after the votes: estimates the depth of each object.
 
-    Depths under another identity are left out, as are those of objects hidden in part. While other
-    identities are nearly as likely the depth is unknown: it hangs on the size of the model.
+    Depths under other identities are ignored, as are those of partly hidden objects. While other identities
+    are nearly as likely the depth is unknown, since it depends on the size of the model.
     """
 
     settings: DepthSettings = field(default_factory=DepthSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one observation; see `Reasoner`."""
+        """Update from one observation; see `Reasoner`."""
         old = mind.recall(DEPTHS)
         owner = region_owners(mind)
-        told = {(owner.get(d.region_id), d.name): d for d in observation.of("depth")}
-        kept: dict[int, DepthEstimate] = {}
+        reported = {(owner.get(d.region_id), d.name): d for d in observation.of("depth")}
+        retained: dict[int, DepthEstimate] = {}
         beliefs: list[ObjectBelief] = []
         for i, belief in mind.objects.items():
-            new = told.get((i, belief.name))
+            new = reported.get((i, belief.name))
             before = old.get(i)
             if new is None and before is None and belief.depth is None:
-                continue  # as nearly always where nobody measures depth
+                continue  # fast path, since depth is seldom measured
             if not self._clear(belief):
                 new = before = None
             elif new is not None and visible_share(mind, i) < self.settings.least_visible:
                 new = None
             now = self._smooth(before, new, belief.name, observation.time)
             if now is not None:
-                kept[i] = now
+                retained[i] = now
             depth, sigma = (now.depth, now.sigma) if now else (None, None)
             if (depth, sigma) != (belief.depth, belief.depth_sigma):
                 beliefs.append(replace(belief, depth=depth, depth_sigma=sigma))
         mind = mind.with_objects(*beliefs) if beliefs else mind
-        return Outcome(mind.remember(DEPTHS, MappingProxyType(kept)))
+        return Outcome(mind.remember(DEPTHS, MappingProxyType(retained)))
 
     def _clear(self, belief: ObjectBelief) -> bool:
         weights = [c.share**2 for c in belief.candidates]

@@ -1,7 +1,7 @@
-"""Who is who: votes on names are counted, and told when they are clear.
+"""Identification of objects: counts votes on names, and reports the clear ones.
 
-The vote itself stands in `votes.py`. What the operator answers is no evidence but a fact, and settles the
-vote.
+The vote itself is in `votes.py`. An operator's answer is not evidence but a fact, and settles the vote.
+
 """
 
 from __future__ import annotations
@@ -41,22 +41,28 @@ from visup.rules.identity.votes import (
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object, recognised
 from visup.rules.presence.reasoner import visible_share
-from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
+from visup.rules.wording.conditions import (
+    Condition,
+    DecisionLog,
+    ExplainableReasoner,
+    at_least,
+    decide,
+)
 from visup.rules.wording.sentences import (
     KIND_NAMES,
-    TOLD_NAMES,
+    REPORTED_NAMES,
     seems,
     with_article,
 )
 
 
 @dataclass(frozen=True, slots=True)
-class NamesHeard:
-    """What was said of an object in one step.
+class NameEvidence:
+    """The hypotheses about an object in one step.
 
     Attributes:
-        kind: By its silhouette, or by what found it.
-        hypotheses: Names and views, in any order; empty where nobody looked.
+        kind: Whether from its silhouette, or from the behaviour that detected it.
+        hypotheses: Names and views, in any order; empty if it was not matched.
     """
 
     kind: Literal["shape", "found"]
@@ -64,7 +70,7 @@ class NamesHeard:
 
 
 def awaited(mind: Mind, object_id: int) -> frozenset[str]:
-    """Models that actors of tasks stand for and that no other object in view is believed to be."""
+    """Models of tasks' actors that no other object in view is believed to be."""
     wanted = {model for models in mind.actors.values() for model in models}
     found = {
         b.name
@@ -75,33 +81,21 @@ def awaited(mind: Mind, object_id: int) -> frozenset[str]:
 
 
 def answered_model(mind: Mind, answer: str) -> str:
-    """The model that an answer means: the first of an actor's, where the answer names an actor."""
+    """The model an answer refers to; the first model of an actor if it names an actor."""
     bindings = (b for task in mind.tasks for b in task.bindings if b.actor == answer)
     return next((b.models[0] for b in bindings if b.models), answer)
 
 
 @dataclass(frozen=True, slots=True)
-class IdentityReasoner:
-    """Reasoner of the cogitate phase: counts votes and tells who is who."""
+class IdentityReasoner(ExplainableReasoner):
+    """Reasoner of the cogitate phase: counts votes and reports identities.
+
+    It explains the decision 'identified' for every object.
+    """
 
     settings: VoteSettings = field(default_factory=VoteSettings)
 
-    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Count one step; see `Reasoner`."""
-        return self._judged(mind, observation, None)
-
-    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
-        """What the decision 'identified' of a step hangs on, for every object.
-
-        Args:
-            mind: As this reasoner got it in that step.
-            observation: What was perceived.
-        """
-        log = DecisionLog()
-        self._judged(mind, observation, log)
-        return log
-
-    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+    def _reason(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
         old = mind.recall(VOTES) or VoteMemory(observation.time)
         dt = max(0.0, observation.time - old.time)
         hypotheses = hypotheses_by_object(mind, observation)
@@ -124,14 +118,14 @@ class IdentityReasoner:
             every[object_id] = votes
         mind = mind.with_objects(*beliefs)
         mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(every)))
-        told = {i: votes.reported for i, votes in every.items() if votes.reported is not None}
-        mind = mind.remember(TOLD_NAMES, MappingProxyType(told))
+        reported = {i: votes.reported for i, votes in every.items() if votes.reported is not None}
+        mind = mind.remember(REPORTED_NAMES, MappingProxyType(reported))
         return Outcome(mind, tuple(events))
 
     def _conditions(
         self, belief: ObjectBelief, votes: ObjectVotes, mind: Mind
     ) -> Iterator[Condition]:
-        """Of an object's being identified as what leads its votes."""
+        """Conditions for identifying an object as the leader of its votes."""
         s = self.settings
         if not belief.candidates:
             answered = mind.answers.get(belief.id) == UNKNOWN_OBJECT
@@ -147,7 +141,7 @@ class IdentityReasoner:
         yield Condition("it has entered", belief.confirmed)
 
     def _count(
-        self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes, look: NamesHeard, dt: float
+        self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes, look: NameEvidence, dt: float
     ) -> ObjectVotes:
         s = self.settings
         visible = visible_share(mind, belief.id)
@@ -155,25 +149,25 @@ class IdentityReasoner:
         blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
         tau = s.tau_hidden_s if hidden or blind else s.tau_s
         waited = awaited(mind, belief.id)
-        said, share = Tally(), 0.0
+        new_votes, share = Tally(), 0.0
         if look.hypotheses and not (hidden or blind):
             new = 1.0 if votes.heard is None else min(1.0, (mind.time - votes.heard) / s.apart_s)
-            said, share = self._weighed(mind, belief.id, look, waited), new * visible
+            new_votes, share = self._weighed(mind, belief.id, look, waited), new * visible
             votes = replace(votes, heard=mind.time)
         tallies = {}
         for kind, tally in (("shape", votes.shape), ("found", votes.found)):
-            heard = said if kind == look.kind else Tally()
+            heard = new_votes if kind == look.kind else Tally()
             tallies[kind] = faded(tally, heard, share, (dt, tau), s.most_candidates)
         return joined(replace(votes, **tallies), s, waited)
 
     def _weighed(
-        self, mind: Mind, object_id: int, look: NamesHeard, waited: Collection[str]
+        self, mind: Mind, object_id: int, look: NameEvidence, waited: Collection[str]
     ) -> Tally:
-        """What a look says: weights of names, and of its being none of the models."""
+        """The new votes of one match: weights of names, and of its being none of the models."""
         s = self.settings
         kind: LookKind = getattr(s, look.kind)
         heard = weights(look.hypotheses, s, waited, kind.awaited)
-        # Views that do not hang together over time speak against a name (paper, figure 5).
+        # Views that are inconsistent over time count against a name (paper, figure 5).
         likely = ((n, w * pose_support(mind, object_id, n)) for n, w in heard.items())
         return Tally(tuple(likely), worth(s.stranger, s))
 
@@ -184,8 +178,8 @@ class IdentityReasoner:
             return replace(belief, candidates=(), unknown=1.0)
         if answer is not None:
             name = answered_model(mind, answer)
-            said = (confirmed_candidate(name, votes.counts),)
-            return replace(belief, candidates=said, unknown=0.0)
+            confirmed = (confirmed_candidate(name, votes.counts),)
+            return replace(belief, candidates=confirmed, unknown=0.0)
         return replace(
             belief,
             candidates=candidates(votes.counts, s, votes.none),
@@ -193,21 +187,23 @@ class IdentityReasoner:
         )
 
     def _lead(self, votes: ObjectVotes, named: tuple[Candidate, ...], now: float) -> ObjectVotes:
-        """The votes with who leads clearly, and since when."""
+        """The votes with the clear leader and its time updated."""
         clear = named and named[0].confidence >= self.settings.settle
         leader = named[0].name if clear else None
         since = votes.leads_since if leader == votes.leader else now
         return replace(votes, leader=leader, leads_since=since)
 
 
-def _look(belief: ObjectBelief, said: tuple[Hypothesis, ...], found: Collection[int]) -> NamesHeard:
-    """What was said of an object, as what kind of look."""
-    return NamesHeard("found" if belief.id in found else "shape", said)
+def _look(
+    belief: ObjectBelief, hypotheses: tuple[Hypothesis, ...], found: Collection[int]
+) -> NameEvidence:
+    """The hypotheses about an object, with their kind."""
+    return NameEvidence("found" if belief.id in found else "shape", hypotheses)
 
 
 def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> Mind:
-    """The mind that knows which names are those of kinds."""
-    heard = {h.name for said in hypotheses.values() for h in said if h.of_kind}
+    """The mind with the names of kinds recorded."""
+    heard = {h.name for some in hypotheses.values() for h in some if h.of_kind}
     known = mind.recall(KIND_NAMES)
     return (
         mind if heard <= set(known) else mind.remember(KIND_NAMES, (*sorted(heard | set(known)),))
@@ -217,7 +213,7 @@ def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> M
 def _identified(
     mind: Mind, belief: ObjectBelief, before: str | None, observation: Observation
 ) -> Event:
-    # By its model alone: the part that it plays in a task may be another's, and lags behind.
+    # Named by its model alone: its role in a task may be another object's, and lags behind.
     words, how = with_article(mind, belief.name), seems(belief.confidence)
     if before is None:
         text = f"Object {belief.id} {how} {words}."

@@ -1,8 +1,8 @@
-"""Asking the operator who is who, where votes alone do not tell (paper, section 5).
+"""Questions to the operator about identities that votes alone do not settle (paper, section 5).
 
-Two names that stay close for a while will hardly be told apart by more of the same. The operator is
-then asked once, and again only after a long time. The question stays in the mind until it is
-answered, settles by itself, or its object is gone.
+Two names that stay close for a while will hardly be separated by more of the same evidence. The operator is
+then asked once, and again only after a long time. The question stays in the mind until it is answered,
+settles by itself, or its object is gone.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from visup.rules.wording.sentences import called, spaced
 
 @dataclass(frozen=True, slots=True)
 class QuestionSettings:
-    """When the operator is asked.
+    """When to ask the operator.
 
     Attributes:
         close: Difference in likelihood within which two names are close.
         least: Likelihood below which a name is not worth asking about.
         patience_s: How long two names must be close.
         again_s: Least time between two questions about an object.
-        most: Names offered.
+        most: Most names offered.
     """
 
     close: float = 0.5
@@ -47,7 +47,7 @@ class QuestionSettings:
 
 @dataclass(frozen=True, slots=True)
 class Ambiguity:
-    """Since when an object's names are close, and when it was last asked about; seconds or None."""
+    """Since when an object's names are close, and when the operator was last asked; seconds or None."""
 
     since: float | None = None
     asked: float | None = None
@@ -58,34 +58,34 @@ QUESTIONS: MemoryKey[Mapping[int, Ambiguity]] = MemoryKey("rules.questions", Map
 
 @dataclass(frozen=True, slots=True)
 class QuestionReasoner:
-    """Reasoner of the cogitate phase, after the votes: keeps the questions that wait."""
+    """Reasoner of the cogitate phase, after the votes: maintains the open questions."""
 
     settings: QuestionSettings = field(default_factory=QuestionSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Reason about one step; see `Reasoner`."""
         old = mind.recall(QUESTIONS)
         open_now = {q.object_id: q for q in mind.questions}
-        doubts: dict[int, Ambiguity] = {}
+        ambiguities: dict[int, Ambiguity] = {}
         waiting: list[Question] = []
         asked: list[Question] = []
         for belief in mind.present():
-            doubt = self._doubt(belief, old.get(belief.id, Ambiguity()), mind)
+            ambiguity = self._updated(belief, old.get(belief.id, Ambiguity()), mind)
             question = open_now.get(belief.id)
-            if doubt.since is None:
+            if ambiguity.since is None:
                 question = None
-            elif question is None and self._ripe(doubt, mind.time):
+            elif question is None and self._ripe(ambiguity, mind.time):
                 question = self._question(mind, belief)
-                doubt = replace(doubt, asked=mind.time)
+                ambiguity = replace(ambiguity, asked=mind.time)
                 asked.append(question)
             waiting += [question] if question else []
-            if doubt != Ambiguity():
-                doubts[belief.id] = doubt
-        mind = mind.remember(QUESTIONS, MappingProxyType(doubts), questions=tuple(waiting))
+            if ambiguity != Ambiguity():
+                ambiguities[belief.id] = ambiguity
+        mind = mind.remember(QUESTIONS, MappingProxyType(ambiguities), questions=tuple(waiting))
         events = tuple(_event(q, observation) for q in asked)
         return Outcome(mind, events, directives=tuple(_directives(waiting)))
 
-    def _doubt(self, belief: ObjectBelief, before: Ambiguity, mind: Mind) -> Ambiguity:
+    def _updated(self, belief: ObjectBelief, before: Ambiguity, mind: Mind) -> Ambiguity:
         if belief.presence is not Presence.SEEN:
             return before
         close = belief.id not in mind.answers and len(self._names(belief)) > 1
@@ -93,13 +93,15 @@ class QuestionReasoner:
             return replace(before, since=None)
         return before if before.since is not None else replace(before, since=mind.time)
 
-    def _ripe(self, doubt: Ambiguity, now: float) -> bool:
+    def _ripe(self, ambiguity: Ambiguity, now: float) -> bool:
         s = self.settings
-        again = doubt.asked is None or now - doubt.asked >= s.again_s
-        return again and doubt.since is not None and now - doubt.since >= s.patience_s - 1e-6
+        again = ambiguity.asked is None or now - ambiguity.asked >= s.again_s
+        return (
+            again and ambiguity.since is not None and now - ambiguity.since >= s.patience_s - 1e-6
+        )
 
     def _names(self, belief: ObjectBelief) -> tuple[str, ...]:
-        """The names that are close to the best one, with it."""
+        """The best name and those close to it."""
         s = self.settings
         best = belief.candidates[0].confidence if belief.candidates else 0.0
         return tuple(
@@ -115,8 +117,8 @@ class QuestionReasoner:
 
 def question_text(mind: Mind, object_id: int, names: tuple[str, ...]) -> str:
     """The question in words: 'Is object 2 the arm or the guitar?'."""
-    spoken = [f"the {spaced(called(mind, name))}" for name in names]
-    return f"Is object {object_id} {', '.join(spoken[:-1])} or {spoken[-1]}?"
+    phrases = [f"the {spaced(called(mind, name))}" for name in names]
+    return f"Is object {object_id} {', '.join(phrases[:-1])} or {phrases[-1]}?"
 
 
 def _event(question: Question, observation: Observation) -> Event:

@@ -5,27 +5,24 @@ For each object o and each model name n, in each step of length dt:
     v(o, n) <- v(o, n) * exp(-dt / tau) + w
     w = new * visible(o) * p(o, n) * rank^k * (s - 0.4) / (1 - 0.4)
 
-where s is the best similarity with which any view of n was hypothesised for o's region in this
-step (nothing at or below 0.4 counts; section 7.3), k the place of n among the names of this step
-(0 for the best), p(o, n) how well its views hang together over time (`pose_support`), and visible(o)
-the share of o that is in sight. Hypotheses that follow each other fast are of the same picture:
-`new` is the time since the last ones, as a share of `apart_s`, at most 1. The three principles:
+where s is the best similarity with which any view of n was hypothesised for o's region in this step (nothing
+at or below 0.4 counts; section 7.3), k the rank of n among the names of this step (0 for the best), p(o, n)
+the consistency of its views over time (`pose_support`), and visible(o) the visible share of o. Hypotheses in
+quick succession are of the same picture: `new` is the time since the last ones, as a share of `apart_s`, at
+most 1. The three principles:
 
-1. recurrent and temporally stable hypotheses are more likely: votes add up over steps;
-2. what has not been hypothesised lately is forgotten: votes decay with `tau_s`;
-3. an occluded object keeps its votes for some time: while it is hidden, or while nobody could look,
+1. recurrent and temporally stable hypotheses are more likely: votes accumulate over steps;
+2. hypotheses that do not recur are forgotten: votes decay with `tau_s`;
+3. an occluded object keeps its votes for some time: while it is hidden, or the camera is blind,
    they decay with `tau_hidden_s` instead.
 
-The set of names is open. Whatever is in view, the database has something that is a little like it:
-each time, the possibility that the object is none of the models gets the vote of a name of
-similarity `stranger`. While it has the most votes, because all names are weak or change all the
-time, the object is an 'unknown object'.
-
-Looks at a silhouette are counted apart from those by which a behaviour found the object. What a task expects
-to see, and no other object is believed to be, was more likely before anybody looked: it counts as more
-similar, since errors of similarity last as long as the view, and has some votes from the start.
-
-Votes are read as evidence: the likelihood of a name is proportional to exp(`evidence` * v).
+The set of names is open. Whatever is in view, the database has something slightly similar: in each step the
+possibility that the object is none of the models gets the vote of a name of similarity `stranger`. While it
+has the most votes, because all names are weak or change constantly, the object is an 'unknown object'.
+ Matches of a silhouette are counted separately from those of the behaviour that detected the object. A model
+that a task expects, and that no other object is believed to be, was more likely a priori: it counts as more
+similar, since errors of similarity last as long as the view, and has some votes from the start. Votes are
+read as evidence: the likelihood of a name is proportional to exp(`evidence` * v).
 """
 
 from __future__ import annotations
@@ -44,11 +41,11 @@ VoteCounts = tuple[tuple[str, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class LookKind:
-    """What one kind of looks tells.
+    """Settings of one kind of match.
 
     Attributes:
-        awaited: How much more similar a model counts that an actor of a task stands for, while no
-            other object is believed to be it.
+        awaited: Bonus to the similarity of a model of a task's actor, while no other object is believed
+            to be it.
     """
 
     awaited: float
@@ -56,24 +53,24 @@ class LookKind:
 
 @dataclass(frozen=True, slots=True)
 class VoteSettings:
-    """How votes are counted.
+    """Settings of the vote.
 
     Attributes:
         least_similarity: Hypotheses at or below it do not count (paper: 0.4).
-        tau_s: Votes of a seen object fall to 37 % in this time.
+        tau_s: Votes of a visible object fall to 37 % in this time.
         tau_hidden_s: The same for a hidden object.
         rank: Weight of each name relative to the name above it in the same step.
-        least_visible: Below this share in sight an object is treated as hidden.
-        most_candidates: Names kept for an object.
+        least_visible: Below this visible share an object is treated as hidden.
+        most_candidates: Most names of an object.
         least_share: Names with a smaller share of the votes are dropped.
         known_votes: Votes that the best name needs for the object to be known at all.
-        stranger: Similarity that an object has to some model even when it is none of them.
-        shape: Looks at the silhouette.
-        found: Looks by which a behaviour found the region itself.
-        expected: Votes that an awaited model has before anybody looked at the silhouette.
+        stranger: Similarity of an object to some model even when it is none of them.
+        shape: Matches of the silhouette.
+        found: Matches by the behaviour that detected the region.
+        expected: Prior votes of an awaited model before any match of the silhouette.
         apart_s: Hypotheses this far apart in time are of different pictures.
-        evidence: How much a vote tells, in units of log likelihood.
-        settle: Likelihood at which a name is told.
+        evidence: Log likelihood per vote.
+        settle: Likelihood at which a name is reported.
         settle_s: How long it must have had it.
     """
 
@@ -97,7 +94,7 @@ class VoteSettings:
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Votes of one kind of looks at an object.
+    """Votes of one kind of match for an object.
 
     Attributes:
         counts: (name, votes), most votes first.
@@ -110,17 +107,17 @@ class Tally:
 
 @dataclass(frozen=True)
 class ObjectVotes:
-    """What is remembered of one object's votes.
+    """The memory of one object's votes.
 
     Attributes:
-        counts: (name, votes), most votes first: of all looks.
+        counts: (name, votes), most votes first: over all kinds.
         none: Votes for its being none of the models.
-        shape: Those of looks at its silhouette.
-        found: Those of looks by which it was found.
+        shape: Votes of matches of its silhouette.
+        found: Votes of matches by the behaviour that detected it.
         heard: Seconds of the last hypotheses about it, or None.
         leader: The name that leads clearly now, or None.
-        leads_since: Seconds since when it does.
-        reported: The name that was reported last, or None.
+        leads_since: Seconds since when it leads.
+        reported: The last reported name, or None.
     """
 
     counts: VoteCounts = ()
@@ -150,7 +147,7 @@ VOTES: MemoryKey[VoteMemory | None] = MemoryKey("rules.votes", None)
 
 
 def object_votes(mind: Mind, object_id: int) -> ObjectVotes:
-    """What is remembered of the votes on an object."""
+    """The memory of the votes on an object."""
     memory = mind.recall(VOTES) or VoteMemory(mind.time)
     return memory.of.get(object_id, ObjectVotes())
 
@@ -167,7 +164,7 @@ def weights(
         hypotheses: All of them, in any order.
         settings: Threshold and rank discount.
         awaited: Models that are expected and not yet found.
-        more: How much more similar they count.
+        more: Bonus to their similarity.
 
     Returns:
         Name -> weight, 0 to 1, best first.
@@ -182,7 +179,7 @@ def weights(
 
 
 def worth(similarity: float, settings: VoteSettings) -> float:
-    """What a similarity counts, 0 to 1."""
+    """The weight of a similarity, 0 to 1."""
     room = 1.0 - settings.least_similarity
     return max(0.0, similarity - settings.least_similarity) / room
 
@@ -198,15 +195,15 @@ def updated_votes(
     """One step of the vote for one object.
 
     Args:
-        tally: Votes before.
+        tally: Votes before the step.
         new: Weights of this step's names.
         dt: Seconds since the last count.
         tau: Time constant, seconds.
         most: Names to keep.
-        visible: Share of the object in sight, 0 to 1.
+        visible: Visible share of the object, 0 to 1.
 
     Returns:
-        Votes after, most first.
+        Votes after the step, most first.
     """
     fade = exp(-dt / tau)
     votes = {name: v * fade for name, v in tally}
@@ -219,15 +216,15 @@ def updated_votes(
 def candidates(
     tally: VoteCounts, settings: VoteSettings, stranger: float = 0.0
 ) -> tuple[Candidate, ...]:
-    """Candidates that votes allow, each with its likelihood.
+    """Candidates supported by votes, each with its likelihood.
 
     Args:
         tally: Votes, most first.
-        settings: How many candidates are kept, and how votes are read.
+        settings: Number of candidates, and the scale of votes.
         stranger: Votes for the object's being none of the models.
 
     Returns:
-        Most likely first; none while the best has too few votes, or fewer than a stranger has.
+        Most likely first; none while the best has too few votes, or fewer than a stranger.
     """
     if not tally or tally[0][1] <= 0.0 or tally[0][1] < max(settings.known_votes, stranger):
         return ()
@@ -242,23 +239,23 @@ def candidates(
 
 
 def unknown_probability(tally: VoteCounts, settings: VoteSettings, stranger: float) -> float:
-    """How likely an object is none of the models, 0 to 1; 1 while nothing was said of it."""
+    """Probability that an object is none of the models, 0 to 1; 1 without hypotheses."""
     odds = sum(exp(settings.evidence * (v - stranger)) for _, v in tally)
     return 1.0 / (1.0 + odds)
 
 
 def confirmed_candidate(name: str, tally: VoteCounts) -> Candidate:
-    """The only candidate, once the operator has said what an object is."""
+    """The only candidate of an object identified by the operator."""
     return Candidate(name, dict(tally).get(name, 0.0), 1.0, 1.0)
 
 
 def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], most: int) -> Tally:
-    """A tally after one step.
+    """Update a tally by one step.
 
     Args:
-        tally: Before.
-        new: Weights of this step's names and of none of the models; nothing where nobody looked.
-        share: What they count.
+        tally: The tally before.
+        new: Weights of this step's names and of none of the models; empty without a match.
+        share: Factor of the weights.
         fade: Seconds since the last count, and the time constant.
         most: Names to keep.
     """
@@ -269,11 +266,11 @@ def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], mos
 
 
 def joined(votes: ObjectVotes, settings: VoteSettings, awaited: Collection[str]) -> ObjectVotes:
-    """The votes of an object with those of all looks added up.
+    """The votes of an object with those of all kinds summed.
 
     Args:
         votes: With the tally of each kind.
-        settings: What awaited models have from the start.
+        settings: For the prior votes of awaited models.
         awaited: Models that are expected and not yet found.
     """
     kinds = votes.shape, votes.found

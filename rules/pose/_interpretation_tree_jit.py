@@ -1,4 +1,4 @@
-"""One level more of an interpretation tree, compiled; `interpretation_tree.py` says what it is for."""
+"""Compiled loops of `interpretation_tree.py`: extending paths by one level."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 NONE = -1
-"""In a path: no hypothesis is chosen at this level; as a view: none was chosen yet."""
+"""In a path: no hypothesis chosen at this level; as a view: none chosen yet."""
 _SMALL = 1e-12
 
 
 @compiled
 def rotate(rate: Floats, seconds: float, matrix: Floats, out: Floats) -> None:
-    """What a (3, 3) matrix becomes after a turn at a rate (3,), radians per second (Rodrigues)."""
+    """Rotate a (3, 3) matrix at a rate (3,), radians per second (Rodrigues)."""
     x, y, z = rate[0] * seconds, rate[1] * seconds, rate[2] * seconds
     angle = sqrt(x * x + y * y + z * z)
     first = sin(angle) / angle if angle > _SMALL else 1.0
@@ -28,7 +28,7 @@ def rotate(rate: Floats, seconds: float, matrix: Floats, out: Floats) -> None:
     second = 0.5 * half * half
     for k in range(3):
         a, b, c = matrix[0, k], matrix[1, k], matrix[2, k]
-        # The cross product with the vector, once and twice.
+        # The cross product with the rotation vector, applied once and twice.
         p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
         out[0, k] = a + first * p + second * (y * r - z * q)
         out[1, k] = b + first * q + second * (z * p - x * r)
@@ -39,14 +39,14 @@ def rotate(rate: Floats, seconds: float, matrix: Floats, out: Floats) -> None:
 def rotation_cost(
     one: Floats, other: Floats, roll_counts: bool, swing_is: float, roll_is: float
 ) -> float:
-    """Half the squares of swing and roll between two orientations; NaN where one is not known.
+    """Half the squares of swing and roll between two orientations; NaN when one is unknown.
 
     Args:
         one: (3, 3) model to camera.
         other: The same.
         roll_counts: Whether the roll is known.
-        swing_is: Radians that count as one standard deviation.
-        roll_is: The same of the roll.
+        swing_is: Standard deviation of the swing, radians.
+        roll_is: Standard deviation of the roll, radians.
     """
     m22 = m10 = m01 = m00 = m11 = 0.0
     for k in range(3):
@@ -63,18 +63,18 @@ def rotation_cost(
 
 
 class TreeCosts(NamedTuple):
-    """What choices cost at one level.
+    """The costs of choices at one level.
 
     Attributes:
         time: Seconds.
-        weight: Of the level.
-        wrong: Of calling all hypotheses wrong.
-        jump: The most that a turn costs.
-        other_view: Of another view where directions are not known.
-        swing: Radians that count as one standard deviation for an object that stands still.
+        weight: Weight of the level.
+        wrong: Cost of calling all hypotheses wrong.
+        jump: Greatest cost of a rotation.
+        other_view: Cost of another view where directions are unknown.
+        swing: Standard deviation of the swing of an object at rest, radians.
         roll: The same in the plane.
         rate_sigma: Standard deviation of the rate, radians per second.
-        most_paths: So many are kept.
+        most_paths: Most paths retained.
     """
 
     time: float
@@ -89,7 +89,7 @@ class TreeCosts(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """The paths of a tree, each by where it stands; see `InterpretationTree`."""
+    """The paths of a tree, each by its current end; see `InterpretationTree`."""
 
     cost: Floats
     views: Ints
@@ -101,7 +101,7 @@ class Paths(NamedTuple):
 
 
 class Choices(NamedTuple):
-    """The hypotheses of a level, none where nothing was hypothesised; see `TreeLevel`."""
+    """The hypotheses of a level, possibly none; see `TreeLevel`."""
 
     views: Ints
     orientation: Floats
@@ -111,11 +111,11 @@ class Choices(NamedTuple):
 
 @compiled
 def turn_costs(costs: TreeCosts, paths: Paths, level: Choices, rate: Floats) -> Floats:
-    """Costs (S, H) of choosing each hypothesis of a level after what each path chose last.
+    """Costs (S, H) of choosing each hypothesis of a level after each path's last choice.
 
     Args:
-        costs: Of the level.
-        paths: Before it.
+        costs: Costs of the level.
+        paths: The paths before it.
         level: Its hypotheses.
         rate: (3,) radians per second.
     """
@@ -142,7 +142,7 @@ def turn_costs(costs: TreeCosts, paths: Paths, level: Choices, rate: Floats) -> 
 def _cheapest_parents(
     costs: TreeCosts, paths: Paths, level: Choices, rate: Floats
 ) -> tuple[Ints, Floats]:
-    """(H + S,) the path that each new one goes on from, and what it costs.
+    """(H + S,) the parent of each new path, and the new path's cost.
 
     The first H choose a hypothesis, the others none.
     """
@@ -165,16 +165,16 @@ def _cheapest_parents(
 def extend_paths(
     costs: TreeCosts, paths: Paths, level: Choices, rate: Floats
 ) -> tuple[Paths, float]:
-    """The paths after one level more, cheapest first, without those that cannot become cheapest.
+    """Extend the paths by one level; cheapest first, without those that cannot become cheapest.
 
     Args:
-        costs: Of the level.
-        paths: Before it.
+        costs: Costs of the level.
+        paths: The paths before it.
         level: Its hypotheses.
         rate: (3,) radians per second.
 
     Returns:
-        The new paths, and what the cheapest costs more than that before.
+        The new paths, and the increase of the cheapest cost.
     """
     parent, every = _cheapest_parents(costs, paths, level, rate)
     order = np.argsort(every, kind="mergesort")

@@ -1,14 +1,12 @@
 """Angular velocity of an object, from the orientations of its views.
 
-Over a window of time the object turns at one rate: R(t) = turned(w * (t - m)) R(m). Rate w and
-orientation R(m) are fitted together by least squares (Gauss-Newton on rotations,
-`angular_velocity_fit.py`). Where the orientations jump (to that of a symmetric object's twin), both sides
-have an R(m) of their own and share w, which is the same for twins.
-
-An object may be hit. Against the one rate stand two, one before and one after a change at a time that is
-fitted too; the orientation is continuous there, so that what was known before helps to measure what
-comes after. The change is believed when the two rates differ by more than their uncertainty allows;
-from then on what lies farther back is left out.
+Within a window the object rotates at one rate: R(t) = turned(w * (t - m)) R(m). Rate w and orientation R(m)
+are fitted together by least squares (Gauss-Newton on rotations, `angular_velocity_fit.py`). Where the
+orientations jump (to that of a symmetric object's twin), both sides have their own R(m) and share w, which is
+the same for twins.
+ The rate may change by an impact. The alternative to one rate is two, before and after a change at a fitted
+time, with continuous orientation, so that earlier measurements constrain later ones. The change is accepted
+when the two rates differ by more than their uncertainty, and older data are then dropped.
 """
 
 from __future__ import annotations
@@ -31,19 +29,19 @@ from visup.rules.pose.rotations import Floats
 
 @dataclass(frozen=True, slots=True)
 class SpinSettings(FitSettings):
-    """How spin is measured; the rest as in `FitSettings`.
+    """Settings of the spin measurement; the rest as in `FitSettings`.
 
     Attributes:
-        window_s: The longest stretch over which a rate is fitted.
-        recent_s: The stretch from which a first guess of the rate now is made.
-        changes_s: A change of rate is looked for about so many seconds ago.
-        change: A change is believed from this squared difference of rates on, in variances, ...
-        gain: ... when each parameter more saves the cost of so many residuals.
-        unchanged: It is believed no longer below this squared difference.
-        doubt: A rate is doubted when that of the last seconds differs by this, squared, in variances.
-        kept_s: So much of the time before a change is still heeded.
-        least: Orientations that a window needs.
-        known_deg_s: A rate is told when its standard deviation is below this ...
+        window_s: Longest window over which a rate is fitted.
+        recent_s: Window for a first guess of the current rate.
+        changes_s: A change of rate is searched for about this many seconds ago.
+        change: A change is accepted from this squared difference of rates, in variances, ...
+        gain: ... if each further parameter saves the cost of this many residuals.
+        unchanged: It is dropped below this squared difference.
+        doubt: A rate is uncertain if the rate of the last seconds differs by this, squared, in variances.
+        kept_s: Length of the window retained before a change.
+        least: Fewest orientations in a window.
+        known_deg_s: A rate is reported when its standard deviation is below this ...
         known_share: ... or below this share of the rate.
     """
 
@@ -66,10 +64,10 @@ class AngularVelocity:
 
     Attributes:
         vector: (3,) rotation vector per second, camera frame, radians.
-        covariance: (3, 3) of `vector`.
-        scatter: Share of its trace that is due to scatter, which makes `vector` longer than it is.
-        since: Seconds since when the object turns at this rate, as far as is known.
-        before: (3,) the rate before a change at `since`, or None when no change is known.
+        covariance: (3, 3) covariance of `vector`.
+        scatter: Share of its trace that is due to scatter, which lengthens `vector`.
+        since: Seconds since when the object rotates at this rate, as far as known.
+        before: (3,) the rate before a change at `since`, or None without one.
     """
 
     vector: Floats
@@ -87,13 +85,13 @@ class AngularVelocity:
 def estimate_angular_velocity(
     turns: OrientationSeries, now: float, before: AngularVelocity | None, settings: SpinSettings
 ) -> AngularVelocity | None:
-    """The rate at which an object turns now.
+    """The current rate of rotation of an object.
 
     Args:
         turns: Its orientations up to now.
         now: Seconds.
-        before: The rate as measured last, or None.
-        settings: How it is measured.
+        before: The last measured rate, or None.
+        settings: Settings.
 
     Returns:
         The rate, or None while there are too few orientations.
@@ -116,7 +114,7 @@ def estimate_angular_velocity(
 
 
 def _inflated(rate: AngularVelocity, recent: SpinFit, settings: SpinSettings) -> AngularVelocity:
-    """The same rate, less certain when the last seconds alone tell another: it may just be changing."""
+    """The rate with its covariance inflated if the last seconds alone disagree: it may be changing."""
     lately = _angular_velocity_of(recent, settings)
     apart = lately.vector - rate.vector
     both = lately.covariance + rate.covariance
@@ -128,7 +126,7 @@ def _inflated(rate: AngularVelocity, recent: SpinFit, settings: SpinSettings) ->
 def _refitted_change(
     turns: OrientationSeries, before: AngularVelocity, settings: SpinSettings
 ) -> SpinFit | None:
-    """The fit with the change that was found before, or None when there is none (any more)."""
+    """A refit with the previously found change, or None when there is none any more."""
     if before.before is None or len(turns.times) < 2 * settings.least:
         return None
     if not turns.times[0] + 0.5 < before.since < turns.times[-1] - 0.5:
@@ -145,7 +143,7 @@ def spin_of(rate: AngularVelocity, settings: SpinSettings) -> Spin | None:
     """A rate as a record of the mind, or None if it is too uncertain to report."""
     length = float(np.linalg.norm(rate.vector))
     axis = rate.vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
-    # The length of a scattered vector is too great.
+    # Scatter biases the length of the vector upwards.
     excess = rate.scatter * float(np.trace(rate.covariance))
     degrees = float(np.degrees(np.sqrt(max(0.0, length**2 - excess))))
     along = float(axis @ rate.covariance @ axis)
@@ -159,7 +157,7 @@ def spin_of(rate: AngularVelocity, settings: SpinSettings) -> Spin | None:
 def _steady_fit(
     turns: OrientationSeries, start: Floats | None, settings: SpinSettings
 ) -> SpinFit | None:
-    """One rate for all of the time, or None when too few orientations hang together."""
+    """One rate for the whole window, or None when too few orientations are consistent."""
     if len(turns.times) < settings.least:
         return None
     guess = start if start is not None else first_rate(turns, settings)
@@ -174,7 +172,7 @@ def _steady_fit(
 def _change_fit(
     steady: SpinFit, turns: OrientationSeries, now: float, after: Floats, settings: SpinSettings
 ) -> SpinFit | None:
-    """The best fit of two rates with a change between them, or None when there is none to be believed."""
+    """The best fit of two rates with a change between them, or None without a credible one."""
     before = steady.rates[0]
     pieces = long_pieces(turns, before, settings)
     if (pieces >= 0).sum() < 2 * settings.least:
@@ -182,7 +180,7 @@ def _change_fit(
     turns, pieces = thinned(turns, pieces, settings)
     times = [now - ago for ago in settings.changes_s]
     inside = [t for t in times if turns.times[0] + 1.0 < t < turns.times[-1] - 1.0]
-    # What one step saves tells where to look: the promise of a step alone is often an empty one.
+    # One step is taken from each candidate: the predicted gain of a step alone is often wrong.
     tried = [SpinFit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
     tried = [fit for fit in tried if fit.run(1)]
     if not tried or min(fit.cost for fit in tried) > steady.cost:
@@ -194,13 +192,13 @@ def _change_fit(
 
 
 def _gain(steady: SpinFit, changed: SpinFit) -> float:
-    """How much better two rates fit: cost saved by each further parameter, in costs of a residual."""
+    """Gain of two rates over one: cost saved per further parameter, in costs of a residual."""
     return (steady.cost - changed.cost) / 4 / max(changed.cost / changed.residuals, 1e-12)
 
 
 def _angular_velocity_of(fit: SpinFit, settings: SpinSettings) -> AngularVelocity:
     covariance, span = fit.covariance(-1), max(fit.span, 1e-6)
-    # However still the views stand, the object may have turned a part of the way to the next.
+    # Even while the view is unchanged, the object may have rotated part of the way to the next.
     unseen = (np.radians(settings.view_deg) / span) ** 2
     stuck = settings.view_share * float(np.linalg.norm(fit.rates[-1]))
     unseen += min(stuck, np.radians(settings.view_most_deg) / span) ** 2

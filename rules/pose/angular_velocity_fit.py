@@ -1,9 +1,8 @@
-"""Least squares of rates of turn on rotations, robust, with a change of rate or without.
+"""Robust least squares for rates of rotation, with or without a change of rate.
 
-Residuals are rotation vectors in units of their standard deviations (directions and turns in the
-plane are known differently well), discounted when they are large (weights of Geman and McClure).
-The views of a model are discrete, so that errors last as long as a view does: covariances are for errors
-that are correlated over time (Newey and West, 1987).
+Residuals are rotation vectors in units of their standard deviations (which differ for directions and in-plane
+rotation), down-weighted when large (Geman and McClure). The views of a model are discrete, so errors persist
+as long as a view: covariances allow for errors correlated over time (Newey and West, 1987).
 """
 
 from __future__ import annotations
@@ -20,22 +19,22 @@ Numbers = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class FitSettings:
-    """How rates are fitted.
+    """Settings of the fit.
 
     Attributes:
-        most: Orientations that are used of a window, evenly spread.
+        most: Most orientations used of a window, evenly spread.
         swing_deg: Standard deviation of directions.
-        roll_deg: Standard deviation of turns in the plane.
-        robust: Residuals beyond so many standard deviations count little.
-        jump_deg: A turn by more than this between two orientations begins a new piece.
-        look_back: Orientations before it from which one may go on.
-        most_pieces: Pieces that are used; the longest.
-        steps: Gauss-Newton steps from a start that is near.
-        view_deg: What the discreteness of views leaves unknown of the turn over a window.
-        view_share: Between two views the turn is told too small or too great by this share, ...
-        view_most_deg: ... over a window by no more than this, as it is made good at the next view.
-        change_sigma_s: How far from where it is looked for a change may be.
-        fastest_deg_s: Greatest rate that is looked for.
+        roll_deg: Standard deviation of in-plane rotation.
+        robust: Residuals beyond this many standard deviations count little.
+        jump_deg: A rotation by more than this between two orientations starts a new segment.
+        look_back: Number of previous orientations that one may continue.
+        most_pieces: Most segments used; the longest.
+        steps: Gauss-Newton steps from a nearby start.
+        view_deg: Uncertainty of the rotation over a window due to discrete views.
+        view_share: Between two views the rotation is over- or underestimated by this share, ...
+        view_most_deg: ... over a window by at most this, since the next view corrects it.
+        change_sigma_s: Standard deviation of the time of a change about its start value.
+        fastest_deg_s: Greatest rate considered.
     """
 
     most: int = 96
@@ -58,7 +57,7 @@ class OrientationSeries:
     """Orientations over time.
 
     Attributes:
-        times: (N,) seconds, rising.
+        times: (N,) seconds, ascending.
         orientations: (N, 3, 3) model to camera.
     """
 
@@ -66,13 +65,13 @@ class OrientationSeries:
     orientations: Floats
 
     def since(self, time: float) -> OrientationSeries:
-        """Those from a time on."""
+        """The orientations from a time on."""
         first = int(np.searchsorted(self.times, time))
         return OrientationSeries(self.times[first:], self.orientations[first:])
 
 
 def first_rate(turns: OrientationSeries, settings: FitSettings) -> Floats:
-    """A first guess: the median over pairs some time apart, (3,) radians per second."""
+    """An initial guess: the median over pairs some time apart, (3,) radians per second."""
     t, r = turns.times, turns.orientations
     found = []
     for lag in (0.3, 0.8):
@@ -87,10 +86,10 @@ def first_rate(turns: OrientationSeries, settings: FitSettings) -> Floats:
 
 
 def long_pieces(turns: OrientationSeries, rate: Floats, settings: FitSettings) -> Numbers:
-    """Number of the piece to which each orientation belongs, or -1 when it is too short.
+    """Number of the segment of each orientation, or -1 when it is too short.
 
-    An orientation goes on from the latest of the few before it from which it is no jump, so that
-    what is wrong for a moment breaks no piece.
+    An orientation continues the latest of the few before it from which it is no jump, so that a
+    momentary error breaks no segment.
     """
     piece = _linked(turns, rate, settings)
     sizes = np.bincount(piece)
@@ -121,24 +120,24 @@ def _linked(turns: OrientationSeries, rate: Floats, settings: FitSettings) -> Nu
 def thinned(
     turns: OrientationSeries, pieces: Numbers, settings: FitSettings
 ) -> tuple[OrientationSeries, Numbers]:
-    """No more than `most` of the orientations that belong to a piece, evenly spread."""
+    """At most `most` of the orientations that belong to a segment, evenly spread."""
     used = np.flatnonzero(pieces >= 0)
     if len(used) > settings.most:
         used = used[np.linspace(0, len(used) - 1, settings.most).round().astype(np.intp)]
-    # A short piece may have lost all its orientations: the others are numbered anew.
+    # A short segment may have lost all its orientations, so the others are renumbered.
     renumbered = np.unique(pieces[used], return_inverse=True)[1].astype(np.intp)
     return OrientationSeries(turns.times[used], turns.orientations[used]), renumbered
 
 
 class SpinFit:
-    """The least squares of one window.
+    """The least-squares fit of one window.
 
     Args:
-        turns: Orientations, at least one of each piece.
-        pieces: (N,) number of the piece to which each belongs, from 0.
-        rates: (1, 3), or (2, 3) before and after a change; radians per second to start from.
-        change: Seconds of the change to start from, or None when there is none.
-        settings: How it is fitted.
+        turns: Orientations, at least one of each segment.
+        pieces: (N,) segment of each orientation, from 0.
+        rates: (1, 3), or (2, 3) before and after a change; start values, radians per second.
+        change: Start value of the time of the change, seconds, or None without one.
+        settings: Settings.
     """
 
     def __init__(
@@ -163,23 +162,23 @@ class SpinFit:
 
     @property
     def residuals(self) -> int:
-        """How many residuals there are, less what is fitted."""
+        """Number of residuals minus number of parameters."""
         parameters = 3 * (len(self.rates) + self._count) + (self.change is not None)
         return max(1, 3 * len(self._pieces) - parameters)
 
     @property
     def span(self) -> float:
-        """Seconds over which the last rate was fitted."""
+        """Time over which the last rate was fitted, seconds."""
         return float(self._turns.times[-1]) - self.since
 
     @property
     def since(self) -> float:
-        """Seconds since when the object turns at the last rate."""
+        """Start of the last rate, seconds."""
         begin = float(self._turns.times[0])
         return begin if self.change is None else max(begin, self.change)
 
     def run(self, steps: int) -> bool:
-        """Take steps of Gauss-Newton; false when the fit runs away."""
+        """Take Gauss-Newton steps; false when the fit diverges."""
         for _ in range(steps):
             change, *_ = self._solved()
             phases = len(self.rates)
@@ -194,12 +193,12 @@ class SpinFit:
         return True
 
     def promise(self) -> float:
-        """How much cost one step would save, were residuals linear in it."""
+        """Predicted decrease of cost by one step, with linearised residuals."""
         step, scores, *_ = self._solved()
         return float(step @ scores.sum(axis=0)) / 3
 
     def covariance(self, phase: int) -> Floats:
-        """(3, 3) of the rate before (0) or after (-1) the change."""
+        """(3, 3) covariance of the rate before (0) or after (-1) the change."""
         k = 3 * (phase % len(self.rates))
         return np.asarray(self._covariance()[k : k + 3, k : k + 3], np.float64)
 
@@ -216,7 +215,7 @@ class SpinFit:
         t = self._turns.times
         step = min(max(by, -1.5), 1.5)
         old, new = self.change, min(max(self.change + step, t[0] + 0.5), t[-1] - 0.5)
-        # Pieces that hold the change are anchored at it: their orientation there moves along.
+        # Segments that contain the change are anchored at it: their anchor moves along.
         held = self._held
         half = rotation_matrices(self.rates.mean(axis=0) * (new - old))
         self.change = new
@@ -225,7 +224,7 @@ class SpinFit:
         self._middle[same] = half @ self._middle[same]
 
     def _anchor(self) -> None:
-        """The time of each orientation from that at which its piece's orientation is fitted."""
+        """Update the time of each orientation relative to its segment's anchor."""
         t = self._turns.times
         belongs = self._pieces[None] == np.arange(self._count)[:, None]
         middle = belongs @ t / belongs.sum(axis=1)
@@ -262,7 +261,7 @@ class SpinFit:
         return residual, flat, (residual**2).sum(axis=1) / 3
 
     def _solved(self) -> tuple[Floats, Floats, Floats, float]:
-        """The change (P,) that fits best, the scores (N, P), the inverse normal matrix, the cost."""
+        """The parameter step (P,), the scores (N, P), the inverse normal matrix, the cost."""
         residual, derivatives, square = self._equations()
         soft = 1 + square / self._s.robust**2
         weight = 1 / soft**2
@@ -273,7 +272,7 @@ class SpinFit:
         if self.change is not None and self._sought is not None:
             normal[-1, -1] += 1 / self._s.change_sigma_s**2
             total[-1] += (self._sought - self.change) / self._s.change_sigma_s**2
-        # What nothing tells of (such as when two equal rates change) stays as it is.
+        # Undetermined parameters (such as the time of change of equal rates) stay as they are.
         normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal)
         inverse: Floats = np.asarray(np.linalg.inv(normal), np.float64)
         return inverse @ total, scores, inverse, float((square / soft).sum())
@@ -283,7 +282,7 @@ class SpinFit:
 
 
 def _newey_west(scores: Floats) -> Floats:
-    """Covariance of the sum of scores (N, P) that are correlated over time (Newey and West)."""
+    """Covariance of the sum of scores (N, P) correlated over time (Newey and West)."""
     count = len(scores)
     reach = max(1, count // 5)
     total = scores.T @ scores

@@ -1,22 +1,21 @@
 """The interpretation tree: which of an object's view hypotheses belong together (paper, figure 5).
 
-Each time an object is looked at, matching offers some views of some models, and some of them are wrong. The
-tree of a model has one level for each look; a path chooses at each level one hypothesis of the
-model, or none of them ("they are all wrong"). Its cost is the sum of
+At each observation of an object, matching offers some views of some models, some of them wrong. The tree of a
+model has one level per observation; a path chooses at each level one hypothesis of the model, or none ("they
+are all wrong"). Its cost is the sum of
 
     w * (best - similarity) / similarity_sigma      for a hypothesis chosen (best: of all models),
     w * wrong                                       for a level at which none is chosen,
     min(jump, swing^2 / 2 s^2 + roll^2 / 2 r^2)     between hypotheses chosen one after the other,
 
-where w (at most 1) makes looks that follow each other closely count as one, swing is the angle between
-the directions and roll the turn in the plane. How far an object may turn free of much cost (s, r) grows
-with the time between both and with how uncertain its spin is; a spin believed turns the earlier
-orientation on. A jump has a bounded cost, so that no wrong hypothesis spoils a path for good, and
-the two orientations of a symmetric object are both kept until one of them fits better.
-
-All paths that end in the same hypothesis share their future: only the cheapest must be kept, which is
-dynamic programming and exact. What ends more than a jump dearer than the cheapest can never be on
-a cheapest path again and is dropped, which is exact too. `most_paths` bounds what is left.
+where w (at most 1) counts observations in quick succession as one, swing is the angle between the directions
+and roll the in-plane rotation. The tolerance of rotation (s, r) grows with the time between both and with the
+uncertainty of the spin; a known spin rotates the earlier orientation. A jump has a bounded cost, so that no
+wrong hypothesis spoils a path for good, and both orientations of a symmetric object are retained until one of
+them fits better.
+ All paths that end in the same hypothesis share their future: only the cheapest must be retained, which is
+dynamic programming and exact. A path more than a jump above the cheapest can never become part of a cheapest
+path and is dropped, which is exact too. `most_paths` bounds the rest.
 """
 
 from __future__ import annotations
@@ -39,22 +38,22 @@ class TreeSettings:
     """Costs and bounds of the interpretation tree.
 
     Attributes:
-        similarity_sigma: So much less similarity costs 1.
+        similarity_sigma: Loss of similarity that costs 1.
         wrong: Cost of calling all hypotheses of a level wrong.
-        jump: Greatest cost of a turn.
-        other_view: Cost of another view where directions are not known.
-        swing_deg: Standard deviation of the angle between the views of an object that stands still:
-            views are some 15 degrees apart.
-        roll_deg: The same of the turn in the plane.
-        independent_s: Looks that follow each other faster than this count in proportion.
-        interpolate_deg: Hypotheses within this angle of each other are of one orientation, and
-            tell together what lies between their views.
-        interpolate_similarity: How fast the weight of such a neighbour falls with its similarity when
-            it is 20 degrees away. Similarity falls with the square of the angle, so that where views
-            stand wider apart a greater difference tells as much.
-        most_hypotheses: Of one model and level, the most similar.
-        most_paths: Of one model; the cheapest.
-        lag: Levels for which paths are remembered.
+        jump: Greatest cost of a rotation.
+        other_view: Cost of another view where directions are unknown.
+        swing_deg: Standard deviation of the angle between the views of an object at rest: views are
+            some 15 degrees apart.
+        roll_deg: The same for in-plane rotation.
+        independent_s: Observations closer in time than this count in proportion.
+        interpolate_deg: Hypotheses within this angle of each other are of one orientation, and are
+            interpolated between their views.
+        interpolate_similarity: Scale on which the weight of such a neighbour falls with its similarity
+            when it is 20 degrees away. Similarity falls with the square of the angle, so that for
+            wider spacing a greater difference carries the same information.
+        most_hypotheses: Most hypotheses of one model and level, the most similar.
+        most_paths: Most paths of one model, the cheapest.
+        lag: Levels for which paths are stored.
     """
 
     similarity_sigma: float = 0.06
@@ -73,7 +72,7 @@ class TreeSettings:
 
 @dataclass(frozen=True, slots=True)
 class SpinPrior:
-    """How an object is believed to turn, as far as the tree is concerned.
+    """The prior of an object's rotation for the tree.
 
     Attributes:
         rate: (x, y, z) rotation vector per second, camera frame, radians.
@@ -86,17 +85,17 @@ class SpinPrior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeLevel:
-    """The hypotheses of one model at one look.
+    """The hypotheses of one model at one observation.
 
     Attributes:
         time: Seconds.
         views: (H,) numbers of the views.
-        orientation: (H, 3, 3) model to camera; NaN where the direction is not known.
-        rolled: (H,) bool: whether the turn in the plane is known.
-        cost: (H,) of choosing each, not yet weighted.
-        between: (H, 3, 3) orientation that neighbouring hypotheses tell together with each; its own of one
-            that was fitted to the picture.
-        fitted: (H,) bool: whether each was.
+        orientation: (H, 3, 3) model to camera; NaN where the direction is unknown.
+        rolled: (H,) bool: whether the in-plane rotation is known.
+        cost: (H,) unweighted cost of choosing each.
+        between: (H, 3, 3) orientation interpolated among neighbouring hypotheses; its own if fitted to
+            the picture.
+        fitted: (H,) bool: whether each was fitted.
     """
 
     time: float
@@ -126,11 +125,11 @@ class InterpretationTree:
     Attributes:
         time: Seconds of the last level.
         cost: (S,) costs above that of the cheapest.
-        view: (S,) view chosen last, or `NONE`.
-        chosen: (S,) seconds at which it was chosen.
+        view: (S,) last chosen view, or `NONE`.
+        chosen: (S,) time of that choice, seconds.
         since: (S,) seconds since when that view was chosen each time.
         orientation: (S, 3, 3) of that choice.
-        rolled: (S,) whether its turn in the plane is known.
+        rolled: (S,) whether its in-plane rotation is known.
         path: (S, lag) hypotheses chosen at the last levels, oldest first, or `NONE`.
         total: Cost of the cheapest path.
     """
@@ -157,7 +156,7 @@ class InterpretationTree:
 
 
 def empty_tree(settings: TreeSettings) -> InterpretationTree:
-    """A tree without any level."""
+    """A tree without levels."""
     return InterpretationTree(
         -np.inf,
         np.zeros(1),
@@ -173,21 +172,21 @@ def empty_tree(settings: TreeSettings) -> InterpretationTree:
 def levels_of(
     hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings
 ) -> dict[str, TreeLevel]:
-    """The levels that the hypotheses of one look make, by model.
+    """The levels from the hypotheses of one observation, by model.
 
     Args:
         hypotheses: At least one, in any order.
         time: Seconds.
-        settings: Of the tree.
+        settings: Settings of the tree.
     """
     by_name: dict[str, list[Hypothesis]] = {}
     for h in sorted(hypotheses, key=lambda h: (-h.similarity, h.view, h.rotation or 0.0)):
         by_name.setdefault(h.name, []).append(h)
-    kept = {name: hs[: settings.most_hypotheses] for name, hs in by_name.items()}
-    whole = _level([h for hs in kept.values() for h in hs], time, settings)
-    ends = np.cumsum([len(hs) for hs in kept.values()]).tolist()
-    places = (slice(end - len(hs), end) for hs, end in zip(kept.values(), ends, strict=True))
-    return {name: _part(whole, at, settings) for name, at in zip(kept, places, strict=True)}
+    selected = {name: hs[: settings.most_hypotheses] for name, hs in by_name.items()}
+    whole = _level([h for hs in selected.values() for h in hs], time, settings)
+    ends = np.cumsum([len(hs) for hs in selected.values()]).tolist()
+    places = (slice(end - len(hs), end) for hs, end in zip(selected.values(), ends, strict=True))
+    return {name: _part(whole, at, settings) for name, at in zip(selected, places, strict=True)}
 
 
 def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings) -> TreeLevel:
@@ -221,7 +220,7 @@ def _part(whole: TreeLevel, at: slice, settings: TreeSettings) -> TreeLevel:
 
 
 def _between(orientation: Floats, similarity: Floats, settings: TreeSettings) -> Floats:
-    """What hypotheses of about one orientation tell together: their weighted mean."""
+    """Interpolate hypotheses of similar orientation by their weighted mean."""
     if len(orientation) < 2 or np.isnan(orientation).any():
         return orientation
     swing, roll = swing_and_roll(orientation[:, None], orientation[None])
@@ -242,14 +241,14 @@ def extended_tree(
     spin: SpinPrior,
     settings: TreeSettings,
 ) -> InterpretationTree:
-    """The tree after one more look.
+    """Extend the tree by one observation.
 
     Args:
-        tree: Before.
-        level: The model's hypotheses, or None when only others were hypothesised.
+        tree: The tree before.
+        level: The model's hypotheses, or None when there are only those of others.
         time: Seconds, not before the last level's.
-        spin: How the object is believed to turn.
-        settings: Of the tree.
+        spin: Prior of the object's rotation.
+        settings: Settings of the tree.
     """
     weight = look_weight(time - tree.time, settings)
     level = level or _NO_LEVEL
@@ -268,17 +267,17 @@ def extended_tree(
     t = tree
     paths = Paths(t.cost, t.view, t.chosen, t.since, t.orientation, t.rolled, t.path)
     choices = Choices(level.views, level.orientation, level.rolled, level.cost)
-    found, dearer = extend_paths(costs, paths, choices, np.array(spin.rate))
-    return InterpretationTree(time, *found, tree.total + dearer)
+    found, increase = extend_paths(costs, paths, choices, np.array(spin.rate))
+    return InterpretationTree(time, *found, tree.total + increase)
 
 
 def look_weight(waited: float, settings: TreeSettings) -> float:
-    """Weight of an observation by the time since the last one: shortly after it, the same is seen."""
+    """Weight of an observation by the time since the last one, with which it is correlated."""
     return min(1.0, max(waited, 0.0) / settings.independent_s)
 
 
 def rival_gap(tree: InterpretationTree, settings: TreeSettings) -> float:
-    """How much dearer the cheapest path is that ends in quite another orientation than the best.
+    """Extra cost of the cheapest path that ends in a clearly different orientation.
 
     Returns:
         0 to `settings.jump`; the latter when there is no such path.
@@ -291,12 +290,12 @@ def rival_gap(tree: InterpretationTree, settings: TreeSettings) -> float:
 
 
 def similarity_lead(level: TreeLevel, chosen: int, settings: TreeSettings) -> float:
-    """By how much less a level's chosen hypothesis costs than the best of quite another orientation.
+    """Cost lead of a level's chosen hypothesis over the best of a clearly different orientation.
 
     Args:
         level: The hypotheses.
         chosen: Number of the chosen one, or `NONE`.
-        settings: Of the tree; `wrong` bounds the lead, and is that over no other at all.
+        settings: Settings of the tree; `wrong` bounds the lead, and is the lead without an alternative.
 
     Returns:
         -`wrong` to `wrong`; 0 when none is chosen.

@@ -1,9 +1,9 @@
-"""Which way objects face and how they turn: the interpretation trees of each object, and what comes of them.
+"""The pose reasoner: orientation and spin of objects, from their interpretation trees.
 
-Every object has a tree for each model that was hypothesised for it lately (`interpretation_tree.py`).
-The cheapest path of the most likely model gives the view, since when, and the orientations from which the
-spin is measured (`angular_velocity.py`). How much dearer the paths of other models are says who the object
-cannot be: `pose_support`, which the votes heed in the next step.
+Every object has a tree for each recently hypothesised model (`interpretation_tree.py`). The cheapest path of
+the most likely model gives the view, its start, and the orientations from which the spin is measured
+(`angular_velocity.py`). The extra cost of other models' paths says what the object is not: `pose_support`,
+which weighs the votes of the next step.
 """
 
 from __future__ import annotations
@@ -44,44 +44,44 @@ from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 
 USUAL_FOCAL = 1.2
-"""Focal length of a usual lens, in widths of the picture; how far an object's way across the image
-turns it is wrong in the proportion to the true one."""
+"""Focal length of a usual lens, in widths of the picture; the rotation inferred from an object's motion
+across the image is wrong in proportion to the error."""
 
 LookSignature = tuple[tuple[str, int, float, float | None], ...]
-"""What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
+"""The hypotheses of an observation: (name, view, similarity, rotation) of each."""
 
 
 FITTED = SpinSettings(swing_deg=2.5, roll_deg=2.5, view_deg=0.5, view_share=0.02, view_most_deg=1.0)
-"""How spin is measured from orientations that are exact to some two degrees."""
+"""Spin settings for orientations accurate to some two degrees."""
 
 
 @dataclass(frozen=True, slots=True)
 class PoseSettings:
-    """How poses are believed.
+    """Settings of the pose belief.
 
     Attributes:
         tree: Costs and bounds of the interpretation trees.
-        spin: How spin is measured from stored views.
-        fitted_spin: The same from orientations that were fitted to the picture, which are exact to two
+        spin: Spin settings for stored views.
+        fitted_spin: Spin settings for orientations fitted to the picture, which are accurate to two
             degrees and follow the object without steps.
-        every_s: Looks at one object are at least so far apart.
-        most_looks: Objects whose trees grow in one step at most; those that have waited longest come
-            first. The budget of the most expensive part of reasoning: it counts work, not time, so that what
-            is believed is the same on every machine.
-        refit_s: Spin is measured so often.
-        least_visible: Below this share in sight an object's hypotheses are not heeded.
-        most_names: Models of an object that have trees.
-        memory_s: Costs of models are forgotten to 37 % in this time.
-        free_cost: A model's cost above that of the cheapest which costs no support.
-        support_cost: So much more lets its support fall to 37 %.
-        settle_s: Orientations remembered for the spin are at least so far apart.
-        lead: How much a lead of the chosen hypotheses over quite other ones, in units of their
-            cost, adds to the logarithm of the odds that the pose is right. Errors of similarity
-            last as long as the view: looks do not add up.
-        loosest: Radians per second; how fast objects of unknown spin may turn.
-        surest: Radians per second; least uncertainty of a believed spin for the tree.
-        stale_s: Without a look for so long, confidence falls to 37 %.
-        spin_stale_s: Without a look for so long, the spin is unknown.
+        every_s: Least time between two observations used of one object.
+        most_looks: Most objects whose trees grow in one step; those waiting longest come first. This
+            bounds the most expensive part of reasoning by work, not time, so that results are the same
+            on every machine.
+        refit_s: Interval of spin measurements.
+        least_visible: Below this visible share an object's hypotheses are ignored.
+        most_names: Most models of an object that have trees.
+        memory_s: Costs of models decay to 37 % in this time.
+        free_cost: Extra cost of a model, above the cheapest, without loss of support.
+        support_cost: Further extra cost that lowers its support to 37 %.
+        settle_s: Least time between stored orientations for the spin.
+        lead: How much a lead of the chosen hypotheses over clearly different ones, in units of their
+            cost, adds to the log odds that the pose is right. Errors of similarity last as long as
+            the view, so leads do not add up.
+        loosest: Standard deviation of an unknown spin for the tree, radians per second.
+        surest: Least standard deviation of a known spin for the tree, radians per second.
+        stale_s: Without an observation for this long, confidence falls to 37 %.
+        spin_stale_s: Without an observation for this long, the spin is unknown.
     """
 
     tree: TreeSettings = field(default_factory=TreeSettings)
@@ -105,24 +105,24 @@ class PoseSettings:
 
 @dataclass(frozen=True, eq=False)
 class PoseTrack:
-    """What is remembered of one object's views.
+    """The memory of one object's views.
 
     Attributes:
-        time: Seconds of the last look, or minus infinity.
-        said: What was said then; when the same is said again nobody looked anew.
+        time: Seconds of the last observation, or minus infinity.
+        said: Its hypotheses; the same again means no new observation.
         trees: Model name -> its tree.
-        levels: Model name -> its level, for each of the last looks.
-        sights: For each of them, (3, 3): from a camera that looks at the object to the camera itself.
-        strain: Model name -> cost of its cheapest path, forgotten over time.
-        untold: The same of a model that was never hypothesised.
-        support: Model name -> how far its strain lets it be the object, 0 to 1.
-        unsaid: The same of a model that was never hypothesised.
+        levels: Model name -> its level, for each of the last observations.
+        sights: For each of them, (3, 3): from a camera looking at the object to the actual camera.
+        strain: Model name -> decayed cost of its cheapest path.
+        untold: The same for a model that was never hypothesised.
+        support: Model name -> compatibility of its strain with being the object, 0 to 1.
+        unsaid: The same for a model that was never hypothesised.
         name: The model whose orientations are in `settled`.
-        lead: By how much its chosen hypotheses cost less than quite other ones, over time.
-        settled: (seconds, orientation) along its cheapest path, of looks older than the trees'.
-        rate: How it turns, or None when it is not known.
+        lead: Cost lead of its chosen hypotheses over clearly different ones, averaged over time.
+        settled: (seconds, orientation) along its cheapest path, older than the trees' levels.
+        rate: Its angular velocity, or None when unknown.
         rated: Seconds when the rate was measured.
-        pose: What is believed since the last look, or None when nothing is.
+        pose: The belief since the last observation, or None.
     """
 
     time: float = -np.inf
@@ -144,12 +144,12 @@ class PoseTrack:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What was said of an object at one look.
+    """One observation of an object.
 
     Attributes:
         time: Seconds.
         said: Hypotheses of views.
-        sight: (3, 3) from a camera that looks at the object to the camera itself.
+        sight: (3, 3) from a camera looking at the object to the actual camera.
     """
 
     time: float
@@ -164,21 +164,21 @@ NO_TRACK = PoseTrack()
 
 
 def pose_tracks(mind: Mind) -> Mapping[int, PoseTrack]:
-    """Object id -> what is remembered of its views."""
+    """Object id -> memory of its views."""
     return mind.recall(POSES)
 
 
 def pose_support(mind: Mind, object_id: int, name: str) -> float:
-    """How well an object's views over time hang together if it is of a model.
+    """Consistency of an object's views over time, if it is of a model.
 
     Args:
-        mind: After the last step.
+        mind: The mind after the last step.
         object_id: The object.
         name: The model.
 
     Returns:
-        0 to 1: 1 for the model whose cheapest path costs least and for those that cost little more;
-        1 as well when nothing is known of the object's views.
+        0 to 1: 1 for the model of least path cost and for those that cost little more; 1 as well when
+        nothing is known of the object's views.
     """
     track = pose_tracks(mind).get(object_id)
     return 1.0 if track is None else track.support.get(name, track.unsaid)
@@ -186,27 +186,27 @@ def pose_support(mind: Mind, object_id: int, name: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PoseReasoner:
-    """Reasoner of the cogitate phase: which way each object faces and how it turns. Runs after the votes."""
+    """Reasoner of the cogitate phase: orientation and spin of each object. Runs after the votes."""
 
     settings: PoseSettings = PoseSettings()
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one step's view hypotheses; see `Reasoner`."""
+        """Update from one step's view hypotheses; see `Reasoner`."""
         said = hypotheses_by_object(mind, observation)
-        known, kept, beliefs = pose_tracks(mind), {}, []
+        known, tracks, beliefs = pose_tracks(mind), {}, []
         due = self._due(mind, said, known)
         for object_id, belief in mind.objects.items():
             track = known.get(object_id, NO_TRACK)
             if object_id in due:
                 look = Look(mind.time, said[object_id], _sight(mind, belief))
-                track = self._looked(track, look, belief.name)
+                track = self._observed(track, look, belief.name)
             if track.trees:
-                kept[object_id] = track
+                tracks[object_id] = track
             pose = self._now(track, belief.name, mind.time)
             if pose != belief.pose:
                 beliefs.append(replace(belief, pose=pose))
         mind = mind.with_objects(*beliefs) if beliefs else mind
-        return Outcome(mind.remember(POSES, MappingProxyType(kept)))
+        return Outcome(mind.remember(POSES, MappingProxyType(tracks)))
 
     def _due(
         self,
@@ -214,7 +214,7 @@ class PoseReasoner:
         said: Mapping[int, tuple[Hypothesis, ...]],
         known: Mapping[int, PoseTrack],
     ) -> frozenset[int]:
-        """Objects whose trees grow now: matched again, not too soon, and within the budget."""
+        """Objects whose trees grow now: newly matched, not too soon, and within the budget."""
         s = self.settings
         waiting = [
             (track.time, object_id)
@@ -230,8 +230,8 @@ class PoseReasoner:
         seen = belief.presence is Presence.SEEN
         return seen and visible_share(mind, belief.id) >= self.settings.least_visible
 
-    def _looked(self, track: PoseTrack, look: Look, name: str) -> PoseTrack:
-        """The track after a look."""
+    def _observed(self, track: PoseTrack, look: Look, name: str) -> PoseTrack:
+        """The track after an observation."""
         track = self._settled(track, name)
         waited = look.time - track.time
         grown = self._grown(replace(track, said=_look_signature(look.said)), look)
@@ -240,7 +240,7 @@ class PoseReasoner:
         return replace(track, pose=self._pose(track, name))
 
     def _grown(self, track: PoseTrack, look: Look) -> PoseTrack:
-        """The trees with one more level, and what their models have cost."""
+        """Extend the trees by one level, and update the costs of their models."""
         s, now = self.settings, look.time
         levels = levels_of(look.said, now, s.tree)
         turning = _spin_prior(track.rate, s)
@@ -250,7 +250,7 @@ class PoseReasoner:
         for name in track.trees.keys() | levels.keys():
             before = track.trees.get(name) or empty_tree(s.tree)
             new = name not in track.trees
-            # A model that is hypothesised for the first time was wrong at all looks before.
+            # A model hypothesised for the first time was wrong at all earlier observations.
             before = replace(before, time=track.time) if new else before
             tree = extended_tree(before, levels.get(name), now, turning, s.tree)
             past = track.untold if new else track.strain[name]
@@ -269,11 +269,11 @@ class PoseReasoner:
             unsaid=self._support(untold - least),
         )
 
-    def _support(self, dearer: float) -> float:
-        return exp(-max(0.0, dearer - self.settings.free_cost) / self.settings.support_cost)
+    def _support(self, extra_cost: float) -> float:
+        return exp(-max(0.0, extra_cost - self.settings.free_cost) / self.settings.support_cost)
 
     def _settled(self, track: PoseTrack, name: str) -> PoseTrack:
-        """The track with the look that the trees are about to forget; another name begins anew."""
+        """Store the observation that the trees are about to drop; another name starts afresh."""
         s = self.settings
         if name != track.name:
             return replace(track, name=name, lead=0.0, settled=(), rate=None)
@@ -303,7 +303,7 @@ class PoseReasoner:
         )
 
     def _led(self, track: PoseTrack, name: str, waited: float) -> PoseTrack:
-        """The track with the lead of the chosen hypotheses renewed."""
+        """The track with the lead of the chosen hypotheses updated."""
         level, tree = track.levels[-1].get(name), track.trees.get(name)
         if level is None or tree is None:
             return track
@@ -312,7 +312,7 @@ class PoseReasoner:
         return replace(track, lead=track.lead * fade + now * (1.0 - fade))
 
     def _pose(self, track: PoseTrack, name: str) -> Pose | None:
-        """What the cheapest path of a model tells."""
+        """The pose from the cheapest path of a model."""
         tree = track.trees.get(name)
         if tree is None or not tree.begun:
             return None
@@ -333,7 +333,7 @@ class PoseReasoner:
         )
 
     def _now(self, track: PoseTrack, name: str, now: float) -> Pose | None:
-        """The pose believed at the last look, as far as it still holds."""
+        """The pose of the last observation, as far as it is still valid."""
         pose, age = track.pose, now - track.time
         if pose is None or pose.name != name or age <= 0.0:
             return pose if pose is None or pose.name == name else None
@@ -341,7 +341,7 @@ class PoseReasoner:
         return replace(pose, confidence=pose.confidence * self._fading(age), spin=spin)
 
     def _confidence(self, track: PoseTrack, tree: InterpretationTree) -> float:
-        """Against the next best orientation: by paths' costs, which are log-likelihoods, and the lead."""
+        """Confidence against the next best orientation: from path costs (log likelihoods) and the lead."""
         age = track.time - float(tree.chosen[tree.best])
         odds = min(rival_gap(tree, self.settings.tree), self.settings.lead * track.lead)
         return self._fading(age) / (1.0 + exp(-odds))
@@ -351,7 +351,7 @@ class PoseReasoner:
 
 
 def _sight(mind: Mind, belief: ObjectBelief) -> Floats:
-    """From a camera that looks at the object to the camera itself."""
+    """The rotation from a camera looking at the object to the actual camera."""
     width, height = mind.frame_size
     x, y = belief.region.centroid
     return sight_rotation((x - width / 2, y - height / 2), USUAL_FOCAL * width)
@@ -369,7 +369,7 @@ def _spin_prior(rate: AngularVelocity | None, settings: PoseSettings) -> SpinPri
 
 
 def _orientation(level: TreeLevel | None, number: int) -> Floats | None:
-    """What a level tells if a path chose this hypothesis of it."""
+    """The orientation of a level's hypothesis, if a path chose one."""
     if level is None or number == NONE or not level.rolled[number]:
         return None
     seen = level.between[number]
@@ -391,7 +391,7 @@ def _orientation_series(track: PoseTrack, name: str, lag: int) -> OrientationSer
 
 
 def _last_orientation(track: PoseTrack, name: str, tree: InterpretationTree) -> Floats:
-    """The orientation that the cheapest path tells of last."""
+    """The last orientation of the cheapest path."""
     path = tree.path[tree.best].tolist()
     for levels, number in zip(reversed(track.levels), reversed(path), strict=False):
         if number != NONE:

@@ -1,4 +1,4 @@
-"""Rotations by many at once: matrices from rotation vectors and back, and their means.
+"""Vectorised rotations: matrices from rotation vectors and back, and their means.
 
 A rotation vector points along the axis; its length is the angle in radians, by the right-hand rule.
 """
@@ -24,7 +24,7 @@ def rotation_matrices(vectors: Floats) -> Floats:
 
 
 def right_jacobian(vectors: Floats) -> Floats:
-    """How a small change d of a rotation vector v turns: R(v + d) ~ R(v) R(J d), R being `rotation_matrices`.
+    """The right Jacobian: R(v + d) ~ R(v) R(J d) for small d, with R = `rotation_matrices`.
 
     Args:
         vectors: (..., 3) radians.
@@ -55,7 +55,7 @@ def rotation_vectors(matrices: Floats) -> Floats:
     )
     length = np.sqrt((axis**2).sum(axis=-1, keepdims=True))
     angle = np.arctan2(length, np.trace(m, axis1=-2, axis2=-1)[..., None] - 1)
-    # By half a turn the axis is as good as lost: any will do for what is an outlier anyhow.
+    # At half a turn the axis is ill-defined; any will do, since such residuals are outliers.
     lost = (length < 1e-6) & (angle > 1.0)
     unit = np.where(lost, np.array([1.0, 0.0, 0.0]), axis / np.maximum(length, _SMALL))
     return np.asarray(unit * angle)
@@ -70,10 +70,10 @@ def nearest_rotations(matrices: Floats) -> Floats:
 
 
 def sight_rotation(place: tuple[float, float], focal_px: float) -> Floats:
-    """The rotation from a camera that looks at a place in the image to the camera itself, (3, 3).
+    """The rotation from a camera looking at a point of the image to the actual camera, (3, 3).
 
-    Orientations are told as if the camera looked at the object, and an object that goes across the
-    image without turning is seen from another side: by this much.
+    Orientations are given as if the camera looked at the object, and an object that moves across the
+    image without rotating is seen from another side: by this rotation.
 
     Args:
         place: (x, y) from the centre of the image, pixels.

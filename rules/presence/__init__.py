@@ -1,11 +1,11 @@
-"""Who is there: data association and the life of an object, from first region to deletion.
+"""Presence: data association and the lifecycle of objects, from first region to deletion.
 
-Read in this order: `association.py` (which region belongs to which object), `objects.py` (percepts
-enter the mind, objects are forgotten), `reasoner.py` (one step on one screen), `lifecycle.py` (the states and
-every change of them), then who decides about these: `initiation.py` (entry), `fragments.py` (parts that are
-no objects), `occlusion.py` (occlusion, exit, loss, reappearance), `merging.py` (two seen as one region)
-and `reidentification.py` (the same object under another region). `object_tracks.py` is what is
-remembered of each object, `step_context.py` the step in the making, `settings.py` the thresholds.
+Read in this order: `association.py` (region to object), `objects.py` (percepts enter the mind, objects are
+forgotten), `reasoner.py` (one step), `lifecycle.py` (states and transitions), then the modules that decide on
+transitions: `initiation.py` (entry), `fragments.py` (parts that are not objects), `occlusion.py` (occlusion,
+exit, loss, reappearance), `merging.py` (two objects in one region) and `reidentification.py` (the same object
+under another region). `object_tracks.py` is the memory of each object, `step_context.py` the state of a step
+in progress, `settings.py` the thresholds.
 """
 
 from visup.rules.presence.objects import ObjectReasoner, ObjectSettings

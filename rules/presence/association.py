@@ -1,9 +1,9 @@
-"""Which region belongs to which object, over time; this alone says so.
+"""Data association: which region belongs to which object, over time.
 
-The segmenter gives its regions ids of its own and may give a body another one, such as after it was hidden.
-Which object owns which region id stands in the mind's memory, so that an object keeps its id:
-`associate` finds the owners of a frame's regions, `reassign_region` changes an owner when an object
-is re-identified (`reidentification.py`), `delete_objects` ends ownership.
+The segmenter has its own region ids and may give a body a new one, such as after occlusion. The mind's memory
+maps region ids to objects, so that an object keeps its id: `associate` finds the owners of a frame's regions,
+`reassign_region` changes an owner when an object is re-identified (`reidentification.py`), and
+`delete_objects` ends ownership. Nothing else changes the map.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ OWNERS: MemoryKey[Mapping[int, int]] = MemoryKey("rules.objects", MappingProxyTy
 
 
 def region_owners(mind: Mind) -> Mapping[int, int]:
-    """Region id -> object id, for all regions that are remembered."""
+    """Region id -> object id, for all remembered regions."""
     return mind.recall(OWNERS)
 
 
 def hypotheses_by_object(
     mind: Mind, observation: Observation
 ) -> Mapping[int, tuple[Hypothesis, ...]]:
-    """Object id -> what was hypothesised of its region in this step; only objects of which something was."""
+    """Object id -> hypotheses about its region in this step; only objects with hypotheses."""
     owner = region_owners(mind)
-    said: dict[int, tuple[Hypothesis, ...]] = {}
+    hypotheses: dict[int, tuple[Hypothesis, ...]] = {}
     for h in observation.of("hypothesis"):
         object_id = owner.get(h.region_id)
         if object_id is not None:
-            said[object_id] = (*said.get(object_id, ()), h)
-    return said
+            hypotheses[object_id] = (*hypotheses.get(object_id, ()), h)
+    return hypotheses
 
 
 def recognised(mind: Mind, observation: Observation) -> frozenset[int]:
     """Objects that a behaviour recognised by appearance: it reports a region together with its identity.
 
     Such a region is the object's own, however near another one is; of regions that merely move together
-    nobody knows how many bodies they are.
+    it is unknown how many bodies they are.
     """
     owner, found = region_owners(mind), set[int]()
     for report in observation.reports:
@@ -51,14 +51,14 @@ def recognised(mind: Mind, observation: Observation) -> frozenset[int]:
 
 
 def associate(mind: Mind, regions: Iterable[Region]) -> tuple[dict[int, Region], dict[int, int]]:
-    """The objects that a frame's regions belong to; a region that none owns is a new object's.
+    """Associate a frame's regions with objects; a region without an owner starts a new object.
 
     Returns:
-        Object id -> its region, and the owners of all regions known, those of this frame last.
+        Object id -> its region, and the owners of all known regions, those of this frame last.
     """
     owners = dict(region_owners(mind))
     found: dict[int, Region] = {}
-    # A region that an object held last comes first, so that it cannot lose it to an older one.
+    # An object's current region takes precedence over an older one of the same object.
     for region in sorted(regions, key=lambda r: not _is_current_region(mind, owners, r)):
         object_id = owners.pop(region.id, None)
         if object_id is None or object_id in found:
@@ -75,13 +75,13 @@ def reassign_region(mind: Mind, region_id: int, object_id: int) -> Mind:
 
 
 def delete_objects(mind: Mind, ids: frozenset[int]) -> Mind:
-    """The same mind without some objects; regions that they owned are owned by none."""
+    """The same mind without some objects; their regions lose their owner."""
     if not ids:
         return mind
-    kept = {i: b for i, b in mind.objects.items() if i not in ids}
+    remaining = {i: b for i, b in mind.objects.items() if i not in ids}
     left = {r: o for r, o in region_owners(mind).items() if o not in ids}
     answers = {i: name for i, name in mind.answers.items() if i not in ids}
-    mind = replace(mind, objects=MappingProxyType(kept), answers=MappingProxyType(answers))
+    mind = replace(mind, objects=MappingProxyType(remaining), answers=MappingProxyType(answers))
     return mind.remember(OWNERS, MappingProxyType(left))
 
 

@@ -1,16 +1,14 @@
-"""Which new regions may be no objects of their own but parts of a body that is already known.
+"""Fragments: new regions that may only be parts of a known body.
 
-A camera that sees motion now and then cuts a body in two: a shadow falls along an arm, a face of a
-spinning satellite moves unlike the rest of it. What first shows itself at, or within the outline
-of, something larger is therefore doubted until it has been clearly apart from that body for a while.
-Motion alone does not end the doubt: a sliver along an edge seems to slide on it (the aperture
-problem), and its outline wanders. The price: of two bodies of unequal size that touch from the
-first sight on, the smaller one is not told before they part.
-
-What came over the image border was never a part of a body inside and is not doubted, even where it
-passes before one soon after; at the start of a video nothing has come over the border yet. Of two
-regions that touch when both are new, the larger one is the body; where they are much of a size,
-neither is a part of the other.
+Motion segmentation sometimes splits a body in two: a shadow falls along an arm, a face of a spinning
+satellite moves unlike the rest. A region that first appears at, or within the outline of, something larger is
+therefore a suspected fragment until it has been clearly apart from that body for a while. Motion alone does
+not clear it: a sliver along an edge appears to slide on it (the aperture problem), and its outline wanders.
+The price: of two bodies of unequal size that touch from the start, the smaller one is not reported before
+they separate.
+ A region that came over the image border was never a part of a body inside and is not suspected, even when it
+soon passes in front of one; at the start of a video nothing has come over the border yet. Of two new regions
+that touch, the larger one is the body; if their sizes are similar, neither is a part of the other.
 """
 
 from __future__ import annotations
@@ -29,16 +27,16 @@ from visup.rules.presence.object_tracks import ObjectTrack, border_sides, predic
 
 @dataclass(frozen=True, slots=True)
 class FragmentSettings:
-    """When a region counts as a possible part of another one, and when no longer.
+    """When a region counts as a possible part of another one, and until when.
 
     Attributes:
-        part: Share of the body's area up to which a region may be a part of it.
+        part: Largest part, as a share of the body's area.
         touch: Outline gap up to which a region touches a body, image diagonals.
         apart: Outline gap beyond which it is clearly apart, image diagonals.
         apart_size: The same as a share of the root of its area; the greater one counts.
         within: Share of its outline inside a body's convex hull, or of its box inside the place of
-            the body, by which it is within the body.
-        apart_s: How long it must be apart.
+            the body, from which it is within the body.
+        apart_s: How long it must be apart, seconds.
     """
 
     part: float = 0.7
@@ -51,11 +49,11 @@ class FragmentSettings:
 
 @dataclass(frozen=True, slots=True)
 class FragmentHypothesis:
-    """Whether a region that is not confirmed yet may be a part of a body.
+    """Whether a tentative region may be a part of a body.
 
     Attributes:
-        body: Id of that object, or None while there is none.
-        rejected: Whether it has shown to be an object of its own; that is not doubted again.
+        body: Id of that object, or None without one.
+        rejected: Whether it has proved to be an object of its own, which is final.
         apart_since: Seconds since when it is clearly apart from the body, or None.
     """
 
@@ -76,7 +74,7 @@ FRAGMENTS: MemoryKey[Mapping[int, FragmentHypothesis]] = MemoryKey(
 
 @dataclass(frozen=True, slots=True)
 class FragmentTest:
-    """Judges which new regions may be fragments, from step to step."""
+    """Tests which new regions may be fragments, from step to step."""
 
     settings: FragmentSettings = FragmentSettings()
 
@@ -88,16 +86,16 @@ class FragmentTest:
         *,
         starting: bool,
     ) -> dict[int, FragmentHypothesis]:
-        """Judge one step.
+        """Run one step.
 
         Args:
-            before: What the step before found, by object id.
-            mind: The mind; its unconfirmed objects are judged.
+            before: Hypotheses of the previous step, by object id.
+            mind: The mind; its tentative objects are tested.
             of: Tracks by object id.
-            starting: Whether the video has only begun.
+            starting: Whether the video has just begun.
 
         Returns:
-            A hypothesis for each unconfirmed object; those out of sight keep theirs.
+            A hypothesis for each tentative object; those out of view keep theirs.
         """
         bodies = [b for b in mind.objects.values() if b.presence is not Presence.LEFT]
         fragments = {}
@@ -119,7 +117,7 @@ class FragmentTest:
     def _first(
         self, new: ObjectBelief, bodies: Iterable[ObjectBelief], mind: Mind, *, starting: bool
     ) -> FragmentHypothesis:
-        """What came over the border is not doubted, unless a body at that side reaches to it."""
+        """A region that came over the border is not suspected, unless a body there reaches it."""
         sides = border_sides(new.region, mind.frame_size)
         if starting or not sides:
             return FragmentHypothesis()
@@ -150,7 +148,7 @@ class FragmentTest:
         return replace(fragment, apart_since=since, rejected=parted)
 
     def _in_place(self, region: Region, body: ObjectTrack | None, mind: Mind) -> bool:
-        """Whether a region is mostly where a body should be, of which little is seen for now."""
+        """Whether a region is mostly where a barely visible body should be."""
         if body is None:
             return False
         x, y, w, h = region.bbox
@@ -160,10 +158,10 @@ class FragmentTest:
     def _may_contain(
         self, body: ObjectBelief, new: ObjectBelief, of: Mapping[int, ObjectTrack]
     ) -> bool:
-        """Whether a belief may be the body of a new one: another one in sight, and larger."""
+        """Whether a belief may be the body of a new one: another one in view, and larger."""
         if body.id == new.id or body.id not in of or body.last_seen < new.first_seen:
             return False
-        # A body that has lost a part is judged by what it was.
+        # A body that has lost a part is compared by its former area.
         whole = max(body.region.area, of[body.id].reference_area if body.confirmed else 0.0)
         return new.region.area <= self.settings.part * whole
 
@@ -176,7 +174,7 @@ class FragmentTest:
     def _body_of(
         self, region: Region, bodies: Iterable[ObjectBelief], mind: Mind
     ) -> ObjectBelief | None:
-        """The nearest body that the region touches, or within whose outline it is."""
+        """The nearest body that the region touches or is within."""
         near: list[tuple[float, int, ObjectBelief]] = []
         for body in bodies:
             gap = self._gap(region, body.region, mind)
@@ -189,9 +187,9 @@ class FragmentTest:
 
 
 def share_within(region: Region, body: Region) -> float:
-    """Share of a region's outline that lies within the convex hull of another, 0 to 1.
+    """Share of a region's outline inside the convex hull of another, 0 to 1.
 
-    The hull is taken as the polygon of its tangents in `DIRECTIONS`, at most 2 % too wide.
+    The hull is approximated by its tangents in `DIRECTIONS`, at most 2 % too wide.
     """
     points = prepared_outline(region).points @ DIRECTIONS.T
     limit = (prepared_outline(body).points @ DIRECTIONS.T).max(axis=0)
@@ -199,7 +197,7 @@ def share_within(region: Region, body: Region) -> float:
 
 
 def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, ObjectTrack]) -> bool:
-    """Whether a region is where a known object should be that is hidden, at least in part."""
+    """Whether a region is where a known object, at least partly hidden, should be."""
     for old in mind.objects.values():
         track = of.get(old.id)
         if not old.confirmed or old.presence is Presence.LEFT or track is None:

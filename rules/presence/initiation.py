@@ -1,4 +1,4 @@
-"""Initiation: a region that has been seen steadily, and is not part of another object, enters."""
+"""Initiation: a region observed steadily, and not part of another object, enters."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from visup.rules.presence.step_context import StepContext
 from visup.rules.wording.conditions import Condition, at_least
 
 STATIONARY_S = 1.0
-"""What was in view for so long before it was seen to move had come before."""
+"""An object in view for longer than this before it moved did not enter now, seconds."""
 
 
 def confirm_new(context: StepContext) -> None:
-    """Confirm tentative objects that are seen now, unless they are known ones seen whole."""
+    """Confirm tentative objects that are visible now, unless they are known ones now seen whole."""
     for belief in context.seen():
         if belief.confirmed or not context.decide("entry", belief.id, _conditions(context, belief)):
             continue
@@ -31,7 +31,7 @@ def confirm_new(context: StepContext) -> None:
 
 
 def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
-    """Of the entry of an object: seen often enough, no part of another, no speck, steadily."""
+    """Conditions for the entry of an object: seen often and steadily enough, no part of another, no speck."""
     s, track = context.settings, context.of[belief.id]
     yield at_least("sightings", track.sightings, s.least_sightings)
     yield Condition("not part of another object", not context.may_be_part(belief))
@@ -50,21 +50,21 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
 
 
 def _is_early(context: StepContext, belief: ObjectBelief) -> bool:
-    """Whether it was there when the video began."""
+    """Whether it was present when the video began."""
     since = context.of[belief.id].coherent_since
     return since - context.start <= context.settings.start_s
 
 
 def _track_confidence(confidence: float) -> float:
-    """Confidence that something is there, from the confidence of each observation.
+    """Confidence of existence, from the confidence of each observation.
 
-    It was seen steadily; looks that follow each other err together, so that all of them count as two.
+    Observations in succession have correlated errors, so all of them count as two.
     """
     return 1.0 - (1.0 - confidence) ** 2
 
 
 def _arrival(context: StepContext, belief: ObjectBelief) -> tuple[str, str]:
-    """Kind and sentence of the event: what rested in view before it moved does not enter."""
+    """Kind and sentence of the event: an object at rest in view before it moved does not enter."""
     since = belief.region.visible_since
     if _is_early(context, belief):
         return "entry", "{0} {is} in view."

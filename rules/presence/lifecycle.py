@@ -1,15 +1,15 @@
-"""The life cycle of an object: every change of its state is made, and reported, here.
+"""The lifecycle of an object: every state transition is made, and reported, here.
 
     initiate -> TENTATIVE -- confirm --> VISIBLE -- occlude --> OCCLUDED
                     |                       |  ----- lose -----> LOST
                     |                       |  ----- leave ----> LEFT
                     |                       <----- reappear ---- OCCLUDED, LOST, LEFT
-                    <------- demote -------- VISIBLE (it was but a part of another)
+                    <------- demote -------- VISIBLE (it was only a part of another)
     delete from any state: merged into a known object (`reidentification.py`), or forgotten (`objects.py`)
 
-A region that appears initiates an object; who decides about the other changes are `initiation.py`,
-`occlusion.py` and `reidentification.py`. The state is held once: `ObjectBelief.confirmed` and
-`ObjectBelief.presence` are it, and the track adds only whether a hidden object is lost.
+A region that appears initiates an object; the other transitions are decided in `initiation.py`,
+`occlusion.py` and `reidentification.py`. The state is stored once: in `ObjectBelief.confirmed` and
+`ObjectBelief.presence`; the track adds only whether a hidden object is lost.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ EXIT_CONFIDENCE = 0.9
 
 
 class LifecycleState(StrEnum):
-    """State of an object in its life cycle."""
+    """Lifecycle state of an object."""
 
     TENTATIVE = "tentative"
     VISIBLE = "visible"
@@ -46,11 +46,11 @@ TRANSITIONS = frozenset(
         (LifecycleState.LEFT, LifecycleState.VISIBLE),
     }
 )
-"""From which state an object may come to which."""
+"""Allowed transitions: (from, to)."""
 
 
 def state_of(belief: ObjectBelief, track: ObjectTrack | None) -> LifecycleState:
-    """The life-cycle state of an object, from the beliefs about it."""
+    """The lifecycle state of an object, from the belief about it."""
     if not belief.confirmed:
         return LifecycleState.TENTATIVE
     if belief.presence is Presence.SEEN:
@@ -63,18 +63,18 @@ def state_of(belief: ObjectBelief, track: ObjectTrack | None) -> LifecycleState:
 def confirm(
     context: StepContext, belief: ObjectBelief, kind: str, template: str, confidence: float
 ) -> None:
-    """Confirm it as an object, which enters."""
+    """Confirm an object, which enters."""
     context.put(replace(belief, confirmed=True))
     context.tell(kind, template, belief.id, confidence=confidence)
 
 
 def demote(context: StepContext, belief: ObjectBelief) -> None:
-    """It was but a part of another object; it has to show that it is more."""
+    """Make a part of another object tentative again."""
     context.put(replace(belief, confirmed=False))
 
 
 def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief | None) -> None:
-    """It goes behind another object, or behind something unknown."""
+    """Hide an object behind another, or behind something unknown."""
     _go(context, belief, Presence.HIDDEN, lost=False)
     if occluder is not None and occluder.confirmed:
         context.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, occluder.id)
@@ -83,14 +83,14 @@ def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief |
 
 
 def lose(context: StepContext, belief: ObjectBelief) -> None:
-    """It is no longer seen, for no apparent reason."""
+    """Lose an object that is no longer seen, for no apparent reason."""
     _go(context, belief, Presence.HIDDEN, lost=True)
     template = "{0} {is} lost: it is no longer seen, for no apparent reason."
     context.tell("lost", template, belief.id)
 
 
 def leave(context: StepContext, belief: ObjectBelief) -> None:
-    """It goes over the border of the image."""
+    """Let an object leave over the border of the image."""
     _go(context, belief, Presence.LEFT, lost=False)
     template = "{0} {leaves} the field of view."
     context.tell("exit", template, belief.id, confidence=EXIT_CONFIDENCE)
@@ -102,7 +102,7 @@ def _go(context: StepContext, belief: ObjectBelief, where: Presence, *, lost: bo
 
 
 def reappear(context: StepContext, belief: ObjectBelief) -> None:
-    """It is seen again, wherever it was."""
+    """Make an object visible again, wherever it was."""
     before = state_of(belief, context.of[belief.id])
     seen = replace(belief, presence=Presence.SEEN)
     context.put(seen, lost=False, clear_since=None, partial_since=None)

@@ -1,6 +1,6 @@
-"""An object may merge with another: two bodies that meet are soon seen as one region.
+"""Merging: two bodies that meet are soon segmented as one region.
 
-What is recognised by its looks has a region of its own and takes up no other.
+An object recognised by appearance has its own region and absorbs no other.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from visup.rules.presence.step_context import StepContext
 
 
 def merge(context: StepContext) -> None:
-    """Find objects that merged with another one, whose region grew into the union of the two."""
+    """Find objects that merged with another, whose region grew into the union of the two."""
     alone = context.recognised
     for gone in context.missing():
         track = context.of.get(gone.id)
@@ -37,7 +37,7 @@ def _stay_merged(context: StepContext, gone: ObjectBelief, track: ObjectTrack) -
         return
     before = context.of[host.id].region
     if host.last_seen == context.now and host.region.area < 0.75 * before.area:
-        # The host's region is its own again; where the other one is shows in the next frames.
+        # The host's region is its own again; the next frames will show where the other one is.
         context.put(gone, merged_with=None, parted_at=context.now, seen_at=context.now)
         return
     dx = host.region.centroid[0] - before.centroid[0]
@@ -49,7 +49,7 @@ def _has_absorbed(context: StepContext, host: ObjectBelief, gone: ObjectTrack) -
     before = context.of.get(host.id)
     if before is None or not host.confirmed or gone.visible_share < context.settings.whole_share:
         return False
-    # The host's track stands still since its last sight: both were seen until much the same time.
+    # The host's track is as of its last sighting: both must have been seen until about the same time.
     if before.seen_at - gone.seen_at > context.settings.settle_s:
         return False
     parts = gone.region.area + before.region.area

@@ -1,7 +1,7 @@
-"""What presence reasoning remembers of each object: where it was whole, how it moved, how much shows.
+"""Memory of presence reasoning for each object: last whole position, motion, visible share.
 
-First-order spatial knowledge is where an object was, second-order how it moved (paper, section 5);
-both serve to tell an object that left from one that something else hides.
+First-order spatial knowledge is where an object was, second-order how it moved (paper, section 5); both help
+to distinguish an object that left from one that is hidden.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.regions import Box, box_intersection, expanded, shared_pixels, shifted
 
 EXIT_HORIZON_S = 6.0
-"""What is leaving is out of sight after so long, seconds."""
+"""An object that is leaving is out of view within this time, seconds."""
 
 TimedCentroid = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
@@ -25,27 +25,27 @@ TimedCentroid = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class ObjectTrack:
-    """What is remembered of one object's sightings.
+    """The memory of one object's sightings.
 
     Attributes:
         region: Its region as last seen.
-        seen_at: Seconds of that.
+        seen_at: Seconds of the last sighting.
         coherent_since: Seconds since when sightings followed each other without a jump.
         sightings: How many since then.
-        centroids: Those of the last second in which it was in the clear; at most 16.
+        centroids: Those of the last second in which it was unobstructed; at most 16.
         whole_box: Its box when last seen whole.
         whole_at: Seconds of that.
-        velocity: (vx, vy) when last in the clear, pixels per second.
+        velocity: (vx, vy) when last unobstructed, pixels per second.
         reference_area: Area of the whole object, pixels.
-        visible_share: Share of the reference area in sight, 0 to 1.
-        partial_since: Seconds since when only a small part shows, or None.
-        clear_since: Seconds since when most of it shows again, or None.
-        merged_with: The object in whose region it went up, or None.
+        visible_share: Visible share of the reference area, 0 to 1.
+        partial_since: Seconds since when only a small part is visible, or None.
+        clear_since: Seconds since when most of it is visible again, or None.
+        merged_with: The object whose region contains it, or None.
         merged_since: Seconds of that.
-        parted_at: Seconds when it last had a region of its own again, or None.
-        changed_at: Seconds when it was given another region; shapes of the older one cannot be
-            compared with those of the new one.
-        lost: Whether it is hidden though nothing tells why.
+        parted_at: Seconds when it last got its own region again, or None.
+        changed_at: Seconds when it got another region, whose shape cannot be compared with that of
+            the older one.
+        lost: Whether it is hidden without an explanation.
         first_box: Its box when first seen.
     """
 
@@ -86,12 +86,12 @@ TRACKS = MemoryKey("rules.presence", PresenceMemory())
 
 
 def presence_memory(mind: Mind) -> PresenceMemory:
-    """The tracks that the mind remembers."""
+    """The tracks in the mind's memory."""
     return mind.recall(TRACKS)
 
 
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
-    """Pairs of objects that are seen as one region now."""
+    """Pairs of objects that share one region now."""
     found = [
         (i, t.merged_with) for i, t in presence_memory(mind).of.items() if t.merged_with is not None
     ]
@@ -99,7 +99,7 @@ def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
 
 
 def visible_share(mind: Mind, object_id: int) -> float:
-    """Share of an object in sight, 0 to 1; 1 while nothing is known, 0 while it is in a merged region."""
+    """Visible share of an object, 0 to 1; 1 while unknown, 0 while it is in a merged region."""
     of = presence_memory(mind).of
     track = of.get(object_id)
     if track is None:
@@ -109,7 +109,7 @@ def visible_share(mind: Mind, object_id: int) -> float:
 
 
 def new_track(region: Region, now: float) -> ObjectTrack:
-    """The track of an object seen for the first time."""
+    """The track of a new object."""
     centroid = (now, *region.centroid)
     return ObjectTrack(
         region,
@@ -133,19 +133,19 @@ def update_track(
     *,
     recognised: bool = False,
 ) -> ObjectTrack:
-    """The track after another sighting.
+    """Update a track with a sighting.
 
     Args:
-        track: Before.
+        track: The track before.
         region: The object's region now.
         now: Seconds.
         crowded: Whether another region touches it, so that a part of it may be hidden.
-        allowed_gap_s: A longer time without sight breaks coherence.
-        recognised: Whether it was found by its looks: how it moves is then known, whatever touches it.
+        allowed_gap_s: A longer gap between sightings breaks coherence.
+        recognised: Whether it was recognised by appearance: its motion is then known, whatever touches it.
 
     Returns:
-        The track after it. The reference area follows an object in the clear, is forgotten slowly
-        for one that the border cuts, and stands still for one that others may hide.
+        The updated track. The reference area follows an unobstructed object, decays slowly for one cut by
+        the border, and is frozen for one that others may hide.
     """
     dt = now - track.seen_at
     smooth = dt <= allowed_gap_s and _coherent(track.region, region)
@@ -171,13 +171,13 @@ def update_track(
 
 
 def predicted_box(track: ObjectTrack, now: float) -> Box:
-    """Where the whole object should be now, from where it was and how it drifted; 3 s ahead at most."""
+    """Predicted box of the whole object, extrapolated by its drift for at most 3 s."""
     ahead = min(now - track.whole_at, 3.0)
     return shifted(track.whole_box, track.velocity[0] * ahead, track.velocity[1] * ahead)
 
 
 def predicted_share_outside(track: ObjectTrack, now: float, frame_size: tuple[int, int]) -> float:
-    """Share of the object's last box that should have left the image by now, 0 to 1."""
+    """Predicted share of the object's last box outside the image by now, 0 to 1."""
     vx, vy = track.velocity
     ahead = now - track.seen_at
     box = shifted(track.region.bbox, vx * ahead, vy * ahead)
@@ -186,15 +186,15 @@ def predicted_share_outside(track: ObjectTrack, now: float, frame_size: tuple[in
 
 
 def heading_out(track: ObjectTrack, frame_size: tuple[int, int], margin: int = 3) -> bool:
-    """Whether the object was at an edge of the image, moving over it, and may be out of sight soon.
+    """Whether the object was at an edge of the image, moving over it, and may soon be out of view.
 
-    What would need longer than `EXIT_HORIZON_S` at its pace, such as an arm that reaches far into
-    the image and whose drift is noise, is not leaving whatever happens to it.
+    An object that would need longer than `EXIT_HORIZON_S` at its speed, such as an arm that reaches far
+    into the image and whose drift is noise, is never considered leaving.
     """
     x, y, w, h = track.region.bbox
     vx, vy = track.velocity
     width, height = frame_size
-    # For each edge: how near it the box is, its pace towards it, and the way to go until it is out.
+    # For each edge: distance of the box, speed towards it, and distance to be entirely out.
     edges = (
         (x, -vx, x + w),
         (y, -vy, y + h),
@@ -224,7 +224,7 @@ def sides_of(box: Box, frame_size: tuple[int, int], margin: int = 3) -> frozense
 
 
 def at_border(region: Region, frame_size: tuple[int, int], margin: int = 3) -> bool:
-    """Whether a region is cut by the image border or as good as."""
+    """Whether a region is cut by the image border, or nearly so."""
     return region.cut or bool(border_sides(region, frame_size, margin))
 
 
@@ -232,8 +232,8 @@ def _coherent(before: Region, after: Region) -> bool:
     near = box_intersection(expanded(before.bbox, 4), after.bbox) > 0
     ratio = after.area / max(before.area, 1.0)
     if before.cut and after.cut and ratio >= 2.5:
-        # What comes over the border shows in pieces that grow together: it goes on while it still
-        # is where it was.
+        # A region coming over the border appears in pieces that grow together: it is coherent while it
+        # still covers its former place.
         return near and shared_pixels(before, after) > 0.6 * before.area
     return near and 0.4 < ratio < 2.5
 
@@ -258,16 +258,16 @@ def _recent_centroids(
 def _velocity(
     track: ObjectTrack, region: Region, centroids: tuple[TimedCentroid, ...], dt: float
 ) -> tuple[float, float]:
-    """How it moves: by image motion where that is known, else by how its centroid moved.
+    """Its velocity: by image motion where known, else by its centroid.
 
-    A centroid moves as well when something unseen begins to hide the body.
+    The centroid also moves when something unseen begins to hide the body.
     """
     if region.velocity_sigma > 0.0:
         share = max(1.0 - exp(-dt / 0.4), 1.0 / track.sightings)
         old, new = track.velocity, region.velocity
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
     if len(centroids) < 3:
-        # Too few places tell nothing: what is known stays.
+        # Too few positions: the last velocity is kept.
         return track.velocity
     middle = sum([t for t, _, _ in centroids]) / len(centroids)
     lever = sum([(t - middle) ** 2 for t, _, _ in centroids])

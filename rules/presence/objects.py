@@ -1,7 +1,7 @@
-"""Percepts enter the mind: regions as objects, health, plug-ins' percepts, what is unknown.
+"""Entering percepts into the mind: regions as objects, health, plug-ins' percepts, unknown kinds.
 
-A new region becomes a tentative object; whether it is an object at all, or one known before
-that shows itself again, is for `reasoner.py` to say. Objects out of sight are forgotten here.
+A new region becomes a tentative object; `reasoner.py` decides whether it is an object at all, or a known one
+that reappears. Objects out of view are forgotten here.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ KNOWN_KINDS = frozenset({"region", "hypothesis", "depth", "health"})
 
 @dataclass(frozen=True, slots=True)
 class ObjectSettings:
-    """How much is remembered, and for how long.
+    """Bounds of memory.
 
     Attributes:
-        most_objects: Bound on remembered objects; those unseen for longest go first.
-        most_owners: Bound on remembered region ids.
-        forget_unconfirmed_s: A new region unseen for this long was nothing.
+        most_objects: Most remembered objects; those unseen for longest are dropped first.
+        most_owners: Most remembered region ids.
+        forget_unconfirmed_s: A tentative object unseen for this long is dropped.
         forget_left_s: An object that left is remembered for this long.
-        forget_hidden_s: A hidden object is remembered for this long when it is known what it is or an
-            actor's part is its own.
+        forget_hidden_s: A hidden object is remembered for this long if it is identified or has a role in a
+            task.
         forget_nameless_s: Any other hidden object is remembered for this long.
-        percept_age_s: Percepts of plug-ins' own kinds fade after this.
+        percept_age_s: Percepts of plug-ins' own kinds expire after this.
     """
 
     most_objects: int = 64
@@ -37,23 +37,23 @@ class ObjectSettings:
     forget_unconfirmed_s: float = 0.5
     forget_left_s: float = 30.0
     forget_hidden_s: float = 300.0
-    # Longer than an occlusion in passing takes (2.7 and 4.5 s in the missions); with minutes, roads fill
-    # the mind with all that ever passed behind something.
+    # Longer than passing occlusions (2.7 and 4.5 s in the missions); with minutes, road scenes fill the mind
+    # with everything that ever passed behind something.
     forget_nameless_s: float = 10.0
     percept_age_s: float = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectReasoner:
-    """Reasoner of the update phase: percepts enter the mind.
+    """Reasoner of the update phase: enters percepts into the mind.
 
-    When no behaviour looked for regions in this step, nothing is concluded about any object.
+    Without a behaviour that looked for regions in this step, nothing is concluded about objects.
     """
 
     settings: ObjectSettings = ObjectSettings()
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one observation; see `Reasoner`."""
+        """Enter one observation; see `Reasoner`."""
         mind = replace(
             mind,
             time=observation.time,
@@ -110,12 +110,12 @@ class ObjectReasoner:
 
 
 def _is_identified(belief: ObjectBelief) -> bool:
-    """Whether some identity is likelier than that it is none of the models known."""
+    """Whether some identity is likelier than none of the models."""
     return bool(belief.candidates) and belief.candidates[0].confidence > belief.unknown
 
 
 def _sighted(mind: Mind, object_id: int, region: Region) -> ObjectBelief:
-    """The belief about an object after another sight of it; a first sight initiates it."""
+    """The belief about an object after a sighting; the first one initiates it."""
     old, now = mind.objects.get(object_id), mind.time
     if old is None:
         return ObjectBelief(object_id, region, Presence.SEEN, first_seen=now, last_seen=now)

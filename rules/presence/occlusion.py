@@ -1,8 +1,8 @@
-"""Occlusion, exit and reappearance: how much of an object is visible.
+"""Occlusion, exit, loss and reappearance, from how much of an object is visible.
 
-The gate that decides that an object has left stands here too (`_exit_conditions` for one of which a
-little still shows, `_missing_exit_conditions` for one of which nothing does): what goes over the border
-and what something hides are told from each other by the same evidence.
+The conditions for having left are here too (`_exit_conditions` while a little is still visible,
+`_missing_exit_conditions` when nothing is): exit and occlusion are distinguished by the same evidence.
+
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from visup.rules.presence.step_context import StepContext
 from visup.rules.wording.conditions import Condition, at_least, less_than, more_than
 
 PARTLY_OUT = 0.35
-"""What showed less than this share of itself when last seen was on its way out."""
+"""An object with a smaller visible share when last seen was on its way out."""
 
 
 def update_visible(context: StepContext) -> None:
-    """Confirmed objects that are seen now: do they hide, leave, come back?"""
+    """Confirmed objects that are visible now: occlusion, exit or reappearance."""
     for belief in context.seen():
         if not belief.confirmed:
             continue
@@ -59,14 +59,14 @@ def _check_hiding(context: StepContext, belief: ObjectBelief) -> None:
 
 
 def _occlusion_conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
-    """Of an object being hidden of which a little shows."""
+    """Conditions for the occlusion of an object of which a little is visible."""
     visible, s = context.of[belief.id].visible_share, context.settings
     yield less_than("visible share", visible, s.hidden_share)
     yield Condition("another object covers it", _occluder(context, belief) is not None)
 
 
 def _exit_conditions(context: StepContext, track: ObjectTrack, hiding: bool) -> Iterator[Condition]:
-    """Of an object having left of which a little shows."""
+    """Conditions for the exit of an object of which a little is visible."""
     size = context.mind.frame_size
     yield less_than("visible share", track.visible_share, context.settings.leaving_share)
     yield Condition("it is at the border of the image", at_border(track.region, size))
@@ -94,7 +94,7 @@ def _check_reappearance(context: StepContext, belief: ObjectBelief) -> None:
 def _reappearance_conditions(
     context: StepContext, belief: ObjectBelief, track: ObjectTrack
 ) -> Iterator[Condition]:
-    """Most of it must show; of one that was hidden, less is enough once nothing covers it."""
+    """Most of it must be visible; for one that was hidden, less is enough once nothing covers it."""
     s = context.settings
     if belief.presence is Presence.LEFT:
         needed = max(s.shown_share, 2 * s.leaving_share)
@@ -106,7 +106,7 @@ def _reappearance_conditions(
 
 
 def update_missing(context: StepContext) -> None:
-    """Confirmed objects without a region: hidden, gone, or lost?"""
+    """Confirmed objects without a region: occlusion, exit or loss."""
     for belief in context.missing():
         track = context.of.get(belief.id)
         if track is None or belief.presence is not Presence.SEEN:
@@ -135,7 +135,7 @@ def update_missing(context: StepContext) -> None:
 
 
 def _missing_conditions(context: StepContext, track: ObjectTrack) -> Iterator[Condition]:
-    """Of anything being concluded from an object's being missing."""
+    """Conditions for concluding anything from a missing object."""
     yield Condition("it has not merged with another object", track.merged_with is None)
     missing = context.now - track.seen_at
     yield at_least("missing for", missing, context.settings.settle_s, " s", slack=1e-6)
@@ -157,7 +157,7 @@ def _missing_exit_conditions(
 def _missing_occlusion_conditions(
     context: StepContext, track: ObjectTrack, occluder: ObjectBelief | None, leaving: bool
 ) -> Iterator[Condition]:
-    """It is not just missed when little of it would show, or when it is missing for long."""
+    """It is occluded, not just missed, if little of it would be visible or it is missing for long."""
     s = context.settings
     yield Condition("it has not left", not leaving)
     yield Condition("another object covers its place", occluder is not None)
@@ -183,7 +183,7 @@ def _loss_conditions(
 
 
 def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None:
-    """The object whose region stands where this one should be, or beside what is left of it."""
+    """The object whose region is where this one should be, or next to its remains."""
     best: tuple[float, ObjectBelief] | None = None
     for other in context.seen():
         if other.id == belief.id or context.may_be_part(other, belief):
@@ -197,11 +197,11 @@ def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None
 
 
 def _covered_share(context: StepContext, track: ObjectTrack, other: ObjectBelief) -> float:
-    """Share of the place of an object that another one's region takes."""
-    # What stands on the very pixels where it was last seen has moved there since.
+    """Share of an object's place that another one's region covers."""
+    # A region on the pixels of its last sighting has moved there since.
     share = shared_pixels(other.region, track.region) / max(1.0, track.region.area)
     if track.visible_share >= context.settings.whole_share:
         return share
-    # Of one that was going out of sight already, the rest may be anywhere in its place.
+    # The rest of an object that was already disappearing may be anywhere in its place.
     places = predicted_box(track, context.now), expanded(track.region.bbox, 6)
     return max(share, *(pixels_in(other.region, p) / max(1, p[2] * p[3]) for p in places))

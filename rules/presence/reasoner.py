@@ -1,11 +1,10 @@
-"""Presence of objects: entry, exit, occlusion, reappearance (paper, section 5).
+"""The presence reasoner: entry, exit, occlusion, loss, reappearance (paper, section 5).
 
-An entry is reported when a region has been seen steadily; an object without a region was hidden when
-another one stands where it should be, left when it was going over the image border, merged with
-another when that grew into the union of the two, and is lost when none of that explains it: a
-camera that sees motion loses what stops. A decision waits over several frames. A new region near
-the place where a missing object should be is that object, which keeps its id; one at another
-object may be a part of it and has to show that it is not.
+A region observed steadily enters. An object without a region is occluded if another one is where it should
+be, has left if it was moving over the image border, has merged if another one grew into the union of the two,
+and is lost otherwise: motion segmentation loses objects that stop. Decisions wait for several frames. A new
+region near the predicted place of a missing object is that object, which keeps its id; one next to another
+object may be a part of it and has to prove otherwise.
 """
 
 from __future__ import annotations
@@ -30,42 +29,31 @@ from visup.rules.presence.occlusion import update_missing, update_visible
 from visup.rules.presence.reidentification import reidentify
 from visup.rules.presence.settings import PresenceSettings
 from visup.rules.presence.step_context import StepContext
-from visup.rules.wording.conditions import Condition, DecisionLog
+from visup.rules.wording.conditions import Condition, DecisionLog, ExplainableReasoner, Subject
 
 __all__ = ["PresenceReasoner", "PresenceSettings", "visible_share"]
 
 
 @dataclass(frozen=True, slots=True)
-class PresenceReasoner:
-    """Reasoner of the cogitate phase: presence of objects; reports entry, exit, occlusion and reappearance.
+class PresenceReasoner(ExplainableReasoner):
+    """Reasoner of the cogitate phase: reports entry, exit, occlusion, loss and reappearance of objects.
 
-    When no behaviour looked for regions in this step, nothing is concluded.
+    Without a behaviour that looked for regions in this step, nothing is concluded. The `DECISIONS` are
+    explained for every object.
     """
 
     settings: PresenceSettings = field(default_factory=PresenceSettings)
     fragments: FragmentSettings = field(default_factory=FragmentSettings)
 
-    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
-        return self._judged(mind, observation, None)
-
-    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
-        """What the decisions of a step hang on: 'entry', 'exit', 'occlusion', 'loss', 'reappearance'.
-
-        Args:
-            mind: As this reasoner got it in that step.
-            observation: What was perceived.
-        """
-        log = DecisionLog()
-        after = self._judged(mind, observation, log).mind.objects
+    def _preconditions(
+        self, mind: Mind, after: Mind, observation: Observation
+    ) -> Iterator[tuple[Subject, tuple[Condition, ...]]]:
         for i, belief in mind.objects.items():
             for kind in DECISIONS:
-                if (kind, (i,)) not in log:
-                    found = _not_considered(kind, belief, after.get(i), observation)
-                    log[kind, (i,)] = tuple(found)
-        return log
+                conditions = _preconditions(kind, belief, after.objects.get(i), observation)
+                yield (kind, (i,)), tuple(conditions)
 
-    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+    def _reason(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
         if not observation.observed("region"):
             return Outcome(mind)
         context = self._context(mind, observation, log)
@@ -93,10 +81,10 @@ class PresenceReasoner:
 DECISIONS = ("entry", "exit", "occlusion", "loss", "reappearance")
 
 
-def _not_considered(
+def _preconditions(
     kind: str, belief: ObjectBelief, after: ObjectBelief | None, observation: Observation
 ) -> Iterator[Condition]:
-    """Preconditions for any decision about an object, from previous beliefs about it."""
+    """Preconditions of considering a decision about an object."""
     yield Condition("regions were looked for", observation.observed("region"))
     yield Condition("it is no known object seen again", after is not None)
     seen = after is not None and after.last_seen == observation.time
@@ -115,9 +103,9 @@ def _not_considered(
 
 
 def _remembered(context: StepContext) -> Mind:
-    """The mind with what is remembered of objects that are still known."""
-    kept = {i: t for i, t in context.of.items() if i in context.mind.objects}
-    mind = context.mind.remember(TRACKS, PresenceMemory(context.start, MappingProxyType(kept)))
+    """The mind with the memory of objects that are still known."""
+    tracks = {i: t for i, t in context.of.items() if i in context.mind.objects}
+    mind = context.mind.remember(TRACKS, PresenceMemory(context.start, MappingProxyType(tracks)))
     return mind.remember(FRAGMENTS, MappingProxyType(dict(context.fragments)))
 
 
@@ -131,7 +119,7 @@ def _update_tracks(context: StepContext) -> None:
             context.of[belief.id] = new_track(belief.region, context.now)
             continue
         if track.merged_with is not None:
-            # It has a region of its own again.
+            # It has its own region again.
             context.put(belief, merged_with=None, parted_at=context.now)
             track = context.of[belief.id]
         crowded = belief.id in hosts or any(
@@ -150,6 +138,6 @@ def _update_tracks(context: StepContext) -> None:
 
 
 def _recently_seen(context: StepContext) -> list[ObjectBelief]:
-    """Objects that are seen, or were a flicker ago: all that may hide a part of another."""
+    """Objects visible now or just before a flicker: all that may hide a part of another."""
     since = context.now - context.settings.allowed_gap_s
     return [b for b in context.mind.objects.values() if b.last_seen >= since]

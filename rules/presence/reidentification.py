@@ -1,8 +1,8 @@
-"""Objects that are given another region: found again, or seen whole after a part of them.
+"""Re-identification: objects that get another region, when found again or seen whole.
 
-A new region where a missing object should be is that object, which keeps its id. And where a
-larger region shows itself round an object that came over no border and never left its place, only
-a part of that object was seen before: it grows into the larger region.
+A new region where a missing object should be is that object, which keeps its id. Where a larger region
+appears around an object that came over no border and never left its place, only a part of that object was
+seen before: the object takes over the larger region.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from visup.rules.presence.object_tracks import border_sides, new_track, predicte
 from visup.rules.presence.step_context import StepContext
 
 PART = 0.7
-"""Share of a region's area up to which an object may have been a part of it."""
+"""Largest part, as a share of the region's area."""
 
 WITHIN = 0.5
-"""Share of the object's outline inside the hull of the region by which it is within it."""
+"""Share of the object's outline inside the region's hull from which it is within it."""
 
 
 def reidentify(context: StepContext) -> None:
-    """Give new regions to the missing objects that they show."""
+    """Assign new regions to the missing objects that they show."""
     for new in context.seen():
         if new.confirmed:
             continue
@@ -41,15 +41,15 @@ def reidentify(context: StepContext) -> None:
 
 
 def parts_of(context: StepContext, whole: ObjectBelief) -> list[ObjectBelief]:
-    """Known objects that were but parts of a new region, by id."""
+    """Known objects that were only parts of a new region, by id."""
     others = (b for b in context.seen() if b.confirmed and b.id not in context.recognised)
     return [b for b in others if _was_part(context, b, whole)]
 
 
 def absorb_parts(context: StepContext, whole: ObjectBelief, parts: list[ObjectBelief]) -> None:
-    """The oldest of some objects that were parts of a new region becomes it.
+    """The oldest of the objects that were parts of a new region takes it over.
 
-    The others count as parts from now on: they have to show that they are more, as any fragment.
+    The others count as parts from now on, and have to prove otherwise, like any fragment.
     """
     oldest = parts[0]
     _take_region(context, whole, oldest)
@@ -60,7 +60,7 @@ def absorb_parts(context: StepContext, whole: ObjectBelief, parts: list[ObjectBe
 
 
 def _take_region(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> None:
-    """The region of a new object belongs to an old one from now on; the new one is deleted."""
+    """Transfer the region of a new object to an old one; the new one is deleted."""
     mind = delete_objects(context.mind, frozenset({new.id}))
     context.mind = reassign_region(mind, new.region.id, old.id)
 
@@ -76,11 +76,11 @@ def _was_part(context: StepContext, part: ObjectBelief, whole: ObjectBelief) -> 
 
 
 def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
-    """How well a new region suits a missing object; 0 when it does not."""
+    """Match score of a new region and a missing object; 0 for no match."""
     track = context.of[old.id]
     named = bool(new.candidates and old.candidates) and new.name == old.name
     if named and new.id in context.recognised and old.confidence > 0.9:
-        return 1.0  # there is but one of what was shown by a name
+        return 1.0  # a taught name denotes a single object
     if track.merged_with is not None:
         iou = box_iou(new.region.bbox, old.region.bbox)
         return iou if iou > 0.3 else 0.0
@@ -93,7 +93,7 @@ def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> 
     ratio = new.region.area / max(track.reference_area, 1.0)
     if (ratio > 1.8 and not coming) or (old.presence is Presence.SEEN and ratio < 0.3):
         return 0.0
-    # The longer it was out of sight, the less is known of where it is.
+    # The search area grows with the time out of view.
     away = min(context.now - track.whole_at, 3.0)
     place = expanded(predicted_box(track, context.now), round(4 + 8 * away))
     area = new.region.bbox[2] * new.region.bbox[3]
@@ -103,13 +103,13 @@ def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> 
 
 
 def _share_border_side(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> bool:
-    """Whether both are cut by one side of the image: of what comes in, ever more shows."""
+    """Whether both are cut by the same side of the image, as while an object comes in."""
     size = context.mind.frame_size
     return bool(border_sides(new.region, size) & border_sides(old.region, size))
 
 
 def _names_agree(new: ObjectBelief, old: ObjectBelief) -> bool:
-    """Whether two beliefs may be of one thing: not when both have a clear and different name."""
+    """Whether two beliefs may be of one object: not when both have clear and different names."""
     if not new.candidates or not old.candidates:
         return True
     sure = min(new.confidence, old.confidence) > 0.9

@@ -1,4 +1,4 @@
-"""How long what is seen must last before an object changes its state, and how much must show."""
+"""Thresholds of presence reasoning: durations before state changes, and visible shares."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PresenceSettings:
-    """How long things must last before they are reported, and how much must show.
+    """Durations before changes are reported, and visible shares.
 
     Attributes:
-        entry_s: A region that came over the border, or was there at the start, enters after this.
-        entry_inside_s: The same for one that appears in the middle of the image.
+        entry_s: A region that came over the border, or was present at the start, enters after this.
+        entry_inside_s: The same for one that appears inside the image.
         start_s: Length of the start, in which every region may be new.
-        least_sightings: Sightings that an entry needs.
+        least_sightings: Sightings required for entry.
         allowed_gap_s: Longest flicker within a steady sighting.
-        settle_s: How long an object must be missing before exit or occlusion is told.
+        settle_s: How long an object must be missing before exit or occlusion is reported.
         missed_s: The same when it is not seen though another hides only a part of it.
         lost_s: The same when nothing explains it.
-        partial_s: How long little must show before exit or occlusion is told.
-        hidden_share: Below this share in sight, beside another region, an object is occluded.
-        leaving_share: Below this share, going over the border, it has left.
-        shown_share: Above this share a hidden object has reappeared.
-        shown_s: How long it must show, or stay in the clear, before that is told.
-        whole_share: An object of which less shows was being hidden, and did not merge with another.
+        partial_s: How long little must be visible before exit or occlusion is reported.
+        hidden_share: Below this visible share, next to another region, an object is occluded.
+        leaving_share: Below this visible share, moving over the border, it has left.
+        shown_share: Above this visible share a hidden object has reappeared.
+        shown_s: How long it must be visible, or unobstructed, before that is reported.
+        whole_share: A less visible object was being hidden, and did not merge with another.
         contact_px: Regions closer than this may hide parts of each other.
         reidentify_s: A new region must be seen this long before it can be a hidden object.
-        least_share: Share of the image below which nobody enters who has not been recognised.
+        least_share: Share of the image below which an unrecognised region does not enter.
     """
 
     entry_s: float = 0.36

@@ -1,4 +1,4 @@
-"""One step of presence reasoning in the making."""
+"""The mutable state of one step of presence reasoning."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from visup.rules.wording.sentences import sentence
 
 @dataclass(slots=True)
 class StepContext:
-    """One step in the making; lives only while the reasoner runs.
+    """The state of a step in progress; lives only while the reasoner runs.
 
     Attributes:
-        mind: As it is believed so far.
-        observation: What was perceived.
+        mind: The mind so far.
+        observation: The observation.
         of: Object id -> its track.
-        fragments: Object id -> whether it may be but a part of another.
-        settings: Of the reasoner.
+        fragments: Object id -> whether it may be only a part of another.
+        settings: Settings of the reasoner.
         start: Seconds of the first observation of regions.
-        log: Where the conditions of decisions are kept for who asks why, or None.
-        events: What is reported.
+        log: Records the conditions of decisions for explanations, or None.
+        events: Reported events.
     """
 
     mind: Mind
@@ -61,7 +61,7 @@ class StepContext:
         return [b for b in self.objects() if b.last_seen == now]
 
     def missing(self) -> list[ObjectBelief]:
-        """Confirmed objects without a region of their own now, unless they left."""
+        """Confirmed objects without their own region now, unless they left."""
         now, left = self.now, Presence.LEFT
         return [
             b
@@ -71,7 +71,7 @@ class StepContext:
 
     @property
     def recognised(self) -> frozenset[int]:
-        """Objects that were found by their looks now; see `recognised`."""
+        """Objects recognised by appearance now; see `recognised`."""
         if self._recognised is None:
             self._recognised = recognised(self.mind, self.observation)
         return self._recognised
@@ -84,32 +84,32 @@ class StepContext:
         return fragment.holds and (body is None or fragment.body == body.id)
 
     def decide(self, kind: str, object_id: int, conditions: Iterable[Condition]) -> bool:
-        """Whether all conditions of a decision about an object are met."""
+        """Whether all conditions of a decision about an object are met; logs them."""
         return decide(conditions, self.log, kind, (object_id,))
 
     def put(self, belief: ObjectBelief, **track: object) -> None:
-        """Believe it, and change what its track says."""
+        """Store a belief, and change fields of its track."""
         self.mind = self.mind.with_objects(belief)
         if track:
             self.of[belief.id] = replace(self.of[belief.id], **track)
 
     def tell(self, kind: str, template: str, *ids: int, confidence: float = 0.9) -> None:
-        """Add an event; its template speaks of the objects as {0}, {1}."""
+        """Add an event; its template refers to the objects as {0}, {1}."""
         text = sentence(self.mind, template, *ids, confidence=confidence)
         self.events.append(
             Event(kind, self.now, self.observation.frame_index, text, ids[:1], confidence)
         )
 
     def near(self, a: Region, b: Region) -> bool:
-        """Whether two regions are so close that one may hide a part of the other."""
+        """Whether two regions are close enough for one to hide a part of the other."""
         contact = self.settings.contact_px
         x, y, width, height = a.bbox
         left, top, w, h = b.bbox
-        # Most pairs are far apart along one of the axes already.
+        # Most pairs are far apart along one axis.
         if not (-w - contact <= left - x <= width + contact):
             return False
         if not (-h - contact <= top - y <= height + contact) or box_gap(a.bbox, b.bbox) > contact:
             return False
-        # As far as relations look in the same step, so that the gap is worked out once.
+        # The same bound as relations use in this step, so that the gap is computed once.
         gap = outline_gap(a, b, max(contact, NEAR_SHARE * image_diagonal(self.mind.frame_size)))
         return gap is not None and gap <= contact

@@ -1,28 +1,31 @@
-"""Conditions of decisions: those by which a reasoner decides also explain the decision.
+"""Conditions of decisions: a reasoner decides and explains its decisions by the same conditions.
 
-A reasoner yields the conditions of a decision one by one; the first that is not met ends it. To find
-out why, let it decide again with a `DecisionLog`: then all conditions are evaluated and recorded.
+A reasoner yields the conditions of a decision one by one; the first unmet one ends it. To explain it, the
+reasoner decides again with a `DecisionLog`, so that all conditions are evaluated and recorded.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from visup.agent import Mind, Observation, Outcome
+
 Subject = tuple[str, tuple[int, ...]]
-"""What is decided, such as 'entry', and of which objects."""
+"""Kind of decision, such as 'entry', and its objects."""
 
 
 class Condition(NamedTuple):
     """One condition of a decision.
 
     Attributes:
-        text: What it is about.
+        text: Its subject.
         met: Whether it is met.
-        value: The amount that counts, or None where there is none.
-        required: What it is compared with.
-        unit: Of both.
-        below: Whether the amount must be less than what is required, else at least that.
+        value: The measured amount, or None without one.
+        required: The required amount.
+        unit: Unit of both.
+        below: Whether the amount must be below the required one, else at least that.
     """
 
     text: str
@@ -33,7 +36,7 @@ class Condition(NamedTuple):
     below: bool = False
 
     def line(self) -> str:
-        """In words, with the amount and what is missing.
+        """The condition in words, with the amount and what is missing.
 
         >>> at_least("seen for", 0.2, 0.36, " s").line()
         'seen for 0.2 s of 0.36 s: 0.16 s short'
@@ -53,7 +56,7 @@ class Condition(NamedTuple):
 def at_least(
     text: str, value: float, required: float, unit: str = "", slack: float = 0.0
 ) -> Condition:
-    """An amount must reach another one, but for a slack that only makes up for rounding."""
+    """An amount must reach another one, up to a slack for rounding."""
     return Condition(text, value >= required - slack, value, required, unit)
 
 
@@ -77,14 +80,14 @@ def decide(
     """Whether all conditions are met.
 
     Args:
-        conditions: In order; those after the first that is not met are asked only for the log.
-        log: Where they are kept, or None. A decision in several parts is kept as one.
-        kind: What is decided.
-        objects: Of whom.
+        conditions: In order; those after the first unmet one are evaluated only for the log.
+        log: Records them, or None. A decision in several parts is recorded as one.
+        kind: Kind of decision.
+        objects: Ids of its objects.
     """
     if log is None:
-        # A loop, not `all(...)`: many decisions are made in each step, and a generator about the
-        # generator would cost as much again.
+        # A loop, not `all(...)`: there are many decisions in each step, and wrapping the generator in
+        # another one would double the cost.
         for condition in conditions:  # noqa: SIM110
             if not condition.met:
                 return False
@@ -92,3 +95,36 @@ def decide(
     listed = tuple(conditions)
     log[kind, objects] = (*log.get((kind, objects), ()), *listed)
     return all(c.met for c in listed)
+
+
+class ExplainableReasoner(ABC):
+    """A reasoner whose explanations run the same code as its decisions."""
+
+    __slots__ = ()
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Reason about one step; see `Reasoner`."""
+        return self._reason(mind, observation, None)
+
+    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
+        """The conditions of all decisions of a step.
+
+        Args:
+            mind: The mind as passed to this reasoner in that step.
+            observation: The observation of that step.
+        """
+        log = DecisionLog()
+        after = self._reason(mind, observation, log).mind
+        for decision, conditions in self._preconditions(mind, after, observation):
+            log.setdefault(decision, conditions)
+        return log
+
+    @abstractmethod
+    def _reason(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+        """Reason about one step, and record the conditions of all decisions if there is a log."""
+
+    def _preconditions(
+        self, mind: Mind, after: Mind, observation: Observation
+    ) -> Iterable[tuple[Subject, tuple[Condition, ...]]]:
+        """Conditions of decisions that `_reason` may not even consider; none by default."""
+        return ()

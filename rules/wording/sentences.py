@@ -13,7 +13,7 @@ from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 TOLD = 0.7
 """Likelihood from which on the identity of an object is reported; see `VoteSettings.settle`."""
 
-TOLD_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", None)
+REPORTED_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", None)
 """Object id -> the identity last reported; None where identities are not reported. The reasoner that counts
 votes maintains it."""
 
@@ -71,11 +71,11 @@ def spoken_name(mind: Mind, object_id: int) -> str | None:
     Returns:
         A name, or None if none was reported.
     """
-    name, told = believed_name(mind, object_id), mind.recall(TOLD_NAMES)
+    name, reported = believed_name(mind, object_id), mind.recall(REPORTED_NAMES)
     played = any(b.object_id == object_id for task in mind.tasks for b in task.bindings)
-    if name is None or played or told is None or object_id in mind.answers:
+    if name is None or played or reported is None or object_id in mind.answers:
         return name
-    return called(mind, told[object_id]) if object_id in told else None
+    return called(mind, reported[object_id]) if object_id in reported else None
 
 
 def is_of_kind(mind: Mind, object_id: int) -> bool:

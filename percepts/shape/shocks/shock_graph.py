@@ -1,11 +1,10 @@
 """Shock graphs: a silhouette as a rooted graph of parts, from thick to thin.
 
 After Siddiqi et al. (1999): every shock is a node; where two meet, the one of greater radius (which formed
-later as the fire burned inwards) is the parent. A symbolic root is the parent of shocks without one. The
-resulting
-grammar: seeds are children of the root only; necks are leaves; a bend or protrusion has at most two parents,
-one for each end. Each node carries its own shape (radii along it, length) and the shape as seen from it, so
-that nodes can be compared without looking at edges.
+later as the fire burned inwards) is the parent. A symbolic root is the parent of shocks without one. In the
+resulting grammar seeds are children of the root only, necks are leaves, and a bend or protrusion has at most
+two parents, one for each end. Each node carries its own shape (radii along it, length) and the shape as seen
+from it, so that nodes can be compared without looking at edges.
 
 Read next: `topological_signature.py`, then `graph_matching.py`.
 """
