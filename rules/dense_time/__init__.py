@@ -1,11 +1,9 @@
-"""Formulas over signals in dense time: exact between samples, with a choice of semantics at the ends.
+"""Dense-time monitoring: exact between samples, with a choice of semantics at the ends.
 
-`rules/monitoring` judges at samples, which is what frames of a camera are. Here a signal is a row of
-pieces of time, held or straight from sample to sample, and so is every formula of it.
-
-Read in this order: `sweep.py` (pieces, and what is active as time goes by), `operators.py` (what each
-operator makes of pieces), `lines.py` (signals that are straight between samples), `compiler.py`,
-`monitor.py` (what users call).
+`rules/monitoring` evaluates at samples, such as frames of a camera. Here a signal is a sequence of pieces of
+time, piecewise constant or linear between samples, and so is every formula over it.
+ Read in this order: `sweep.py` (pieces, and a sweep over active ones), `operators.py` (operators on pieces),
+`lines.py` (piecewise linear signals), `compiler.py`, `monitor.py` (the public interface).
 """
 
 from visup.rules.dense_time.monitor import DenseTimeMonitor, Ends, judge_recording

@@ -1,4 +1,4 @@
-"""From a formula to operators over pieces; what formulas share is done once."""
+"""Compiler from formulas to operators over pieces, with common subexpressions shared."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ class PieceProgram:
     """Operators in order, each reading those before it.
 
     Attributes:
-        constants: Value of each constant, by its place.
-        signals: Name of each signal, by its place.
-        steps: Operator and parts, by place; None for constants and signals.
+        constants: Value of each constant, by step.
+        signals: Name of each signal, by step.
+        steps: Operator and operands, by step; None for constants and signals.
     """
 
     constants: dict[int, object] = field(default_factory=dict)
@@ -73,7 +73,7 @@ class PieceProgram:
 
 
 class PieceCompiler:
-    """Puts a formula into a program.
+    """Compiles a formula into a program.
 
     Args:
         reading: 'samples', 'held' or 'linear'.
@@ -85,10 +85,10 @@ class PieceCompiler:
         self._places: dict[object, int] = {}
 
     def formula(self, node: Formula) -> int:
-        """The place of a formula.
+        """Compile a formula.
 
         Raises:
-            RuleError: It has no exact value as signals are read.
+            RuleError: It has no exact value for this reading of signals.
         """
         place = self._places.get(node)
         if place is None:
@@ -136,7 +136,7 @@ class PieceCompiler:
         )
 
     def term(self, node: Term) -> int:
-        """The place of a quantity."""
+        """Compile a quantity."""
         place = self._places.get(node)
         if place is None:
             made = self._line(node) if self._linear else self._term(node)
@@ -231,7 +231,7 @@ class PieceCompiler:
 
 
 def horizon(node: Node) -> float:
-    """How far after a moment a formula looks, microseconds."""
+    """How far into the future a formula looks, microseconds."""
     match node:
         case FutureOperator(part=part, window=TimeWindow() as window):
             return _bounds(window)[1] + horizon(part)
@@ -259,7 +259,7 @@ def _unequal(v: Interval, w: Interval) -> Interval:
 
 
 def _plain(function: object) -> Function:
-    """The Python function that was compiled: of two floats it is faster than a compiled call."""
+    """The uncompiled Python function, which is faster for two floats."""
     plain: Function = function.py_func  # type: ignore[attr-defined]
     return plain
 

@@ -1,7 +1,7 @@
-"""Signals that are straight between samples: exact moments at which a comparison changes.
+"""Piecewise linear signals: exact moments at which a comparison changes.
 
-A quantity is then a row of straight lines, each a pair of its two ends; sums, differences and
-multiples of lines are lines. A comparison of lines is true or false, and no matter of degree.
+A quantity is a sequence of straight lines, each a pair of its end values; sums, differences and multiples of
+lines are lines. A comparison of lines is Boolean.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from visup.rules.dense_time.sweep import Aligned, Piece, append
 from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval
 
 Line = tuple[float, float]
-"""What a quantity is at the begin and at the end of a piece; NaN where it is not known."""
+"""Values of a quantity at the start and end of a piece; NaN for unknown."""
 
 
 def combined(operator: str, v: Line, w: Line) -> Line:
-    """A sum, a difference, or a product or quotient of which one side is a number."""
+    """A sum, a difference, or a product or quotient with a constant."""
     if operator == "+":
         return v[0] + w[0], v[1] + w[1]
     if operator == "-":
@@ -28,7 +28,7 @@ def combined(operator: str, v: Line, w: Line) -> Line:
 
 
 def refused(what: object) -> RuleError:
-    """That something is no straight line."""
+    """The error that something is not a straight line."""
     return RuleError(
         f"'{what}' is not straight where signals are",
         expected="sums, differences and multiples of signals",
@@ -70,7 +70,7 @@ class LineComparison:
         return [p for p in parts if p.begin < p.end]
 
     def _truth(self, difference: float) -> Interval:
-        """The truth in the inner of a stretch in which the sign does not change."""
+        """The truth inside an interval without a change of sign."""
         if difference == 0.0:
             return TRUE if "=" in self._operator and self._operator != "!=" else FALSE
         holds = {"<": difference < 0, ">": difference > 0, "=": False, "!": True}

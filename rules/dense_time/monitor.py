@@ -1,4 +1,4 @@
-"""One formula over plain signals, exact between samples, with ends as one chooses."""
+"""A dense-time monitor of one formula over plain signals."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from visup.rules.monitoring.intervals import UNKNOWN, Interval, as_ended
 from visup.rules.monitoring.signals import Signals, known_interval, later
 
 Reading = Literal["samples", "held", "linear"]
-"""What a signal is between two samples: nothing of its own, the earlier one, or a straight line."""
+"""A signal between two samples: not evaluated, the earlier value, or a straight line."""
 Before = Literal["unknown", "cut"]
 After = Literal["unknown", "weak", "strong", "cut", "lasting"]
 NAN = float("nan")
@@ -25,15 +25,15 @@ NAN = float("nan")
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """What is outside a recording, and how long a sample is believed.
+    """Semantics outside a recording, and how long a sample is valid.
 
     Attributes:
-        before: What is before the first sample: not known, or no part of any window ('cut').
-        after: What is after the last one, once the recording is over: not known; not known, and what
-            is undecided then is told as the best ('weak') or the worst ('strong') that could come; no
-            part of any window ('cut'); or as it was last ('lasting').
-        hold_s: How long a sample is believed when no other comes, seconds; of straight signals how
-            far apart two may be to be joined.
+        before: Before the first sample: unknown, or no part of any window ('cut').
+        after: After the last one, once the recording is over: unknown; unknown, with undecided verdicts
+            resolved to the best ('weak') or worst ('strong') possible; no part of any window ('cut');
+            or the last value ('lasting').
+        hold_s: How long a sample is valid when no other comes, seconds; for linear signals the largest
+            gap that is interpolated.
     """
 
     before: Before = "unknown"
@@ -46,11 +46,11 @@ UNKNOWN_ENDS = Ends()
 
 @dataclass(frozen=True, slots=True)
 class TimedVerdict:
-    """What a formula is in a stretch of time.
+    """The verdict on a formula in an interval of time.
 
     Attributes:
         begin_s: Seconds.
-        end_s: Seconds, without.
+        end_s: Seconds, exclusive.
         robustness: Interval; see `intervals.verdict`.
     """
 
@@ -72,16 +72,16 @@ class DenseTimeMonitor:
 
     Args:
         formula: Its quantities are the signals, written `name()`.
-        reading: 'held': a sample's value stands until the next one. 'linear': values lie straight
+        reading: 'held': a sample's value lasts until the next one. 'linear': values are interpolated
             between samples; verdicts are then exact, and robustness is infinite. 'samples': as
-            'held', but `since` and `until` ask sample by sample, as `Monitor` does.
-        ends: What is outside the recording.
+            'held', but `since` and `until` are evaluated sample by sample, as in `Monitor`.
+        ends: Semantics outside the recording.
 
     Attributes:
-        delay: How many seconds at most a verdict waits for the future; also for the next sample.
+        delay: Longest wait of a verdict for the future, seconds, not counting the next sample.
 
     Raises:
-        RuleError: The formula has no exact value as signals are read.
+        RuleError: The formula has no exact value for this reading of signals.
     """
 
     def __init__(
@@ -101,14 +101,14 @@ class DenseTimeMonitor:
         self._values: dict[str, Interval] = {}
 
     def step(self, time: float, values: Signals) -> list[TimedVerdict]:
-        """Take in one sample.
+        """Process one sample.
 
         Args:
             time: Seconds, later than all before.
             values: Number or interval of each signal; None, NaN or left out when unknown.
 
         Returns:
-            What is decided by it, each moment once.
+            The verdicts decided by it, each moment once.
 
         Raises:
             SettingsError: As of `Monitor.step`.
@@ -120,13 +120,13 @@ class DenseTimeMonitor:
         else:
             found = self._run(self._between(self._then, now, known), (self._then, now))
         self._then, self._values = now, known
-        return _told(found)
+        return _verdicts(found)
 
     def foreseen(self) -> Interval:
-        """What the formula is at the last sample by what is known now, the future being unknown.
+        """The formula's value at the last sample as known now, with an unknown future.
 
         So `eventually[60 s] f` is true as soon as f is, and `henceforth[60 s] f` false as soon as f is.
-        It takes the time of what is retained, which grows with the windows; no sample is taken in.
+        Its cost grows with the windows; the state is unchanged.
         """
         if self._then is None:
             return UNKNOWN
@@ -137,10 +137,10 @@ class DenseTimeMonitor:
         return next(told, UNKNOWN)
 
     def finish(self, end_s: float | None = None) -> list[TimedVerdict]:
-        """No more samples will come: the verdicts about all that is left of the recording.
+        """End the recording: the remaining verdicts.
 
         Args:
-            end_s: When the recording ends, seconds; with the last sample when left out.
+            end_s: When the recording ends, seconds; with the last sample by default.
         """
         if self._then is None:
             return []
@@ -164,7 +164,7 @@ class DenseTimeMonitor:
         found = self._run(rows, span, end if self._after == "cut" else inf)
         if self._after in ("weak", "strong"):
             found = [Piece(b, e, as_ended(v, self._after)) for b, e, v in found]
-        return _told(found)
+        return _verdicts(found)
 
     @property
     def _nothing(self) -> object:
@@ -207,7 +207,7 @@ class DenseTimeMonitor:
         span: tuple[float, float],
         end: float | None = None,
     ) -> list[Piece]:
-        """New pieces of the formula from new pieces of the signals; with `end` there are no more."""
+        """New pieces of the formula from new pieces of the signals; the last ones if `end` is given."""
         program, found = self._program, list[list[Piece]]()
         for place, step in enumerate(program.steps):
             if step is None:
@@ -233,10 +233,10 @@ def judge_recording(
     ends: Ends = UNKNOWN_ENDS,
     end_s: float | None = None,
 ) -> list[TimedVerdict]:
-    """What a formula is at every moment of a recording; arguments as of `DenseTimeMonitor` and its `finish`.
+    """Evaluate a formula over a whole recording; arguments as for `DenseTimeMonitor` and its `finish`.
 
     Returns:
-        Stretches of time that follow each other, neighbours with different values.
+        Consecutive intervals of time, neighbours with different values.
     """
     monitor = DenseTimeMonitor(formula, reading, ends)
     found = [v for time, values in samples for v in monitor.step(time, values)]
@@ -252,12 +252,12 @@ def _merged(verdicts: list[TimedVerdict]) -> list[TimedVerdict]:
     return found
 
 
-def _told(pieces: list[Piece]) -> list[TimedVerdict]:
+def _verdicts(pieces: list[Piece]) -> list[TimedVerdict]:
     return _merged([TimedVerdict(p.begin / TICKS, p.end / TICKS, p.value) for p in pieces])
 
 
 def _line(first: Interval, last: Interval) -> tuple[float, float]:
-    """A line between two numbers; what is not one number at either end is not known."""
+    """A line between two numbers; NaN if an end is not a single number."""
     if first[0] != first[1] or last[0] != last[1]:
         return NAN, NAN
     return first[0], last[0]

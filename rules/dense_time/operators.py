@@ -1,10 +1,9 @@
-"""What each operator makes of pieces: new pieces in, new pieces out, each moment once and in order.
+"""Operators on pieces: new pieces in, new pieces out, each moment once and in order.
 
-A window is [t + low, t + high] around a moment t, of the past with numbers below 0. It holds every
-piece that it meets, so that a piece counts from begin - high up to and without end - low.
-
-`since` and `until` over samples ask f at the samples between g and now. In dense time f must be true
-at all moments between, so that of the piece in which g was true the rest is asked as well.
+A window is [t + low, t + high] around a moment t, with negative numbers for the past. It includes every piece
+that it meets, so a piece counts from begin - high up to but excluding end - low.
+ `since` and `until` over samples evaluate f at the samples between g and now. In dense time f must be true at
+all moments between, including the rest of the piece in which g was true.
 """
 
 from __future__ import annotations
@@ -26,18 +25,18 @@ class Operator(Protocol):
     """One step of a program over pieces."""
 
     def take(self, rows: Sequence[list[Piece]]) -> list[Piece]:
-        """Take in the new pieces of all parts, give those that follow from them."""
+        """Process new pieces of all operands, and return the resulting pieces."""
 
     def finish(self, end: float) -> list[Piece]:
-        """No more will come, and nothing is after `end`: the rest."""
+        """Finish at `end`, and return the rest."""
 
 
 class Pointwise:
-    """A function of the values of one moment.
+    """A pointwise function.
 
     Args:
-        count: How many parts it has.
-        function: Of their values.
+        count: Number of operands.
+        function: Function of their values.
     """
 
     def __init__(self, count: int, function: Callable[..., Any]) -> None:
@@ -53,12 +52,12 @@ class Pointwise:
 
 
 class Swept(ABC):
-    """What all operators with windows share: a sweep over lanes, and how far it may go.
+    """Base of window operators: a sweep over lanes, and how far it may proceed.
 
     Args:
-        count: How many parts it has.
-        high: How far after a moment it looks, microseconds.
-        samples: Whether pieces are samples, each of which counts by itself.
+        count: Number of operands.
+        high: How far it looks into the future, microseconds.
+        samples: Whether pieces are samples, each of which counts separately.
     """
 
     lanes: Sequence[Lane]
@@ -72,8 +71,8 @@ class Swept(ABC):
         return Lane(fold, nothing, self.merges)
 
     def swept(self, lanes: Sequence[Lane], join: Callable[..., Any]) -> None:
-        """Say what is swept."""
-        # Of samples also where each begins, so that pieces stay samples.
+        """Set the lanes of the sweep."""
+        # For samples also the start of each, so that pieces stay samples.
         self._grid = None if self.merges else Lane(lambda old, new: new, None, merges=False)
         every = lanes if self._grid is None else (*lanes, self._grid)
         self._sweep = Sweep(every, lambda *v: join(*v[: len(lanes)]), self.merges)
@@ -99,7 +98,7 @@ class Swept(ABC):
 
 
 class Window(Swept):
-    """The least or the greatest over [t + low, t + high].
+    """The minimum or maximum over [t + low, t + high].
 
     Args:
         kind: 'always' or 'once'.
@@ -187,7 +186,7 @@ class SoFar:
         self._inner, self._begin = inner, inf
 
     def begins(self, moment: float) -> None:
-        """Say when the first sample was, microseconds."""
+        """Set the time of the first sample, microseconds."""
         self._begin = moment
 
     def take(self, rows: Sequence[list[Piece]]) -> list[Piece]:
@@ -205,7 +204,7 @@ class SoFar:
 
 
 class Latch:
-    """A comparison with two thresholds: the second one counts from when it is true to when it is false."""
+    """A comparison with hysteresis: the second threshold applies while it is true."""
 
     def __init__(self) -> None:
         self._aligned, self._entered = Aligned(2), False
@@ -225,7 +224,7 @@ class Latch:
 
 
 class PieceNote:
-    """`let x be q at f`: what q was when f was last true."""
+    """`let x be q at f`: the value of q when f was last true."""
 
     def __init__(self) -> None:
         self._aligned, self._kept = Aligned(2), UNKNOWN
@@ -245,10 +244,10 @@ class PieceNote:
 
 
 class PieceHold:
-    """`last(f, 0.5 s)`: what was known last, while that is no older.
+    """`last(f, 0.5 s)`: the last known value, while it is no older.
 
     Args:
-        age: Microseconds.
+        age: Greatest age, microseconds.
     """
 
     def __init__(self, age: float) -> None:
@@ -275,7 +274,7 @@ class PieceHold:
 
 
 class PreviousPiece:
-    """`previous f` where pieces are samples."""
+    """`previous f`, where pieces are samples."""
 
     def __init__(self) -> None:
         self._before: Interval | None = None

@@ -1,8 +1,9 @@
-"""Pieces of time, and the sweep that finds what is active as time goes by.
+"""Pieces of time, and a sweep line over the active ones.
 
-Of what enters and leaves in one order, the fold is kept by two stacks (Tangwongsan, Hirzel and
-Schneider, "General incremental sliding-window aggregation", 2015): each piece costs the same
-whatever the window.
+The fold of values that enter and leave in the same order is maintained by two stacks (Tangwongsan, Hirzel and
+Schneider, "General incremental sliding-window aggregation", 2015), at constant cost per piece whatever the
+window.
+
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 Fold = Callable[[Any, Any], Any]
-"""Joins what is older with what is newer; associative."""
+"""Combines an older with a newer value; associative."""
 
 
 class Piece(NamedTuple):
@@ -21,8 +22,8 @@ class Piece(NamedTuple):
 
     Attributes:
         begin: Microseconds, or minus infinity.
-        end: Microseconds, without; or infinity.
-        value: An interval, or of a straight line its two ends.
+        end: Microseconds, exclusive; or infinity.
+        value: An interval, or the two end values of a straight line.
     """
 
     begin: float
@@ -31,7 +32,7 @@ class Piece(NamedTuple):
 
 
 class FoldQueue:
-    """First in, first out, with the fold of all that is in it.
+    """A first-in, first-out queue with the fold of its content.
 
     Args:
         fold: Joins values.
@@ -39,17 +40,17 @@ class FoldQueue:
 
     def __init__(self, fold: Fold) -> None:
         self._fold = fold
-        self._front: list[tuple[Any, Any]] = []  # (value, fold of it and all newer of the front)
+        self._front: list[tuple[Any, Any]] = []  # (value, fold from it to the end of the front)
         self._back: list[Any] = []
         self._newer: Any = None
 
     def push(self, value: Any) -> None:
-        """Put one in."""
+        """Append a value."""
         self._newer = self._fold(self._newer, value) if self._back else value
         self._back.append(value)
 
     def pop(self) -> None:
-        """Take the oldest one out."""
+        """Remove the oldest value."""
         if not self._front:
             folded = None
             for value in reversed(self._back):
@@ -59,7 +60,7 @@ class FoldQueue:
         self._front.pop()
 
     def value(self, nothing: Any) -> Any:
-        """The fold of all, or what it is of nothing."""
+        """The fold of all values, or `nothing` if empty."""
         if not self._front:
             return self._newer if self._back else nothing
         oldest = self._front[-1][1]
@@ -67,12 +68,12 @@ class FoldQueue:
 
 
 class Lane:
-    """Values that enter and leave, in the same order.
+    """Values that enter and leave in the same order.
 
     Args:
         fold: Joins values.
         nothing: Their fold when none is active.
-        merges: Whether equal values that follow each other may count as one.
+        merges: Whether consecutive equal values may be merged.
     """
 
     def __init__(self, fold: Fold, nothing: Any, merges: bool = True) -> None:
@@ -80,11 +81,11 @@ class Lane:
         self._pending: deque[tuple[float, float, Any]] = deque()
         self._leaving: deque[tuple[float, Any]] = deque()
         self._active = FoldQueue(fold)
-        self._staying: Any = None  # the fold of those that never leave
+        self._staying: Any = None  # fold of the values that never leave
         self._stays = False
 
     def push(self, enter: float, leave: float, value: Any) -> None:
-        """One more value, active from `enter` up to and without `leave`."""
+        """Add a value, active from `enter` up to but excluding `leave`."""
         if leave <= enter:
             return
         if self._merges and self._pending and self._pending[-1][1:] == (enter, value):
@@ -92,7 +93,7 @@ class Lane:
         self._pending.append((enter, leave, value))
 
     def move(self, at: float) -> None:
-        """Let all enter and leave that do up to a moment."""
+        """Process all entries and exits up to a moment."""
         while self._pending and self._pending[0][0] <= at:
             _, leave, value = self._pending.popleft()
             if leave == inf and not self._leaving:
@@ -108,12 +109,12 @@ class Lane:
             self._active.pop()
 
     def next(self) -> float:
-        """When the next one enters or leaves."""
+        """Time of the next entry or exit."""
         enter = self._pending[0][0] if self._pending else inf
         return min(enter, self._leaving[0][0]) if self._leaving else enter
 
     def value(self) -> Any:
-        """The fold of what is active."""
+        """The fold of the active values."""
         if not self._stays:
             return self._active.value(self._nothing)
         if not self._leaving:
@@ -122,12 +123,12 @@ class Lane:
 
 
 class Sweep:
-    """Sweeps through time and yields what is active in each piece.
+    """Sweeps through time and returns pieces with the folds of active values.
 
     Args:
         lanes: The lanes.
         join: The value of a piece, from the folds of all lanes.
-        merges: Whether neighbouring pieces of one value become one.
+        merges: Whether adjacent pieces of equal value are merged.
     """
 
     def __init__(
@@ -137,7 +138,7 @@ class Sweep:
         self.at: float | None = None
 
     def until(self, limit: float) -> list[Piece]:
-        """The pieces from where the last ones ended up to a moment."""
+        """The pieces from the end of the last ones up to a moment."""
         found: list[Piece] = []
         while self.at is not None and self.at < limit:
             for lane in self._lanes:
@@ -153,14 +154,14 @@ class Sweep:
 
 
 def append(pieces: list[Piece], piece: Piece, merges: bool = True) -> None:
-    """Add a piece; one that goes on as the last one did only makes that longer."""
+    """Append a piece, or extend the last one if the value is equal."""
     if merges and pieces and pieces[-1].value == piece.value and pieces[-1].end == piece.begin:
         piece = Piece(pieces.pop().begin, piece.end, piece.value)
     pieces.append(piece)
 
 
 class Aligned:
-    """Several rows of pieces, cut so that they change together.
+    """Aligns several rows of pieces to common boundaries.
 
     Args:
         count: How many rows.
@@ -170,7 +171,7 @@ class Aligned:
         self._rows: tuple[deque[Piece], ...] = tuple(deque() for _ in range(count))
 
     def take(self, rows: Sequence[list[Piece]]) -> list[Piece]:
-        """The common pieces up to where all rows are known; values are tuples."""
+        """The common pieces up to where all rows are known; their values are tuples."""
         for row, new in zip(self._rows, rows, strict=True):
             row.extend(new)
         found = []

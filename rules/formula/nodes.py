@@ -1,4 +1,4 @@
-"""The tree of a rule file: frozen nodes that print themselves back as source."""
+"""AST nodes of rule files: frozen, and printed back as source."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from visup.rules.formula.terms import (
 from visup.rules.formula.units import NOWHERE, Number, Span, Unit
 
 SIGNAL_WORDS = frozenset({"signal", "signal_on", "signal_is", "signal_known"})
-"""Words about signals, which are of no object: what they are given is no variable and no actor."""
+"""Words about signals, which belong to no object: their arguments are neither variables nor actors."""
 
 ZERO = Number(0.0, Unit.S)
 
 
 @dataclass(frozen=True, slots=True)
 class TimeWindow:
-    """`[2 s .. 5 s]`: a stretch of time, counted from now into the past or into the future."""
+    """`[2 s .. 5 s]`: a time interval, counted from now into the past or the future."""
 
     low: Number
     high: Number
@@ -58,7 +58,7 @@ class Literal:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """`gap(a, b) < 20 px`; with `leave 25 px`, once true it ends only there (hysteresis)."""
+    """`gap(a, b) < 20 px`; with `leave 25 px` it ends only there once true (hysteresis)."""
 
     left: Term
     operator: str
@@ -106,12 +106,12 @@ class Or:
 
 @dataclass(frozen=True, slots=True)
 class PastOperator:
-    """`always f`, `once f`: so far; `f for 2 s`, `f within 2 s`: in a window that ends now.
+    """`always f`, `once f`: over the whole past; `f for 2 s`, `f within 2 s`: in a window ending now.
 
     Attributes:
         kind: 'always' or 'once'.
-        part: Of what.
-        window: The window, or None for all that was watched.
+        part: The operand.
+        window: The window, or None for the whole past.
     """
 
     kind: str
@@ -129,7 +129,7 @@ class PastOperator:
 
 @dataclass(frozen=True, slots=True)
 class FutureOperator:
-    """`eventually[5 s] f`, `henceforth[5 s] f`: in a window that begins now; reported when it is over."""
+    """`eventually[5 s] f`, `henceforth[5 s] f`: in a window starting now; reported when it is over."""
 
     kind: str
     part: Formula
@@ -153,7 +153,7 @@ class Previous:
 
 @dataclass(frozen=True, slots=True)
 class Since:
-    """`f since g`: g held, and f has held ever since; with a window, g held within it."""
+    """`f since g`: g held, and f has held ever since; with a window, g held within the window."""
 
     left: Formula
     right: Formula
@@ -180,7 +180,7 @@ class Until:
 
 @dataclass(frozen=True, slots=True)
 class MOfN:
-    """`f in 60 % of 2 s`: in at least that share of the time; `f in 3 of 5 samples`: in as many."""
+    """`f in 60 % of 2 s`: for at least that share of the time; `f in 3 of 5 samples`: at as many samples."""
 
     part: Formula
     least: Number
@@ -189,7 +189,7 @@ class MOfN:
 
     @property
     def counts_samples(self) -> bool:
-        """Whether samples are counted, and not time."""
+        """Whether samples are counted instead of time."""
         return self.of.unit is Unit.NONE
 
     def __str__(self) -> str:
@@ -200,7 +200,7 @@ class MOfN:
 
 @dataclass(frozen=True, slots=True)
 class Last:
-    """`last(f, 0.5 s)`: as it was when last known, while that is at most so old."""
+    """`last(f, 0.5 s)`: the last known value, while it is at most this old."""
 
     part: Formula
     duration: Number
@@ -211,13 +211,13 @@ class Last:
 
 @dataclass(frozen=True, slots=True)
 class Quantified:
-    """`exists b: f`, `forall b: f`: of some, of all other objects.
+    """`exists b: f`, `forall b: f`: for some, for all other objects.
 
     Attributes:
         kind: 'exists' or 'forall'.
-        variable: Name that the objects have in `part`.
-        part: What is true of them.
-        may_repeat: Whether objects that stand for other variables count too.
+        variable: Name of the objects in `part`.
+        part: The operand.
+        may_repeat: Whether objects bound to other variables count too.
     """
 
     kind: str
@@ -233,13 +233,13 @@ class Quantified:
 
 @dataclass(frozen=True, slots=True)
 class Let:
-    """`let x be gap(a, b) at touching(a, b): f`: f, in which x is what the gap was when they last touched.
+    """`let x be gap(a, b) at touching(a, b): f`: f, where x is the gap when they last touched.
 
     Attributes:
         variable: The name.
-        value: The quantity; it has no value until `at` has been true.
-        at: When it is noted.
-        part: The formula in which the variable stands for it, as a `Variable` that holds both.
+        value: The quantity; undefined until `at` has been true.
+        at: When it is sampled.
+        part: The formula, with the variable as a `Variable` holding both.
     """
 
     variable: str
@@ -278,16 +278,16 @@ class Rule:
     """One rule.
 
     Attributes:
-        name: Also the kind of its concerns.
-        variables: Names of its objects; distinct objects but for those of `may_repeat`.
-        severity: How grave its concerns are.
-        when: What must be true.
+        name: Name of the rule, and kind of its alarms.
+        variables: Names of its objects; distinct objects, except those of `may_repeat`.
+        severity: Severity of its alarms.
+        when: The condition.
         say: The sentence, with `{a}` for objects and `{is}` for the verb.
-        unless: What must not be true, or None.
-        hold: How long a concern stays after the rule was last true, or None.
-        cooldown: How long the same objects raise no concern after one was over, or None.
-        may_repeat: Variables that may stand for an object that another one stands for.
-        file: Where it was read, for messages.
+        unless: The exception, or None.
+        hold: How long an alarm stays after the rule was last true, or None.
+        cooldown: How long after an alarm the same objects raise no new one, or None.
+        may_repeat: Variables that may be bound to the same object as another.
+        file: File it was read from, for messages.
     """
 
     name: str
@@ -315,12 +315,12 @@ class Rule:
 
     @property
     def formulas(self) -> tuple[Formula, ...]:
-        """`when`, and `unless` if there is one."""
+        """`when`, and `unless` if present."""
         return (self.when,) if self.unless is None else (self.when, self.unless)
 
 
 def children(node: Node) -> tuple[Node, ...]:
-    """The nodes that a node is made of directly; numbers of windows and durations left out."""
+    """The direct children of a node, without the numbers of windows and durations."""
     match node:
         case And(parts=parts) | Or(parts=parts) | PointwiseFunction(parts=parts):
             return parts
@@ -344,7 +344,7 @@ def children(node: Node) -> tuple[Node, ...]:
 
 
 def walk(node: Node | None) -> Iterator[Node]:
-    """A node and all that it is made of, in the order of the text."""
+    """A node and all its descendants, in source order."""
     if node is not None:
         yield node
         for part in children(node):
@@ -352,12 +352,12 @@ def walk(node: Node | None) -> Iterator[Node]:
 
 
 def calls(node: Node | None) -> tuple[Predicate | Measure, ...]:
-    """All relations, facts and quantities that a formula names, in the order of the text."""
+    """All relations, facts and quantities named in a formula, in source order."""
     return tuple(n for n in walk(node) if isinstance(n, Predicate | Measure))
 
 
 def placeholder(variable: str) -> str:
-    """What stands for a variable in a text until it is known which object it is."""
+    """The placeholder of a variable in a text until its object is known."""
     return f"\0{variable}\0"
 
 
@@ -366,5 +366,5 @@ _PREFIXED = (Not, Quantified, Let, FutureOperator, PastOperator, Previous)
 
 
 def _wrapped(formula: Formula, *loose: type) -> str:
-    """Its source, in parentheses where it is of a looser kind; `for` within `for` also for the eye."""
+    """Its source, parenthesised if it binds more loosely; nested `for` also for readability."""
     return f"({formula})" if isinstance(formula, loose) else str(formula)

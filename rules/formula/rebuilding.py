@@ -1,4 +1,4 @@
-"""The same tree with some of its nodes changed: objects named, values of `let` put in."""
+"""Tree rewriting: substituting objects for variables, and binding `let`."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ _PARTS: dict[type, tuple[str, ...]] = {
     ),
     **dict.fromkeys((Negative, WindowFunction), ("part",)),
 }
-"""Where the nodes that a node is made of stand in it."""
+"""Node type -> fields that hold its children."""
 
 
 def rebuilt(node: Node, change: Callable[[Node], Node | None]) -> Node:
-    """The same tree with some nodes changed.
+    """Rewrite a tree.
 
     Args:
         node: The root.
-        change: What stands in the place of a node; None to leave it and look at its parts.
+        change: Returns the replacement of a node, or None to descend into its children.
     """
     changed = change(node)
     if changed is not None:
@@ -62,7 +62,7 @@ def rebuilt(node: Node, change: Callable[[Node], Node | None]) -> Node:
 
 
 def substituted(node: Node, names: Mapping[str, str]) -> Node:
-    """The same tree with variables replaced by the names of objects."""
+    """Replace variables by the names of objects."""
 
     def change(part: Node) -> Node | None:
         if isinstance(part, Predicate | Measure):
@@ -73,7 +73,7 @@ def substituted(node: Node, names: Mapping[str, str]) -> Node:
 
 
 def bound(node: Formula, variable: Variable) -> Formula:
-    """The same formula in which a name stands for what `let` says."""
+    """Bind a `let` variable in a formula."""
 
     def change(part: Node) -> Node | None:
         free = isinstance(part, Variable) and part.part is None and part.name == variable.name

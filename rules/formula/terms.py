@@ -1,4 +1,4 @@
-"""Quantities in the tree of a rule: frozen nodes that print themselves back as source."""
+"""AST nodes of quantities: frozen, and printed back as source."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 from visup.rules.formula.units import NOWHERE, Number, Span
 
 POINTWISE = ("abs", "min", "max", "sqrt", "exp", "power")
-"""Functions of quantities of one moment; of one quantity but for `min`, `max` and `power`."""
+"""Pointwise functions; of one quantity, except `min`, `max` and `power`."""
 OVER_WINDOW = ("rate", "before", "lowest", "highest", "last")
-"""Functions of a quantity and of a time span."""
+"""Functions of a quantity and a duration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Negative:
 
 @dataclass(frozen=True, slots=True)
 class PointwiseFunction:
-    """`min(gap(a, b), gap(a, c))`: one of `POINTWISE` of quantities of one dimension."""
+    """`min(gap(a, b), gap(a, c))`: one of `POINTWISE`, of quantities of one dimension."""
 
     name: str
     parts: tuple[Term, ...]
@@ -81,8 +81,8 @@ class Variable:
 
     Attributes:
         name: Its name.
-        part: What it is a value of; None of a name that no `let` has bound.
-        at: The formula; it is the value that `part` had when this was last true.
+        part: The quantity; None for a name not bound by a `let`.
+        at: The formula; the value is that of `part` when this was last true.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""Three-valued logic (Kleene's): what is not known is unknown, never false.
+"""Kleene's three-valued logic: unknown is never taken for false.
 
-Everything that people and records read is a `Truth`. Arrays of truths hold int8 codes instead, and
-operators over time hold robustness intervals; the conversions stand here and in
-`monitoring.intervals.verdict`.
+Public interfaces and records use `Truth`. Arrays hold int8 codes instead, and temporal operators hold
+robustness intervals; the conversions are here and in `monitoring.intervals.verdict`.
+
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NEGATION: Mapping[Truth, Truth] = MappingProxyType(
 
 
 def conjunction(truths: Iterable[Truth]) -> Truth:
-    """'and': the least of some truths.
+    """'and': the minimum.
 
     >>> conjunction([Truth.TRUE, Truth.UNKNOWN])
     <Truth.UNKNOWN: 'unknown'>
@@ -33,7 +33,7 @@ def conjunction(truths: Iterable[Truth]) -> Truth:
 
 
 def disjunction(truths: Iterable[Truth]) -> Truth:
-    """'or': the greatest of some truths."""
+    """'or': the maximum."""
     return max(truths, key=CODE_OF.__getitem__)
 
 

@@ -1,4 +1,4 @@
-"""Numbers with units, and what they measure: sums need one dimension, products make new ones."""
+"""Units and dimensions: sums require equal dimensions, products combine them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Span:
     """Position of a node: lines and columns counted from 1, the end column exclusive.
 
     Attributes:
-        file: The included file in which it stands; empty for the file itself.
+        file: The included file it is in; empty for the file itself.
     """
 
     line: int = 0
@@ -23,12 +23,12 @@ class Span:
     file: str = ""
 
     def to(self, last: Span) -> Span:
-        """From the beginning of this place to the end of another."""
+        """From the start of this span to the end of another."""
         return Span(self.line, self.column, last.end_line, last.end_column)
 
     @property
     def length(self) -> int:
-        """Characters on its line; of a node that runs over several lines, 1."""
+        """Characters on its line; 1 for a node that spans several lines."""
         return self.end_column - self.column if self.end_line == self.line else 1
 
 
@@ -37,13 +37,13 @@ NOWHERE = Span()
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """What a number measures: powers of length, time and angle; a share has none of them.
+    """A physical dimension: powers of length, time and angle; none for a share.
 
     Attributes:
         length: Power of pixels.
         time: Power of seconds.
         angle: Power of degrees.
-        metres: Power of metres; what is measured in the scene is no length in the image.
+        metres: Power of metres; lengths in the scene differ from lengths in the image.
     """
 
     length: int = 0
@@ -61,7 +61,7 @@ class Dimension:
 
     @property
     def powers(self) -> tuple[int, int, int, int]:
-        """Of length, time, angle and metres."""
+        """Powers of length, time, angle and metres."""
         return self.length, self.time, self.angle, self.metres
 
     def __str__(self) -> str:
@@ -95,11 +95,11 @@ DIMENSION_NAMES = {
     REAL_LENGTH: "real length",
     REAL_SPEED: "real speed",
 }
-"""Dimensions that have a name, for messages and docs."""
+"""Named dimensions, for messages and docs."""
 
 
 class Unit(StrEnum):
-    """What a number counts."""
+    """Units of numbers."""
 
     NONE = ""
     MS = "ms"
@@ -137,19 +137,19 @@ UNITS: dict[str, tuple[Dimension, float]] = {
     Unit.M: (REAL_LENGTH, 1.0),
     Unit.M_S: (REAL_SPEED, 1.0),
 }
-"""Unit -> what it measures, and how many of the base unit it is."""
+"""Unit -> dimension, and factor to the base unit."""
 
 TICKS = 1_000_000
-"""Moments are counted in whole microseconds, so that the ends of windows compare exactly."""
+"""Ticks per second: times are integer microseconds, so that window bounds compare exactly."""
 
 
 def ticks(seconds: float) -> int:
-    """Seconds as a whole number of microseconds."""
+    """Seconds as integer microseconds."""
     return round(seconds * TICKS)
 
 
 def units_of(dimension: Dimension) -> str:
-    """The units in which a dimension is written, for messages: 'a speed: px/s'."""
+    """The units of a dimension, for messages: 'a speed: px/s'."""
     units = [str(u) or "no unit" for u, (d, _) in UNITS.items() if d == dimension]
     return f"a {dimension}: {', '.join(units)}" if units else f"a quantity in {dimension}"
 
@@ -160,7 +160,7 @@ class Number:
 
     Attributes:
         value: The number, in its unit.
-        unit: One of `UNITS`; of a task file that is not checked yet perhaps another word.
+        unit: One of `UNITS`; possibly another word in an unchecked task file.
     """
 
     value: float
@@ -174,7 +174,7 @@ class Number:
 
     @property
     def dimension(self) -> Dimension:
-        """What it measures."""
+        """Its dimension."""
         return UNITS[self.unit][0]
 
     def __str__(self) -> str:
@@ -182,7 +182,7 @@ class Number:
 
 
 def number_text(number: float) -> str:
-    """A number as one writes it: whole ones without a point."""
+    """A number as written by people: integers without a decimal point."""
     if number == float("inf"):
         return "1e999"
     return str(int(number)) if number == int(number) and abs(number) < 1e15 else repr(number)
@@ -199,4 +199,4 @@ UNITS_MEANT: Mapping[str, str] = MappingProxyType(
         "metres": "m",
     }
 )  # fmt: skip
-"""What people write -> the unit that they mean."""
+"""Common spelling -> the unit meant."""

@@ -1,8 +1,9 @@
-"""What each operator does to single intervals, defined once.
+"""Interval arithmetic of the operators, defined once.
 
-Compiled into the loops of `vm`, and called as it is by `monitor`, for which plain Python on two floats is
-faster than a call of compiled loops. An interval is a pair (low, high) of floats; `p` and `q` are the
-constants of an operation.
+Compiled into the loops of `vm`, and called uncompiled by `monitor`, where plain Python on two floats is
+faster than calling compiled code. An interval is a pair (low, high) of floats; `p` and `q` are the constants
+of an operation.
+
 """
 
 from __future__ import annotations
@@ -13,30 +14,30 @@ from visup.compiled import compiled
 
 Pair = tuple[float, float]
 MOST_EXPONENT = 709.0
-"""Beyond it e to its power is no number."""
+"""Largest exponent of e without overflow."""
 
 
 @compiled
 def shifted(v: Pair, p: float, q: float) -> Pair:
-    """The interval plus two numbers: how far a quantity lies above a bound."""
+    """The interval plus constants: how far a quantity is above a bound."""
     return v[0] + p + q, v[1] + p + q
 
 
 @compiled
 def mirrored(v: Pair, p: float, q: float) -> Pair:
-    """Two numbers minus the interval: how far a quantity lies below a bound; 'not' when both are 0."""
+    """Constants minus the interval: how far a quantity is below a bound; 'not' when both are 0."""
     return -v[1] + p + q, -v[0] + p + q
 
 
 @compiled
 def absolute(v: Pair, p: float, q: float) -> Pair:
-    """Of an interval that spans 0, all up to the farther bound."""
+    """The absolute value; from 0 if the interval contains 0."""
     return max(max(v[0], -v[1]), 0.0), max(-v[0], v[1])
 
 
 @compiled
 def rooted(v: Pair, p: float, q: float) -> Pair:
-    """The square root; of what is below 0 nothing is known."""
+    """The square root; unknown below 0."""
     if v[1] < 0.0:
         return -inf, inf
     return sqrt(max(v[0], 0.0)), sqrt(v[1])
@@ -44,13 +45,13 @@ def rooted(v: Pair, p: float, q: float) -> Pair:
 
 @compiled
 def exponential(v: Pair, p: float, q: float) -> Pair:
-    """E to the power of it; what is too large for a number is infinite."""
+    """The exponential; infinite on overflow."""
     return exp(v[0]) if v[0] < MOST_EXPONENT else inf, exp(v[1]) if v[1] < MOST_EXPONENT else inf
 
 
 @compiled
 def raised(base: float, exponent: float) -> float:
-    """One number to the power of another; NaN where it is no number, infinite where too large."""
+    """The power of two numbers; NaN if undefined, infinite on overflow."""
     if base == 0.0:
         return inf if exponent < 0.0 else 1.0 if exponent == 0.0 else 0.0
     if base < 0.0 and exponent != floor(exponent):
@@ -67,8 +68,8 @@ def raised(base: float, exponent: float) -> float:
 
 @compiled
 def powered(v: Pair, w: Pair, p: float) -> Pair:
-    """The power; unknown where some number of the intervals has none."""
-    # Of one exponent it is monotone on either side of 0; of a positive base in both.
+    """The power; unknown if undefined for some number of the intervals."""
+    # With one exponent it is monotone on either side of 0; with a positive base in both arguments.
     whole = w[0] == w[1] and w[0] == floor(w[0]) and w[0] >= 0.0
     if not (whole or v[0] > 0.0 or (v[0] == 0.0 and w[0] > 0.0) or (v[0] == v[1] and w[0] == w[1])):
         return -inf, inf
@@ -98,7 +99,7 @@ def subtracted(v: Pair, w: Pair, p: float) -> Pair:
 
 @compiled
 def compared(v: Pair, w: Pair, p: float) -> Pair:
-    """How far one quantity lies above another; `p` decides ties."""
+    """How far one quantity is above another; `p` decides ties."""
     low, high = v[0] - w[1], v[1] - w[0]
     return (-inf if low != low else low) + p, (inf if high != high else high) + p
 
@@ -122,16 +123,16 @@ def product(v: Pair, w: Pair, p: float) -> Pair:
 
 @compiled
 def ratio(p: float, q: float) -> float:
-    """One number by another, which is not 0; 0 by what is infinite, whatever it is."""
+    """The ratio to a nonzero number; 0 if that is infinite."""
     return 0.0 if q == inf or q == -inf else p / q
 
 
 @compiled
 def quotient(v: Pair, w: Pair, p: float) -> Pair:
-    """The quotient; by an interval that holds 0, nothing is known of it."""
+    """The quotient; unknown if the divisor contains 0."""
     if w[0] <= 0.0 <= w[1]:
         return -inf, inf
-    # Divided once, and not multiplied by an inverse: the last digit decides ties.
+    # A single division, not multiplication by an inverse: the last digit decides ties.
     one, two = ratio(v[0], w[0]), ratio(v[0], w[1])
     three, four = ratio(v[1], w[0]), ratio(v[1], w[1])
     return min(min(one, two), min(three, four)), max(max(one, two), max(three, four))
@@ -139,12 +140,12 @@ def quotient(v: Pair, w: Pair, p: float) -> Pair:
 
 @compiled
 def recalled(v: Pair, kept: Pair, at: float, now: float, span: float) -> tuple[Pair, Pair, float]:
-    """The interval last known, while that is no older than `span`; what to retain, and of when.
+    """Sample and hold: the last known interval, while at most `span` old; and the new state with its time.
 
     Args:
         v: The interval of this sample.
-        kept: The one that was known last.
-        at: When it was, microseconds.
+        kept: The last known interval.
+        at: Its time, microseconds.
         now: Microseconds.
         span: Microseconds.
     """
@@ -155,6 +156,6 @@ def recalled(v: Pair, kept: Pair, at: float, now: float, span: float) -> tuple[P
 
 @compiled
 def latched(enter: Pair, leave: Pair, entered: bool) -> tuple[Pair, bool]:
-    """A comparison with two thresholds: the second counts from when it is true to when it is false."""
+    """A comparison with hysteresis: the second threshold applies while it is true."""
     v = leave if entered else enter
     return v, v[0] > 0.0 or (entered and v[1] >= 0.0)

@@ -1,12 +1,11 @@
-"""Formulas made ready to run: one list of steps, in which what formulas share is done once.
+"""Compiler from formulas to one program of steps with common subexpressions shared.
 
-Every formula becomes a step that reads the results of steps before it. Two formulas that say the
-same of the same variables, in one rule or in several, are one step. An object variable is an axis of
-the arrays, so that one step serves all choices of objects. A program only says what is to be done:
-`monitor` does it to single intervals, `vm` to those of all choices of objects.
-
-What speaks of the future is turned into the past by waiting (Maler and Nickovic's pastification):
-`eventually[5 s] f` is told 5 s late as `f within 5 s`, and what stands beside it waits as long.
+Every formula becomes a step that reads the results of earlier steps. Equal formulas of the same variables, in
+one rule or several, are one step. An object variable is an axis of the arrays, so that one step serves all
+bindings of objects. A program is only a description: `monitor` executes it on single intervals, `vm` on those
+of all bindings.
+ Future operators are turned into past ones by delay (pastification, Maler and Nickovic): `eventually[5 s] f`
+is reported 5 s late as `f within 5 s`, and its siblings are delayed as long.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ from visup.rules.formula.terms import (
     WindowFunction,
 )
 from visup.rules.formula.units import Number, ticks
-from visup.rules.monitoring.beside_windows import (
+from visup.rules.monitoring.further_operators import (
     BegunWindow,
     DelayedUnbounded,
     EndedWindow,
@@ -64,7 +63,7 @@ from visup.rules.monitoring.operators import (
 )
 
 Scope = tuple[tuple[str, bool], ...]
-"""The variables of a formula by axis, each with whether it may repeat another one."""
+"""The variables of a formula by axis, each with whether it may repeat another."""
 
 
 def scope_of(rule: Rule) -> Scope:
@@ -73,7 +72,7 @@ def scope_of(rule: Rule) -> Scope:
 
 
 def inner_scope(node: Quantified, scope: Scope) -> Scope:
-    """The variables of what a quantifier is of."""
+    """The variables of a quantifier's operand."""
     return (*scope, (node.variable, node.may_repeat))
 
 
@@ -82,17 +81,16 @@ class Operation:
     """One step of a program.
 
     Attributes:
-        kind: 'number', 'look', 'remember', 'exists' or 'forall'; or what is done to the intervals of
-            one moment: 'not', 'abs', 'least', 'most', 'above', 'below', 'compare', '+', '-', '*',
-            '/', 'rate'.
+        kind: 'number', 'look', 'remember', 'exists' or 'forall'; or a pointwise operation: 'not', 'abs',
+            'least', 'most', 'above', 'below', 'compare', '+', '-', '*', '/', 'rate'.
         reads: Steps whose values it reads.
         axes: Axes of the objects that its value depends on.
-        numbers: Of 'number' its interval; of 'above' and 'below' what is added, then what ties decide;
-            of 'compare' the latter; of 'rate' the factor.
-        node: Of 'look' what is looked up.
-        order: Of 'look' the axes in the order in which its objects are named; of a quantifier its
-            axis, then those whose objects it leaves out.
-        operator: Of 'remember'.
+        numbers: For 'number' its interval; for 'above' and 'below' the offset, then the tie-breaker; for
+            'compare' the latter; for 'rate' the factor.
+        node: For 'look' the node to look up.
+        order: For 'look' the axes in the order of its arguments; for a quantifier its axis, then the
+            axes whose objects it excludes.
+        operator: For 'remember' the operator.
     """
 
     kind: str
@@ -106,13 +104,13 @@ class Operation:
 
 @dataclass(frozen=True, slots=True)
 class ValueRef:
-    """Where the value of a formula is found.
+    """A reference to the value of a formula.
 
     Attributes:
         step: Its step.
-        delay: How late it comes, microseconds.
+        delay: Its delay, microseconds.
         axes: Axes of the objects that it depends on.
-        certain: Whether it is no matter of degree: its robustness is always infinite.
+        certain: Whether it is Boolean: its robustness is always infinite.
     """
 
     step: int
@@ -127,41 +125,41 @@ class Program:
 
     Attributes:
         steps: The steps.
-        places: What makes a step the same as another -> its number.
+        places: Key of equal steps -> number of the step.
     """
 
     steps: list[Operation] = field(default_factory=list)
     places: dict[Hashable, int] = field(default_factory=dict)
 
     def add(self, key: Hashable, step: Operation) -> int:
-        """The step of that key, made when there is none yet."""
+        """The step with this key, added if new."""
         if key not in self.places:
             self.steps.append(step)
             self.places[key] = len(self.steps) - 1
         return self.places[key]
 
     def looks(self) -> Iterable[tuple[int, Predicate | Measure]]:
-        """What is looked up, each with its step."""
+        """All lookups, each with its step."""
         return ((k, s.node) for k, s in enumerate(self.steps) if s.node is not None)
 
     def operators(self) -> Iterable[TemporalOperator]:
-        """What remembers."""
+        """All temporal operators."""
         return (s.operator for s in self.steps if s.operator is not None)
 
 
 class Compiler:
-    """Puts formulas into a program."""
+    """Compiles formulas into a program."""
 
     def __init__(self) -> None:
         self.program = Program()
 
     def rule(self, rule: Rule) -> tuple[ValueRef, ...]:
-        """The places of `when` and `unless`, which come equally late."""
+        """Compile `when` and `unless`, with equal delay."""
         scope = scope_of(rule)
         return tuple(self.together([self.formula(f, scope) for f in rule.formulas]))
 
     def formula(self, node: Formula, scope: Scope = ()) -> ValueRef:
-        """The place of a formula, after its steps have been put into the program."""
+        """Compile a formula."""
         match node:
             case Predicate():
                 return self._called(node, scope, certain=True)
@@ -202,7 +200,7 @@ class Compiler:
                 return self.formula(part, scope)
 
     def term(self, node: Term, scope: Scope = ()) -> ValueRef:
-        """The place of a quantity."""
+        """Compile a quantity."""
         match node:
             case Number():
                 return self.constant(node.base, node.base)
@@ -227,12 +225,12 @@ class Compiler:
                 return self._over_time(node, self.term(node.part, scope))
 
     def constant(self, low: float, high: float, certain: bool = False) -> ValueRef:
-        """A step that is always the same interval."""
+        """A constant step."""
         step = Operation("number", numbers=(low, high))
         return ValueRef(self.program.add(("number", low, high), step), certain=certain)
 
     def combined(self, kind: str, *at: ValueRef, numbers: tuple[float, ...] = ()) -> ValueRef:
-        """A step that remembers nothing."""
+        """A stateless step."""
         axes, reads = _axes(at), tuple(p.step for p in at)
         step = self.program.add((kind, numbers, reads), Operation(kind, reads, axes, numbers))
         return ValueRef(step, at[0].delay, axes, all(p.certain for p in at))
@@ -245,18 +243,18 @@ class Compiler:
         return at
 
     def together(self, parts: list[ValueRef]) -> list[ValueRef]:
-        """The same parts, those that come earlier made to wait for the latest one."""
+        """The same values, delayed to the latest one."""
         latest = max(p.delay for p in parts)
         return [self.waited(p, latest - p.delay) for p in parts]
 
     def waited(self, at: ValueRef, wait: int) -> ValueRef:
-        """The same value, told later."""
+        """The same value, delayed further."""
         return self.windowed("always", wait, wait, wait, at) if wait else at
 
     def remembered(
         self, operator: TemporalOperator, *at: ValueRef, delay: int = 0, certain: bool = False
     ) -> ValueRef:
-        """A step that remembers."""
+        """A step with a temporal operator."""
         axes, reads = _axes(at), tuple(p.step for p in at)
         step = Operation("remember", reads, axes, operator=operator)
         return ValueRef(
@@ -264,14 +262,14 @@ class Compiler:
         )
 
     def windowed(self, kind: str, low: int, high: int, delay: int, *at: ValueRef) -> ValueRef:
-        """The least ('always') or greatest ('once') over a window of the past, 'since' or 'until' in it.
+        """The minimum ('always') or maximum ('once') over a window of the past, or 'since' or 'until' in it.
 
         Args:
-            kind: Which.
+            kind: Kind of operator.
             low: How long before now the window ends, microseconds.
             high: How long before now it begins.
-            delay: By how much later than the parts the value comes.
-            at: The parts.
+            delay: Additional delay of the value relative to the operands.
+            at: The operands.
         """
         certain = all(p.certain for p in at)
         lasting = certain and low == 0 and kind in ("always", "once")
@@ -286,7 +284,7 @@ class Compiler:
         return self.unbounded(kind, at)
 
     def unbounded(self, kind: str, *at: ValueRef) -> ValueRef:
-        """'always', 'once' or 'since' of all that was watched."""
+        """'always', 'once' or 'since' over the whole past."""
         delay = at[0].delay
         operator = DelayedUnbounded(kind, delay) if delay else Unbounded(kind)
         return self.remembered(operator, *at, certain=all(p.certain for p in at))
@@ -298,7 +296,7 @@ class Compiler:
         found = self.windowed("since", low, high, 0, left, right)
         if not low:
             return found
-        # What came after the window must have been so, too.
+        # The left side must also have held after the window.
         return self.combined("least", found, self.remembered(BegunWindow(low), left))
 
     def _until(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
@@ -329,7 +327,7 @@ class Compiler:
             return self.combined("above", apart, numbers=(0.0, -EQUAL))
         by = EQUAL if "=" in operator else -EQUAL
         more, less = (left, right) if operator[0] == ">" else (right, left)
-        # With a number on one side nothing can fail to be a number, and half the work is saved.
+        # With a constant on one side no NaN can arise, which saves half the work.
         if isinstance(less, Number):
             return self.combined("above", self.term(more, scope), numbers=(-less.base, by))
         if isinstance(more, Number):
@@ -353,7 +351,7 @@ class Compiler:
 
     def _called(self, node: Predicate | Measure, scope: Scope, certain: bool) -> ValueRef:
         names = [name for name, _ in scope]
-        # An inner variable hides an outer one of its name.
+        # An inner variable shadows an outer one of the same name.
         axis = {name: i for i, name in enumerate(names)}
         order = tuple(axis[w] for w in node.words if w in axis)
         words = tuple(axis.get(w, w) for w in node.words)
@@ -365,7 +363,7 @@ class Compiler:
         return self.quantified(node, scope, self.formula(node.part, inner_scope(node, scope)))
 
     def quantified(self, node: Quantified, scope: Scope, at: ValueRef) -> ValueRef:
-        """The least or the greatest along the axis of a quantifier, of what it is of."""
+        """The minimum or maximum of an operand along the axis of a quantifier."""
         axis = len(scope)
         apart = () if node.may_repeat else tuple(i for i, (_, r) in enumerate(scope) if not r)
         axes, order = (at.axes | frozenset(apart)) - {axis}, (axis, *apart)

@@ -1,10 +1,10 @@
-"""What is decided about the future before it has come: `eventually[60 s] f` is true once f is.
+"""Early verdicts about the future: `eventually[60 s] f` is true once f is.
 
-The compiler waits until all of a window has passed. Beside each such value stands a second one here, which
-comes as soon as anything can be known, and holds what will be told later (as the intervals of
-Deshmukh and others do, "Robust online monitoring of signal temporal logic", 2017): its bounds are those
-of the later value whatever comes. It costs the same at every sample, since each operator reads the newest
-value of its part and, for what is older, what has been told of it by then.
+The compiler delays future operators until their window has passed. For each such value this adds a second one
+that comes as soon as anything can be known: an interval that contains the final value whatever comes (as in
+Deshmukh and others, "Robust online monitoring of signal temporal logic", 2017). It costs the same at every
+sample, since each operator reads the newest value of its operand and, for older times, what has been reported
+of it by then.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from visup.rules.formula.nodes import (
     Until,
 )
 from visup.rules.formula.units import ticks
-from visup.rules.monitoring.beside_windows import EndedWindow, FollowedWindow
 from visup.rules.monitoring.compiler import Compiler, Scope, ValueRef, inner_scope, scope_of
+from visup.rules.monitoring.further_operators import EndedWindow, FollowedWindow
 
 
 @dataclass(frozen=True, slots=True)
 class EarlyValue:
-    """An early value, as soon as it is decided, and the final one.
+    """An early value and the final one.
 
     Attributes:
-        first: Its delay is the shortest after which anything can be decided.
-        last: Its delay is that after which all is.
-        steady: Whether what is told first at a sample is right of all moments up to the next one, and
-            not only of its own.
+        first: The early value, with the shortest delay after which anything can be decided.
+        last: The final value.
+        steady: Whether the early value at a sample is valid for all moments up to the next sample, not
+            only for its own.
     """
 
     first: ValueRef
@@ -48,24 +48,24 @@ class EarlyValue:
 
     @property
     def wait(self) -> int:
-        """How much later the last value comes, microseconds."""
+        """Delay of the final value relative to the early one, microseconds."""
         return self.last.delay - self.first.delay
 
 
 class EarlyCompiler:
-    """Puts what is decided early into a program.
+    """Compiles early values into a program.
 
     Args:
-        compiler: What puts formulas into it.
+        compiler: The compiler of the program.
     """
 
     def __init__(self, compiler: Compiler) -> None:
         self._on = compiler
 
     def rule(self, rule: Rule) -> EarlyValue | None:
-        """That `when` is true and `unless` is not, while a verdict may still come; None where none is late.
+        """Early value of `when` and not `unless` while the verdict is pending; None if there is no delay.
 
-        What was decided early stays so until it is told in the end, so that one alert stands throughout.
+        An early decision persists until the final verdict, so that one alert lasts throughout.
         """
         parts = rule.when.parts if isinstance(rule.when, And) else (rule.when,)
         parts = parts if rule.unless is None else (*parts, Not(rule.unless))
@@ -80,9 +80,9 @@ class EarlyCompiler:
         return replace(found, first=at)
 
     def _followed(self, parts: tuple[Formula, ...], scope: Scope) -> ValueRef | None:
-        """That all but one of some parts were true at a moment, which `eventually` has then followed.
+        """All but one of some parts were true at a moment, which `eventually` has then followed.
 
-        What is true now was not yet when they were; so of such rules each moment is told early.
+        For such rules the early value at each moment is latched, since its parts need not be true any more.
         """
         ahead = [p for p in parts if self._on.formula(p, scope).delay]
         if len(ahead) != 1 or len(parts) == 1:
@@ -103,12 +103,12 @@ class EarlyCompiler:
         return replace(at, delay=low)
 
     def formula(self, node: Formula, scope: Scope = ()) -> EarlyValue:
-        """What is known early of a formula, after its steps have been put into the program."""
+        """Compile the early value of a formula."""
         last = self._on.formula(node, scope)
         if not last.delay:
             return EarlyValue(last, last)
         found = self._of(node, scope, last)
-        # What can be decided no sooner than all of it is told in the end, exactly.
+        # Without an earlier decision the final, exact value is used.
         return found if found.wait else EarlyValue(last, last)
 
     def _of(self, node: Formula, scope: Scope, last: ValueRef) -> EarlyValue:
@@ -148,17 +148,17 @@ class EarlyCompiler:
         return self._on.constant(-inf, inf, certain=True)
 
     def _open(self, kind: str, at: ValueRef) -> ValueRef:
-        """The bound that what still comes cannot change: of 'most' the lower one, of 'least' the upper."""
+        """The bound that the future cannot change: the lower one of 'most', the upper one of 'least'."""
         return self._on.combined(kind, at, self._unknown)
 
     def _steadied(self, early: EarlyValue) -> ValueRef:
-        """What is known first of a part, where it is right of all moments up to the next sample."""
+        """The early value of a part if it is valid up to the next sample, else unknown."""
         return early.first if early.steady else replace(self._unknown, delay=early.first.delay)
 
     def _joined(self, kind: str, parts: list[EarlyValue], last: ValueRef) -> EarlyValue:
         first = max(p.first.delay for p in parts)
         alike = len({(p.first.delay, p.last.delay) for p in parts}) == 1
-        # What is made to wait is told of moments between samples, too.
+        # A delayed value is also read between samples.
         known = [p.first if alike else self._steadied(p) for p in parts]
         at, *others = (self._on.waited(p, first - p.delay) for p in known)
         for other in others:
@@ -193,7 +193,7 @@ class EarlyCompiler:
     def _so_far(self, kind: str, part: EarlyValue, last: ValueRef) -> EarlyValue:
         on = self._on
         if part.first.delay:
-            # What is told first speaks of moments before the first sample, too, which do not count.
+            # Early values also cover moments before the first sample, which do not count.
             return self._nothing(last)
         newer = on.windowed(kind, 0, part.wait, 0, self._steadied(part))
         at = on.combined(

@@ -1,15 +1,13 @@
-"""Intervals [low, high]: what is known of a quantity, and of how far a formula is from changing.
+"""Robustness intervals [low, high]: bounds of a quantity, or of a formula's distance from changing.
 
-One algebra of two kinds: of single intervals (`Scalars`), and of arrays of them for all choices of
-objects at once (`Arrays`). The operators that keep windows are written once for both.
-
-A formula's robustness is how far its quantities are from where it changes its truth (Donze and
-Maler, "Robust satisfaction of temporal logic over real-valued signals", 2010); as an interval it
-also says how little is known (Deshmukh and others, "Robust online monitoring of signal temporal
-logic", 2017). It is true when all of it lies above 0, false when all of it lies below, else
-unknown. A fact, which is no matter of degree, has an infinite one, and what is not known at all has
-[-inf, inf]. Where two quantities are equal, `>=` and `<=` hold and `>` and `<` do not: `EQUAL` is
-added or subtracted, which changes no other number.
+There are two algebras: single intervals (`Scalars`), and arrays of them for all bindings of objects at once
+(`Arrays`). The window operators are written once for both.
+ A formula's robustness is how far its quantities are from changing its truth (Donze and Maler, "Robust
+satisfaction of temporal logic over real-valued signals", 2010); an interval also expresses what is unknown
+(Deshmukh and others, "Robust online monitoring of signal temporal logic", 2017). A formula is true when all
+of its interval is above 0, false when all of it is below, else unknown. A Boolean fact has infinite
+robustness, an unknown one [-inf, inf]. For equal quantities `>=` and `<=` hold and `>` and `<` do not:
+`EQUAL` is added or subtracted, which changes no other number.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ EQUAL = 1e-300
 
 
 def verdict(interval: Interval) -> Truth:
-    """True when all of the interval lies above 0, false when all lies below, else unknown."""
+    """True if the whole interval is above 0, false if it is below, else unknown."""
     low, high = interval
     if low > 0:
         return Truth.TRUE
@@ -41,13 +39,13 @@ def verdict(interval: Interval) -> Truth:
 
 
 AtEnd = Literal["unknown", "weak", "strong"]
-"""What is undecided when a recording ends: still unknown, the best that could come, or the worst."""
+"""Undecided verdicts at the end of a recording: unknown, the best possible, or the worst possible."""
 
 
 def as_ended(interval: Interval, view: AtEnd) -> Interval:
-    """The value of an interval that nothing will narrow any further.
+    """The final value of an interval at the end of a recording.
 
-    In the weak view what is undecided is true, in the strong view it is false (Eisner and others,
+    In the weak view undecided is true, in the strong view false (Eisner and others,
     "Reasoning with temporal logic on truncated paths", 2003).
     """
     low, high = interval
@@ -55,28 +53,28 @@ def as_ended(interval: Interval, view: AtEnd) -> Interval:
 
 
 class Algebra(Protocol):
-    """What operators with windows ask of intervals; `v` and `w` are intervals of its kind."""
+    """The operations that window operators need; `v` and `w` are intervals of one kind."""
 
     def constant(self, value: Interval) -> Any:
-        """An interval that is the same for all choices of objects."""
+        """An interval that is the same for all bindings of objects."""
 
     def least(self, v: Any, w: Any) -> Any:
-        """The lesser of each bound: 'and'."""
+        """The minimum of each bound: 'and'."""
 
     def most(self, v: Any, w: Any) -> Any:
-        """The greater of each bound: 'or'."""
+        """The maximum of each bound: 'or'."""
 
     def held(self, v: Any) -> Any:
-        """(surely, possibly) true, each 0 or 1."""
+        """(certainly, possibly) true, each 0 or 1."""
 
     def scaled(self, v: Any, factor: float) -> Any:
-        """Times a number that is not negative; also of what `held` gives."""
+        """Multiply by a nonnegative number; also for results of `held`."""
 
     def tallied(self, v: Any, w: Any) -> Any:
-        """The sum of what `held` gives, which is never without end."""
+        """The sum of results of `held`, which are finite."""
 
     def shifted(self, v: Any, by: float) -> Any:
-        """A number added to both bounds."""
+        """Add a number to both bounds."""
 
 
 class Scalars:
@@ -90,7 +88,7 @@ class Scalars:
         """See `Algebra`."""
         a, b = v
         c, d = w
-        # One of the two where it can be: a window then holds each value once.
+        # Returns an operand itself where possible, so that windows share values.
         if a <= c and b <= d:
             return v
         return w if c <= a and d <= b else (a if a < c else c, b if b < d else d)
@@ -121,13 +119,13 @@ class Scalars:
 
 
 class Arrays:
-    """(2, cells) arrays of intervals, one for each choice of objects."""
+    """(2, cells) arrays of intervals, one for each binding of objects."""
 
     def constant(self, value: Interval) -> IntervalArray:
         """See `Algebra`."""
         return np.array(value).reshape(2, 1)
 
-    # NumPy's functions themselves, since a call costs as much as what they do.
+    # NumPy's functions directly, since a wrapper would double the cost.
     least: Any = staticmethod(np.minimum)
     most: Any = staticmethod(np.maximum)
     scaled: Any = staticmethod(np.multiply)

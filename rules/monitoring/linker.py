@@ -1,7 +1,7 @@
-"""The layout of a program for a number of objects: the place of every interval and state.
+"""The linker: lays out a program's intervals and states for a number of objects.
 
-Most operations are done by `vm`. Those that keep windows are done one by one between its calls, on
-what these have made; few calls are enough, since windows rarely look at windows.
+Most operations are executed by `vm`. Window operators run one by one between its calls, on earlier results;
+few calls are needed, since windows are rarely nested.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _KINDS = {
 
 
 class _Stage(NamedTuple):
-    """What follows from what stages before have made: instructions, their numbers, then windows."""
+    """One stage, which depends on earlier ones: instructions and constants, then windows."""
 
     rows: list[list[int]]
     numbers: list[tuple[float, float]]
@@ -67,20 +67,20 @@ class _Stage(NamedTuple):
 
 
 class LinkedProgram:
-    """A program for a number of objects.
+    """A program laid out for a number of objects.
 
     Args:
         program: The steps.
         n: Number of objects.
-        facts: Where the codes of each fact begin, by the step that looks it up.
-        codes: How many codes of facts there are.
+        facts: Start of each fact's codes, by the step that looks it up.
+        codes: Number of fact codes.
 
     Attributes:
-        places: Where the intervals of each step begin.
-        axes: Axes of the objects that each depends on, in order.
-        size: Of all intervals, numbers.
-        looked: Of those of the quantities that are looked up; they come first, in their order.
-        memory: Where states stand.
+        places: Start of each step's intervals.
+        axes: Axes of the objects that each step depends on, in order.
+        size: Length of the arena, numbers.
+        looked: Length of its first part, the looked-up quantities, in their order.
+        memory: Layout of the states.
         fresh: The states before the first sample.
     """
 
@@ -90,12 +90,12 @@ class LinkedProgram:
         self.axes = [tuple(sorted(step.axes)) for step in program.steps]
         self.size = 0
         self._stages: list[_Stage] = []
-        self._ready: list[int] = []  # the stage from which on each step's value is there
+        self._ready: list[int] = []  # the stage from which each step's value is available
         self._wider: dict[tuple[int, frozenset[int]], int] = {}
         self._moments: list[PointSlot] = []
         self._windows: list[WindowSlot] = []
         self._kept = 0
-        # Quantities stand before all else, so that they are put there in one go.
+        # Quantities come first, so that they are copied in one go.
         measured = [k for k, node in program.looks() if isinstance(node, Measure)]
         places = {k: self._room(n ** len(self.axes[k])) for k in measured}
         self.looked = self.size
@@ -112,13 +112,13 @@ class LinkedProgram:
         self._ends = np.cumsum([len(stage.rows) for stage in self._stages]).tolist()
 
     def step(self, states: States, now: int, facts: Codes, arena: Floats) -> States:
-        """Judge one sample.
+        """Process one sample.
 
         Args:
-            states: States before, for as many objects.
+            states: States before, for the same number of objects.
             now: Microseconds.
-            facts: Codes of the facts that are looked up.
-            arena: (size,) all intervals; those of the quantities that are looked up stand in it.
+            facts: Codes of the looked-up facts.
+            arena: (size,) all intervals; those of the looked-up quantities are filled in.
 
         Returns:
             States after; the arena holds the intervals of all steps.
@@ -141,7 +141,7 @@ class LinkedProgram:
         return States(now, after if changed else states.moments, tuple(windows))
 
     def interval(self, step: int, rows: tuple[int, ...], arena: Floats) -> Interval:
-        """The interval of a step for one choice of objects, by the rows of these along all axes."""
+        """The interval of a step for one binding of objects, given by rows along all axes."""
         axes, at = self.axes[step], 0
         for axis in axes:
             at = at * self.n + rows[axis]
@@ -149,7 +149,7 @@ class LinkedProgram:
         return arena.item(at), arena.item(at + self.n ** len(axes))
 
     def _lay(self, number: int, step: Operation) -> None:
-        """Say how a step is done."""
+        """Lay out a step."""
         cells = self.n ** len(step.axes)
         stage = max((self._ready[r] for r in step.reads), default=0)
         if isinstance(step.operator, WindowOperator):
@@ -173,7 +173,7 @@ class LinkedProgram:
     def _row(
         self, number: int, step: Operation, cells: int
     ) -> tuple[list[int], tuple[float, float]]:
-        """The instruction of a step that the virtual machine does."""
+        """The virtual machine's instruction for a step."""
         row, numbers = [0] * vm.WIDTH, (*step.numbers, 0.0, 0.0)
         row[vm.DEST], row[vm.CELLS] = self.places[number], cells
         row[vm.MASK] = bits(step.axes)
@@ -199,7 +199,7 @@ class LinkedProgram:
         return row, (numbers[0], numbers[1])
 
     def _wide(self, read: int, axes: frozenset[int]) -> int:
-        """Where a step's intervals stand for objects along some axes."""
+        """Position of a step's intervals, broadcast to some axes."""
         own = self.program.steps[read].axes
         if own == axes:
             return self.places[read]
@@ -229,10 +229,10 @@ class LinkedProgram:
 
 
 def _moment(operator: PointOperator) -> tuple[int, float, tuple[float, ...]]:
-    """How the virtual machine does an operator, its span, and what its state is before the first sample."""
+    """Opcode of an operator, its span, and its state before the first sample."""
     match operator:
         case BooleanWindow(kind=kind, high=high):
-            # Before the first sample it may have been otherwise than wanted.
+            # The value before the first sample is unknown.
             op = vm.LASTS if kind == "always" else vm.HAPPENED
             return op, float(high), (np.inf, -np.inf)
         case Unbounded(kind=kind):

@@ -1,7 +1,7 @@
-"""One formula over plain signals that belong to no object, from any source.
+"""A monitor of one formula over plain signals, from any source.
 
-It does the operations of a compiled program one by one on single intervals. What each does is defined
-in `_interval_jit` and in `operators`, for this and for the loops over all choices of objects alike.
+It executes the operations of a compiled program one by one on single intervals. They are defined in
+`_interval_jit` and `operators`, shared with the loops over all bindings of objects.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Inter
 
 _ON = Scalars()
 _OPEN, _FORESEEN = -2, -1
-"""Where, behind the states of operators, the samples stand that are not judged yet, and what is foreseen."""
+"""Indices, after the states of operators, of the samples without a verdict yet, and of the early verdict."""
 
 
 class Monitor:
-    """Judges a formula at every sample of some signals, at the same cost whatever its windows.
+    """Evaluates a formula at every sample of some signals, at a cost independent of its windows.
 
     >>> from visup.rules.language.parser import parse_formula
     >>> from visup.rules.predicates.vocabulary import signals
@@ -53,7 +53,7 @@ class Monitor:
     >>> [monitor.step(t, {"x": x}) for t, x in ((0.0, 3.0), (0.1, 4.0), (0.2, 2.0), (0.3, 0.0))]
     [(-inf, 2.0), (-inf, 2.0), (1.0, 1.0), (-1.0, -1.0)]
 
-    What is decided before a window of the future is over, `foreseen` tells if asked to:
+    With `early`, `foreseen` returns what is decided before a window of the future is over:
 
     >>> monitor = Monitor(parse_formula("eventually[60 s] x() > 1", signals("x")), early=True)
     >>> _ = monitor.step(0.0, {"x": 3.0})  # of a minute ago
@@ -62,13 +62,13 @@ class Monitor:
 
     Args:
         formula: Its quantities are the signals, written `name()`.
-        early: Whether to find at every sample what is decided by then, which costs up to twice as much.
+        early: Whether to compute early verdicts at every sample, which up to doubles the cost.
 
     Attributes:
-        delay: How many seconds late a verdict comes: what is reported at t is about t - delay.
-        early_delay: The same of what is foreseen.
-        state: All that is retained, an immutable value: microseconds of the last sample, or None
-            before it, and what the operators remember. Put back an older one to go on from it.
+        delay: Delay of verdicts, seconds: the result at t is about t - delay.
+        early_delay: The same for early verdicts.
+        state: The complete state, immutable: microseconds of the last sample, or None before the first,
+            and the states of the operators. Restore an older one to continue from it.
     """
 
     def __init__(self, formula: Formula, *, early: bool = False) -> None:
@@ -84,7 +84,7 @@ class Monitor:
         self.state: tuple[int | None, tuple[Any, ...]] = (None, (*states, Queue(), UNKNOWN))
 
     def step(self, time: float, values: Signals) -> Interval:
-        """Take in one sample.
+        """Process one sample.
 
         Args:
             time: Seconds, later than all before.
@@ -94,7 +94,7 @@ class Monitor:
             The robustness interval of the formula; see `verdict`.
 
         Raises:
-            SettingsError: The time is no number, or not later than the one before; a signal is a
+            SettingsError: The time is not a number, or not later than the previous one; a signal is a
                 reversed interval.
         """
         then, before = self.state
@@ -111,34 +111,33 @@ class Monitor:
         return found[self._at]
 
     def foreseen(self) -> Interval:
-        """What is decided at the last sample of the moment `early_delay` before it.
+        """The early verdict at the last sample, about the moment `early_delay` before it.
 
-        The robustness interval that `step` returns in the end, `delay` after that moment, lies within
-        this one: what is true or false here stays so. Of a monitor that is not early it is the same as
-        what `step` returned.
+        The interval that `step` returns in the end, `delay` after that moment, lies within this one: what
+        is true or false here stays so. Without `early` it is the same as the result of `step`.
         """
         foreseen: Interval = self.state[1][_FORESEEN]
         return foreseen
 
     def finish(self, at_end: AtEnd = "unknown") -> list[tuple[float, Interval]]:
-        """What `step` would still report if there were no more samples; can be called at any time.
+        """The pending verdicts if there were no more samples; can be called at any time.
 
         Args:
-            at_end: What becomes of what is not decided by then.
+            at_end: Treatment of undecided verdicts.
 
         Returns:
-            Seconds of each sample of which no verdict has come, and the robustness interval of it.
+            Seconds of each sample without a verdict so far, and its robustness interval.
         """
-        kept, told = self.state, list[tuple[float, Interval]]()
+        kept, verdicts = self.state, list[tuple[float, Interval]]()
         for moment in kept[1][_OPEN].times():
             found = self.step((moment + self._wait) / TICKS, {})
-            told.append((moment / TICKS, as_ended(found, at_end)))
+            verdicts.append((moment / TICKS, as_ended(found, at_end)))
         self.state = kept
-        return told
+        return verdicts
 
 
 def _run(step: Operation, slot: int) -> Run:
-    """How one operation of a program is done."""
+    """The executor of one operation of a program."""
     one, other = (*step.reads, -1, -1)[:2]
     first, second = (*step.numbers, 0.0, 0.0)[:2]
     if step.operator is not None:
@@ -155,7 +154,7 @@ def _run(step: Operation, slot: int) -> Run:
 
 
 def _looking(name: str) -> Run:
-    """A run that looks a signal up; floats, which most signals are, need no call."""
+    """An executor that looks up a signal; with a fast path for floats."""
 
     def look(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Interval:
         value = signals.get(name)
@@ -167,7 +166,7 @@ def _looking(name: str) -> Run:
 
 
 def _remembering(update: Update, slot: int, one: int, other: int) -> Run:
-    """A run that takes its state from its slot and puts the next one there."""
+    """An executor that reads and writes its state in a slot."""
 
     def single(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
         after[slot], value = update(before[slot], now, v[one])
@@ -203,11 +202,11 @@ _FUNCTIONS: Mapping[str, Callable[..., Interval]] = {
     "exp": _plain(on_intervals.exponential),
     "power": on_intervals.powered,
 }
-"""What an operation without memory does: (interval, two numbers) or (two intervals, a number)."""
+"""Stateless operations: (interval, two numbers) or (two intervals, a number)."""
 
 
 def _update(operator: TemporalOperator) -> Update:
-    """How an operator takes in a sample of single intervals."""
+    """The update function of an operator for single intervals."""
     match operator:
         case Unbounded(kind=kind):
             return _unbounded(kind)

@@ -1,12 +1,11 @@
-"""Operators over time: each takes in one sample and keeps an immutable state.
+"""Temporal operators: each consumes samples and has an immutable state.
 
-A sample speaks from its moment to the next one, but for no longer than `SAMPLE_HOLD`: what comes after is
-unknown until the next sample, and so is all before the first. Windows are closed; a window holds
-every piece of time that it meets. `docs/rules.md` says it in full, and an oracle in the evaluation
-does it a second time over whole histories.
-
-Those that retain no more than a few numbers for each choice of objects (`BooleanWindow`, `Unbounded`,
-`SampleAndHold`, `HysteresisLatch`) are done by `vm` for all choices at once.
+A sample is valid from its moment to the next one, but for no longer than `SAMPLE_HOLD`: after that the value
+is unknown until the next sample, as it is before the first. Windows are closed; a window includes every piece
+of time that it meets. `docs/rules.md` has the full definition, and an oracle in the tests evaluates it a
+second time over whole histories.
+ Operators that retain only a few numbers per binding of objects (`BooleanWindow`, `Unbounded`,
+`SampleAndHold`, `HysteresisLatch`) are executed by `vm` for all bindings at once.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from visup.rules.monitoring.beside_windows import (
+from visup.rules.monitoring.further_operators import (
     BegunWindow,
     DelayedUnbounded,
     EndedWindow,
@@ -28,10 +27,10 @@ from visup.rules.monitoring.sliding import Fold, Queue, SlidingState, initial, m
 
 @dataclass(frozen=True)
 class SlidingWindow:
-    """The least or the greatest over a window, and `since` within one.
+    """The minimum or maximum over a window, or `since` or `until` within one.
 
     Attributes:
-        kind: 'always' (least), 'once' (greatest), 'since' or 'until'; the last two take two parts.
+        kind: 'always' (minimum), 'once' (maximum), 'since' or 'until'; the last two have two operands.
         low: How long before now the window ends, microseconds.
         high: How long before now it begins.
     """
@@ -41,7 +40,7 @@ class SlidingWindow:
     high: int
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its parts at a sample."""
+        """The update function for a sample of its operands."""
         fold, low, high = self._fold(algebra), self.low, self.high
         nothing = algebra.constant(UNKNOWN)
         unknown = (nothing, nothing) if self._pair else nothing
@@ -67,7 +66,7 @@ class SlidingWindow:
         return pair if self._pair else single
 
     def _fold(self, algebra: Algebra) -> Fold:
-        """How the values of neighbouring pieces of time are joined."""
+        """The fold of the values of adjacent pieces of time."""
         least, most = algebra.least, algebra.most
 
         def since(older: Any, newer: Any) -> Any:
@@ -84,11 +83,11 @@ class SlidingWindow:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return (2 if self._pair else 1) * (2 * max_samples(self.high) + 2)
 
     def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
-        """The same state for other objects; the new ones have no past."""
+        """The state for other objects; new ones have no past."""
         if self._pair:
             return mapped(state, lambda v: (pick(v[0], UNKNOWN), pick(v[1], UNKNOWN)))
         return mapped(state, lambda v: pick(v, UNKNOWN))
@@ -96,7 +95,7 @@ class SlidingWindow:
 
 @dataclass(frozen=True)
 class BooleanWindow:
-    """`for` and `within` of what is no matter of degree: its state is one moment, not a window.
+    """`for` and `within` of a Boolean: the state is one moment instead of a window.
 
     Attributes:
         kind: 'always' or 'once'.
@@ -108,13 +107,13 @@ class BooleanWindow:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 1
 
 
 @dataclass(frozen=True)
 class Unbounded:
-    """`always`, `once` and `since` over all that was watched.
+    """`always`, `once` and `since` over the whole past.
 
     Attributes:
         kind: 'always', 'once' or 'since'.
@@ -124,7 +123,7 @@ class Unbounded:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 1
 
 
@@ -132,16 +131,16 @@ MAYBE: Interval = (0.0, 1.0)
 
 
 class CountState(NamedTuple):
-    """How much has been counted.
+    """The state of a count.
 
     Attributes:
         then: Time of the last sample.
-        clock: What counts: microseconds, or samples.
+        clock: The counter: microseconds, or samples.
         born: The clock at the first sample.
-        total: (surely, possibly) true up to the clock.
-        rate: How `total` grows with the clock from here on.
-        begin: (clock, (total, rate)) at the piece in which the window begins.
-        queue: The same of all pieces after it.
+        total: (certainly, possibly) true up to the clock.
+        rate: Growth of `total` per unit of the clock from here on.
+        begin: (clock, (total, rate)) at the piece that contains the start of the window.
+        queue: The same for all later pieces.
     """
 
     then: int
@@ -155,7 +154,7 @@ class CountState(NamedTuple):
 
 @dataclass(frozen=True)
 class SlidingCount:
-    """`f in 60 % of 2 s`, `f in 3 of 5 samples`: how much above the least it was true.
+    """`f in 60 % of 2 s`, `f in 3 of 5 samples`: by how much the count exceeds the least.
 
     Attributes:
         least: Share of the time, or number of samples.
@@ -168,9 +167,9 @@ class SlidingCount:
     samples: bool
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its part at a sample."""
+        """The update function for a sample of its operand."""
         a, maybe = algebra, algebra.constant(MAYBE)
-        # Counted in whole samples or microseconds, so that what just suffices is told exactly.
+        # Counted in integers, so that a count that just suffices is exact.
         enough = -self.least if self.samples else -round(self.least * self.span)
 
         def step(state: CountState | None, now: int, value: Any) -> tuple[CountState, Any]:
@@ -195,7 +194,7 @@ class SlidingCount:
         return step
 
     def _added(self, a: Algebra, state: CountState, now: int, clock: int, held: Any) -> CountState:
-        """The tally with a sample: of samples it counts at once, of time while it stands."""
+        """Add a sample to the count: samples count at once, time while the value lasts."""
         if self.samples:
             clock, total, rate = clock + 1, a.tallied(state.total, held), a.constant((0.0, 0.0))
         else:
@@ -206,11 +205,11 @@ class SlidingCount:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 2 * ((self.span if self.samples else max_samples(self.span)) + 2)
 
     def rows(self, state: CountState, pick: SelectObjects) -> CountState:
-        """The same state for other objects; the new ones have no past."""
+        """The state for other objects; new ones have no past."""
 
         def total(clock: int, value: Any) -> Any:
             return pick(value, (0.0, float(clock - state.born)))
@@ -229,42 +228,42 @@ class SlidingCount:
 
 @dataclass(frozen=True)
 class SampleAndHold:
-    """`last(x, 0.5 s)`: what was known last, while it is not too old.
+    """`last(x, 0.5 s)`: the last known value, while it is not too old.
 
     Attributes:
-        age: Microseconds.
+        age: Greatest age, microseconds.
     """
 
     age: int
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 2
 
 
 @dataclass(frozen=True)
 class HysteresisLatch:
-    """A comparison with two thresholds: the second one counts from when it is true to when it is false."""
+    """A comparison with hysteresis: the second threshold applies while it is true."""
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 1
 
 
 @dataclass(frozen=True)
 class ValueWhenTrue:
-    """`let x be q at f`: what q was when f was last known to be true; unknown before it ever was."""
+    """`let x be q at f`: the value of q when f was last known true; unknown before."""
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 1
 
 
 PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch | ValueWhenTrue
-"""Operators whose state is a few numbers for each choice of objects."""
+"""Operators whose state is a few numbers per binding of objects."""
 WindowOperator = (
     SlidingWindow
     | SlidingCount
@@ -274,6 +273,6 @@ WindowOperator = (
     | FollowedWindow
     | PreviousSample
 )
-"""Operators that retain a whole window, or what `vm` has no loop for."""
+"""Operators that retain a whole window, or that `vm` does not implement."""
 TemporalOperator = PointOperator | WindowOperator
-"""What remembers something of one formula or quantity from sample to sample."""
+"""An operator with state."""

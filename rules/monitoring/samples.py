@@ -1,4 +1,4 @@
-"""For how long a sample speaks, how near two may be, and how an operator takes one in."""
+"""Validity and spacing of samples, and the signatures of updates."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from visup.rules.formula.units import ticks
 from visup.rules.monitoring.intervals import Interval
 
 SAMPLE_HOLD = ticks(0.5)
-"""How long one sample speaks for what follows, microseconds."""
+"""How long a sample remains valid, microseconds."""
 MIN_SPACING = ticks(0.01)
-"""Samples closer than this are not taken in, which bounds what a window holds; microseconds."""
+"""Samples closer than this are skipped, which bounds the content of a window; microseconds."""
 LONG_AGO = -(2**62)
 
 Update = Callable[..., tuple[Any, Any]]
-"""(state before or None at the first sample, microseconds, intervals of the parts) -> (state after,
-the interval of the whole)."""
+"""(state before or None at the first sample, microseconds, intervals of the operands) -> (state after,
+interval of the result)."""
 
 
 def max_samples(span: int) -> int:
-    """Most samples of a span in microseconds, with one for each silence and one at either end."""
+    """Most samples in a span, microseconds, with one for each gap and one at either end."""
     return span // MIN_SPACING + span // SAMPLE_HOLD + 2
 
 
 SelectObjects = Callable[[Any, Interval], Any]
-"""(intervals, what those of new objects are) -> intervals of the objects there are now."""
+"""(intervals, interval of new objects) -> intervals of the current objects."""

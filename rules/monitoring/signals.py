@@ -1,4 +1,4 @@
-"""Samples of plain signals from any source: what is taken for a time, for a value, for unknown."""
+"""Samples of plain signals: conversion of times and values, with NaN as unknown."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from visup.rules.formula.units import TICKS
 from visup.rules.monitoring.intervals import UNKNOWN, Interval
 
 SignalValue = SupportsFloat | Interval | None
-"""A number of Python or NumPy, an interval, or None where nothing is known."""
+"""A number of Python or NumPy, an interval, or None for unknown."""
 Signals = Mapping[str, SignalValue]
 
 
 def later(time: float, before: int | None) -> int:
-    """The moment of a sample in microseconds, which must come after the one before."""
+    """The time of a sample in microseconds, which must be later than the previous one."""
     try:
         now = round(time * TICKS)
-    except (OverflowError, TypeError, ValueError):  # infinite, or no number
+    except (OverflowError, TypeError, ValueError):  # infinite, or not a number
         raise SettingsError(
             f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
         ) from None
@@ -33,7 +33,7 @@ _LEAVE_OUT = "leave samples without a time out"
 
 
 def known_interval(value: SignalValue) -> Interval:
-    """What a signal says, in Python's floats: those of NumPy are slower and warn."""
+    """The interval of a signal, in Python floats: those of NumPy are slower and warn."""
     if type(value) is float and value == value:  # NaN is not equal to itself
         return (value, value)
     if value is None:

@@ -1,11 +1,11 @@
-"""Windows that slide over samples at a constant cost, in values that are never changed.
+"""Sliding-window aggregation at constant cost per sample, with immutable states.
 
-What a window holds stands in two linked lists of tuples, the older part with the fold of all that
-follows each, the newer part with the fold of all of it ("two stacks"; Tangwongsan, Hirzel and
-Schneider, "General incremental sliding-window aggregation", 2015). A sample is pushed once, folded
-anew once when the older part has run out, and dropped once: three steps whatever the window. Since
-no cell is ever changed, the state before a step stays good after it, and shares all but a few
-cells with the state after it: snapshots of a mind cost little, and one may go on from any of them.
+The content of a window is two linked lists of tuples, the older one with the fold of each element and all
+that follow, the newer one with the fold of all of it ("two stacks"; Tangwongsan, Hirzel and Schneider,
+"General incremental sliding-window aggregation", 2015). A sample is pushed once, refolded once when the older
+list is exhausted, and dropped once: three steps whatever the window. Since no cell is ever modified, the
+state before a step stays valid and shares all but a few cells with the state after it: snapshots are cheap,
+and one may continue from any of them.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 Fold = Callable[[Any, Any], Any]
-"""Joins what is older with what is newer; associative."""
+"""Combines an older with a newer value; associative."""
 Change = Callable[[Any], Any]
 Cell = tuple[Any, ...] | None
-"""A linked list: (time, value, rest) or, of the older part, (time, value, fold, rest)."""
+"""A linked list: (time, value, rest) or, in the older part, (time, value, fold, rest)."""
 
 
 class Queue(NamedTuple):
-    """First in, first out; immutable.
+    """An immutable first-in, first-out queue.
 
     Attributes:
         front: The older ones, oldest first.
@@ -32,18 +32,18 @@ class Queue(NamedTuple):
     back: Cell = None
 
     def push(self, time: int, value: Any) -> Queue:
-        """The same queue with one more at its end."""
+        """The queue with an element appended."""
         return Queue(self.front, (time, value, self.back))
 
     def advance(self, limit: int, current: Any) -> tuple[Queue, Any]:
-        """Take out all that came up to a moment.
+        """Remove all elements up to a moment.
 
         Args:
             limit: The moment; microseconds.
-            current: What is returned when none did.
+            current: Returned when there is none.
 
         Returns:
-            The rest, and the (time, value) of the last one that was taken out.
+            The rest, and the (time, value) of the last removed element.
         """
         front, back = self
         while True:
@@ -55,14 +55,14 @@ class Queue(NamedTuple):
             current, front = (front[0], front[1]), front[2]
 
     def changed(self, change: Callable[[int, Any], Any]) -> Queue:
-        """The same queue with every value changed by its time and value."""
+        """The queue with a function of time and value applied to every value."""
         queue = Queue()
         for time, value in self._cells():
             queue = queue.push(time, change(time, value))
         return queue
 
     def times(self) -> list[int]:
-        """When each came, oldest first; microseconds."""
+        """Times of the elements, oldest first; microseconds."""
         return [time for time, _ in self._cells()]
 
     def _cells(self) -> list[tuple[int, Any]]:
@@ -79,12 +79,12 @@ class SlidingState(NamedTuple):
 
     Attributes:
         then: Time of the last sample, microseconds.
-        current: Value of the piece of time in which the window begins.
-        front: Older samples: (time, value, fold of it and all newer ones of the front, rest).
+        current: Value of the piece of time that contains the start of the window.
+        front: Older samples: (time, value, fold from it to the end of the front, rest).
         back: Newer samples, newest first: (time, value, rest).
-        fold: Fold of all of the back, or None when there are none.
-        waiting: Samples that are too new for a window that ends before now.
-        head: Fold of the current value and all of the front.
+        fold: Fold of the back, or None if empty.
+        waiting: Samples too new for a window that ends before now.
+        head: Fold of the current value and the front.
     """
 
     then: int
@@ -97,25 +97,25 @@ class SlidingState(NamedTuple):
 
 
 def initial(now: int, value: Any) -> SlidingState:
-    """The state before any sample, with what is known of the time before."""
+    """The state before any sample, with the value of the time before."""
     return SlidingState(now, value, None, None, None, Queue(), value)
 
 
 def slide(
     state: SlidingState, now: int, value: Any, low: int, high: int, fold: Fold
 ) -> tuple[SlidingState, Any]:
-    """Take in one sample.
+    """Process one sample.
 
     Args:
         state: The state before.
         now: Time of the sample, microseconds, later than all before.
-        value: Its value, which stands from now to the next sample.
+        value: Its value, valid from now to the next sample.
         low: How long before now the window ends, microseconds.
         high: How long before now it begins.
-        fold: Joins values.
+        fold: The fold.
 
     Returns:
-        The state after, and the fold of all values that stood at any time of the window.
+        The state after, and the fold of all values valid at some time of the window.
     """
     _, current, front, back, newer, waiting, head = state
     if low:
@@ -138,19 +138,19 @@ def slide(
             head = fold(current, front[2])
         if front[0] > limit:
             break
-        # What was folded of it and all that follow it is the fold of all that is left now.
+        # The fold stored with it covers exactly the remaining front.
         _, current, head, front = front
     result = head if back is None else fold(head, newer)
     return SlidingState(now, current, front, back, newer, waiting, head), result
 
 
 def later(state: SlidingState, fold: Fold, nothing: Any) -> Any:
-    """The fold of what began after the window did, that is, without what stood where it begins.
+    """The fold of the values that began inside the window, without the one valid at its start.
 
     Args:
-        state: After a sample.
-        fold: Joins values.
-        nothing: What it is when nothing began.
+        state: The state after a sample.
+        fold: The fold.
+        nothing: The result when no value began.
     """
     front = None if state.front is None else state.front[2]
     if state.back is None:
@@ -159,7 +159,7 @@ def later(state: SlidingState, fold: Fold, nothing: Any) -> Any:
 
 
 def _next(queue: Queue, limit: int) -> tuple[Queue, tuple[int, Any] | None]:
-    """The oldest one, taken out, when it came up to a moment."""
+    """Remove the oldest element if it is not after a moment."""
     front, back = queue
     if front is None:
         while back is not None:
@@ -170,7 +170,7 @@ def _next(queue: Queue, limit: int) -> tuple[Queue, tuple[int, Any] | None]:
 
 
 def _turned(back: Cell, fold: Fold) -> tuple[Any, ...]:
-    """The back as a front."""
+    """The back converted to a front."""
     assert back is not None
     time, value, back = back
     front: tuple[Any, ...] = (time, value, value, None)
@@ -181,7 +181,7 @@ def _turned(back: Cell, fold: Fold) -> tuple[Any, ...]:
 
 
 def mapped(state: SlidingState, change: Change) -> SlidingState:
-    """The same state with every value changed, as when objects come and go."""
+    """The state with a function applied to every value, as when objects come and go."""
     front: Cell = None
     for time, value, folded in reversed(_listed(state.front, 3)):
         front = (time, change(value), change(folded), front)

@@ -1,4 +1,4 @@
-"""What operators remember of the objects of a sample, and of other ones when these come and go."""
+"""States of operators, and their re-indexing when objects come and go."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from visup.rules.monitoring.vm import Floats
 
 
 class States(NamedTuple):
-    """What the operators of a program remember; never changed, shared where nothing changes.
+    """The states of a program's operators; immutable, shared where unchanged.
 
     Attributes:
         then: Microseconds of the last sample, or None before the first.
-        moments: Of those that keep but a moment, one after the other.
-        windows: Of those that keep windows, one each; None before the first sample.
+        moments: States of point operators, concatenated.
+        windows: States of window operators, one each; None before the first sample.
     """
 
     then: int | None
@@ -36,13 +36,13 @@ class States(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PointSlot:
-    """Where the state of an operator stands that keeps but a moment.
+    """The position of a point operator's state.
 
     Attributes:
         operator: The operator.
-        axes: How many axes its objects have.
-        begin: Its first number.
-        fills: What each of its parts, one number for each choice of objects, is before the first sample.
+        axes: Number of axes of its objects.
+        begin: Index of its first number.
+        fills: Initial value of each part, which has one number per binding of objects.
     """
 
     operator: PointOperator
@@ -53,15 +53,15 @@ class PointSlot:
 
 @dataclass(frozen=True, slots=True)
 class WindowSlot:
-    """An operator that keeps a window.
+    """A window operator.
 
     Attributes:
         operator: The operator.
-        step: How it takes in a sample.
-        axes: How many axes its objects have.
-        reads: Where the intervals of its parts begin.
-        place: Where its own begin.
-        cells: How many intervals each of these has.
+        step: Its update function.
+        axes: Number of axes of its objects.
+        reads: Starts of its operands' intervals.
+        place: Start of its own intervals.
+        cells: Number of intervals of each.
     """
 
     operator: WindowOperator
@@ -72,9 +72,9 @@ class WindowSlot:
     cells: int
 
     def update(self, state: Any, now: int, arena: Floats) -> Any:
-        """The state after a sample, whose intervals it writes."""
+        """The state after a sample; writes the result to the arena."""
         at, size = self.place, 2 * self.cells
-        # What is retained must not change when the arena does.
+        # Copied, since the arena is overwritten.
         parts = [arena[r : r + size].reshape(2, -1).copy() for r in self.reads]
         state, value = self.step(state, now, *parts)
         arena[at : at + size].reshape(2, -1)[:] = value
@@ -83,12 +83,12 @@ class WindowSlot:
 
 @dataclass(frozen=True, slots=True)
 class StateLayout:
-    """Where the states of a program's operators stand for a number of objects.
+    """The layout of the states of a program's operators for a number of objects.
 
     Attributes:
         n: Number of objects.
-        moments: What keeps but a moment.
-        windows: What keeps windows, in the order of their states.
+        moments: The point operators.
+        windows: The window operators, in the order of their states.
     """
 
     n: int
@@ -101,11 +101,11 @@ class StateLayout:
         return States(None, np.concatenate([np.zeros(0), *moments]), (None,) * len(self.windows))
 
     def silenced(self, moments: Floats, end: int) -> Floats:
-        """The states after a sample of which nothing is known.
+        """The states after an unknown sample.
 
         Args:
             moments: The states before.
-            end: Microseconds of it.
+            end: Its time, microseconds.
         """
         moments = moments.copy()
         for m in self.moments:
@@ -123,17 +123,17 @@ class StateLayout:
         return moments
 
     def rerowed(self, states: States, new: StateLayout, rows: NDArray[np.intp], now: int) -> States:
-        """The states for other objects.
+        """The states re-indexed for other objects.
 
         Args:
-            states: States for the objects of this one.
-            new: Where the states of the other ones stand.
-            rows: Where each of these stood before, or -1: nothing is known of its past.
+            states: States for the objects of this layout.
+            new: Layout for the other objects.
+            rows: Former index of each object, or -1 for new ones.
             now: Microseconds of the sample at which they change.
         """
         then, moments, windows = states
         if then is not None and now - then > SAMPLE_HOLD:
-            # The silence is not part of what was watched of those that are new.
+            # The gap does not belong to the observed past of new objects.
             moments, then = self.silenced(moments, then + SAMPLE_HOLD), now - SAMPLE_HOLD
         chosen = [_chosen(rows, self.n, axes) for axes in range(4)]
         after = new.fresh().moments
@@ -156,7 +156,7 @@ class StateLayout:
 
 
 def _chosen(rows: NDArray[np.intp], count: int, axes: int) -> NDArray[np.intp]:
-    """Where each choice of objects stood before among those of `count` objects, or -1."""
+    """Former index of each binding of objects among those of `count` objects, or -1."""
     at = np.zeros((1,) * axes, dtype=np.intp)
     fresh = np.zeros((1,) * axes, dtype=bool)
     for axis in range(axes):
@@ -168,7 +168,7 @@ def _chosen(rows: NDArray[np.intp], count: int, axes: int) -> NDArray[np.intp]:
 def _picker(
     chosen: NDArray[np.intp], cells: int
 ) -> Callable[[IntervalArray, Interval], IntervalArray]:
-    """Takes the intervals of some choices of objects, of the new ones what they are before all samples."""
+    """A function that selects intervals of bindings, with initial values for new ones."""
     fresh = chosen < 0
     at = np.maximum(chosen, 0)
 

@@ -1,9 +1,9 @@
-"""The loops that judge formulas for all choices of objects: one call does many steps of a program.
+"""The virtual machine: compiled loops that execute many steps for all bindings of objects per call.
 
-A program is laid out (`layout`) as rows of numbers: what to do, where the intervals stand that it reads
-and where those go that it makes. All intervals of one sample stand in one array, the lower bounds
-of a step before its upper ones; so do the states of what keeps but a moment. A step does next to
-nothing for one choice of objects, and there are few choices: what counts is the number of calls.
+A program is laid out (`linker`) as rows of numbers: operation, positions of the intervals it reads and of
+those it writes. All intervals of a sample are in one array, the lower bounds of a step before its upper ones;
+so are the states of point operators. A step is cheap per binding, and there are few bindings: the number of
+calls dominates the cost.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ Ints = NDArray[np.int64]
 Codes = NDArray[np.int8]
 
 (OP, DEST, A, B, CELLS, STATE, MASK_A, MASK, AXIS, APART) = range(10)
-"""Columns of an instruction: what to do; where to; where from; of how many choices of objects; where its
-state stands; axes (bits) of what it reads and of what it makes; of a quantifier its axis, and axes
-whose objects it leaves out."""
+"""Columns of an instruction: operation; destination; sources; number of bindings; position of its state; axes
+(bits) of what it reads and of what it writes; for a quantifier its axis, and the axes whose objects it
+excludes. """
 WIDTH = 10
 CHOICE_BITS = 32
-"""There are fewer choices of objects than 2 to that."""
+"""Bits of a binding's number."""
 
 (FACT, SPREAD, NUMBER, NOT, ABS, LEAST, MOST, SHIFT, BELOW, COMPARE, PLUS, MINUS) = range(12)
 (TIMES, OVER, RATE, ROOT, EXP, POWER, SOME, EVERY) = range(12, 20)
@@ -61,22 +61,22 @@ def run(
     before: Floats,
     after: Floats,
 ) -> bool:
-    """Do some steps at one sample.
+    """Execute some steps for one sample.
 
     Args:
         code: (I, WIDTH) instructions.
         numbers: (I, 2) their constants.
-        begin: The first one to be done.
-        end: The first one not to be.
+        begin: First instruction to execute.
+        end: One past the last.
         n: Number of objects.
         now: Microseconds.
-        facts: Codes of facts: above 0 true, below it false.
-        arena: All intervals; those of steps done before are read, those of these are written.
-        before: States of what keeps but a moment.
-        after: The same after the sample; written.
+        facts: Codes of facts: above 0 true, below 0 false.
+        arena: All intervals; earlier steps are read, these are written.
+        before: States of point operators.
+        after: Output: the states after the sample.
 
     Returns:
-        Whether any of their states has changed.
+        Whether any state has changed.
     """
     changed = False
     for i in range(begin, end):
@@ -140,7 +140,7 @@ def _arithmetic(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floa
 
 @compiled
 def _read_facts(facts: Codes, row: Ints, n: int, arena: Floats) -> None:
-    """What is true is [inf, inf], what is false [-inf, -inf]; the other way round if so asked."""
+    """True becomes [inf, inf], false [-inf, -inf]; negated on request."""
     c, out, turned = row[CELLS], row[DEST], row[AXIS]
     for k in range(c):
         code = facts[row[A] + (k % n * n + k // n if turned else k)]
@@ -150,7 +150,7 @@ def _read_facts(facts: Codes, row: Ints, n: int, arena: Floats) -> None:
 
 @compiled
 def _strides(mask: int, n: int) -> tuple[int, int, int]:
-    """How far apart neighbours along each axis stand; 0 along axes that are not there."""
+    """Strides along each axis; 0 for absent axes."""
     third = 1 if mask & 4 else 0
     second = (n if mask & 4 else 1) if mask & 2 else 0
     first = ((n if mask & 4 else 1) * (n if mask & 2 else 1)) if mask & 1 else 0
@@ -159,9 +159,9 @@ def _strides(mask: int, n: int) -> tuple[int, int, int]:
 
 @compiled
 def _along_axis(row: Ints, n: int, arena: Floats) -> None:
-    """The same intervals for more objects, on which they do not depend.
+    """Broadcast intervals to further objects, on which they do not depend.
 
-    Or the greatest (`exists`) or the least (`forall`) along an axis, of objects that are not left out.
+    Or reduce by maximum (`exists`) or minimum (`forall`) along an axis, over objects not excluded.
     """
     op, mask, c, axis, apart = row[OP], row[MASK], row[CELLS], row[AXIS], row[APART]
     first, second, third = _strides(row[MASK_A], n)
@@ -193,7 +193,7 @@ def _along_axis(row: Ints, n: int, arena: Floats) -> None:
 def _update_states(
     row: Ints, now: float, span: float, arena: Floats, before: Floats, after: Floats
 ) -> bool:
-    """One operator that retains a few numbers of each choice of objects; whether any has changed."""
+    """Update one point operator; returns whether its state has changed."""
     op = row[OP]
     if op == RECALL:
         return _recall(row, now, span, arena, before, after)
@@ -235,7 +235,7 @@ def _latch(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
 
 @compiled
 def _note(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
-    """What a quantity was when a formula was last true."""
+    """The value of a quantity when a formula was last true."""
     c, out, a, b, state, changed = row[CELLS], row[DEST], row[A], row[B], row[STATE], False
     for k in range(c):
         holds = arena[b + k] > 0.0
@@ -250,12 +250,12 @@ def _note(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
 def _boolean_window(
     row: Ints, now: float, span: float, arena: Floats, before: Floats, after: Floats
 ) -> bool:
-    """Since when either bound has been as wanted: infinite while it is, else up to when it was not."""
+    """State per bound: infinite while it is as required, else the time until which it was not."""
     op, c, out, a, state, changed = row[OP], row[CELLS], row[DEST], row[A], row[STATE], False
     for k in range(2 * c):
         kept, value, at = before[state + k], arena[a + k], out + k
         if op == HAPPENED:
-            # Of `within` it is the upper bound that what is not known widens, and which stands first.
+            # For `within`, unknown values widen the upper bound, which is stored first.
             other = k + c if k < c else k - c
             value, at = -arena[a + other], out + other
         new = np.inf if value < 0.0 else now if kept == np.inf else kept
@@ -281,18 +281,18 @@ def _accumulate(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool
 
 @compiled
 def find_true(rules: Ints, n: int, arena: Floats, found: Ints) -> int:
-    """Every choice of objects for which a rule is true and not suspended.
+    """Find all bindings of objects for which a rule is true and not suspended.
 
     Args:
-        rules: (R, 6) of each where `when` stands and its axes (bits); where `unless` stands, or -1, and
-            its axes; how many variables it has; pairs of these that must not be one object (bits: 01,
-            02, 12).
+        rules: (R, 6) per rule: position of `when` and its axes (bits); position of `unless`, or -1, and
+            its axes; number of variables; pairs of these that must be distinct (bits: 01, 02, 12).
+
         n: Number of objects.
         arena: All intervals.
-        found: The number of the rule, times 2 to the `CHOICE_BITS`, and that of the choice; written.
+        found: Output: rule number shifted by `CHOICE_BITS`, plus the number of the binding.
 
     Returns:
-        How many were found.
+        Number of bindings found.
     """
     count = 0
     for r in range(len(rules)):
@@ -322,5 +322,5 @@ def find_true(rules: Ints, n: int, arena: Floats, found: Ints) -> int:
 
 
 def bits(axes: Any) -> int:
-    """Axes as one number."""
+    """Axes as a bit mask."""
     return sum(1 << axis for axis in axes)

@@ -14,9 +14,9 @@ from tests.rules.safety.test_reasoner import closing
 from visup.agent import Truth
 from visup.rules.formula.nodes import Formula
 from visup.rules.language.parser import parse_formula, parse_rules
-from visup.rules.monitoring.beside_windows import FollowedWindow
 from visup.rules.monitoring.compiler import Compiler
 from visup.rules.monitoring.early import EarlyCompiler
+from visup.rules.monitoring.further_operators import FollowedWindow
 from visup.rules.monitoring.intervals import FALSE, TRUE, AtEnd, Scalars, verdict
 from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals

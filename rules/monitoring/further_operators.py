@@ -1,8 +1,8 @@
-"""Operators beside windows: previous samples, delayed values, onsets and ends within a window.
+"""Further operators: previous samples, delayed values, onsets and ends within a window.
 
-`since` with a lower bound asks its left side also after the window, `until` also before it;
-`always`, `once` and `since` without a window leave out what was told of the time before the first
-sample. All keep immutable states as the operators of `operators.py` do.
+`since` with a lower bound also requires its left side after the window, `until` also before it; `always`,
+`once` and `since` without a window ignore verdicts about the time before the first sample. All have immutable
+states, like the operators of `operators.py`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from visup.rules.monitoring.sliding import SlidingState, initial, later, mapped,
 
 @dataclass(frozen=True)
 class PreviousSample:
-    """`previous f`: what it was at the sample before; unknown after a silence."""
+    """`previous f`: the value at the previous sample; unknown after a gap."""
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its part at a sample."""
+        """The update function for a sample of its operand."""
         unknown = algebra.constant(UNKNOWN)
 
         def step(state: tuple[int, Any] | None, now: int, value: Any) -> tuple[Any, Any]:
@@ -32,26 +32,26 @@ class PreviousSample:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 1
 
     def rows(self, state: tuple[int, Any], pick: SelectObjects) -> tuple[int, Any]:
-        """The same state for other objects; those that are new have no past."""
+        """The state for other objects; new ones have no past."""
         return state[0], pick(state[1], UNKNOWN)
 
 
 @dataclass(frozen=True)
 class BegunWindow:
-    """The least of what began in a window that ends now; true when nothing did.
+    """The minimum over values that began in a window ending now; true if none did.
 
     Attributes:
-        high: Length of the window, microseconds; what stands where it begins is left out.
+        high: Length of the window, microseconds; the value at its start is excluded.
     """
 
     high: int
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its part at a sample."""
+        """The update function for a sample of its operand."""
         unknown, nothing = algebra.constant(UNKNOWN), algebra.constant(TRUE)
         least, high = algebra.least, self.high
 
@@ -67,17 +67,17 @@ class BegunWindow:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 2 * max_samples(self.high) + 2
 
     def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
-        """The same state for other objects; those that are new have no past."""
+        """The state for other objects; new ones have no past."""
         return mapped(state, lambda v: pick(v, UNKNOWN))
 
 
 @dataclass(frozen=True)
 class FollowedWindow:
-    """Whether in a window that ends now something was true, and something else then or later.
+    """Whether, in a window ending now, one formula was true and another at that time or later.
 
     Attributes:
         high: Length of the window, microseconds.
@@ -86,12 +86,12 @@ class FollowedWindow:
     high: int
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its parts at a sample."""
+        """The update function for a sample of its operands."""
         least, most, high = algebra.least, algebra.most, self.high
         unknown = (algebra.constant(UNKNOWN),) * 3
 
         def fold(older: Any, newer: Any) -> Any:
-            # (what has been followed, the first, the second)
+            # (first followed by second, first, second)
             followed = most(most(older[0], newer[0]), least(older[1], newer[2]))
             return followed, most(older[1], newer[1]), most(older[2], newer[2])
 
@@ -110,20 +110,20 @@ class FollowedWindow:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 3 * (2 * max_samples(self.high) + 2)
 
     def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
-        """The same state for other objects; those that are new have no past."""
+        """The state for other objects; new ones have no past."""
         return mapped(state, lambda v: tuple(pick(part, UNKNOWN) for part in v))
 
 
 class EndedState(NamedTuple):
-    """What `EndedWindow` retains.
+    """The state of `EndedWindow`.
 
     Attributes:
         standing: The value that has not ended.
-        window: The values that have, each at its end.
+        window: The values that have ended, each at its end.
     """
 
     standing: Any
@@ -132,18 +132,18 @@ class EndedState(NamedTuple):
 
 @dataclass(frozen=True)
 class EndedWindow:
-    """The least of what ended in a window before now; true when nothing did.
+    """The minimum over values that ended in a window before now; true if none did.
 
     Attributes:
         low: How long before now the window ends, microseconds.
-        high: How long before now it begins; what ended there is left out.
+        high: How long before now it begins; a value ending exactly there is excluded.
     """
 
     low: int
     high: int
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its part at a sample."""
+        """The update function for a sample of its operand."""
         unknown, nothing = algebra.constant(UNKNOWN), algebra.constant(TRUE)
         least, low, high = algebra.least, self.low, self.high
 
@@ -159,21 +159,21 @@ class EndedWindow:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 2 * max_samples(self.high) + 3
 
     def rows(self, state: EndedState, pick: SelectObjects) -> EndedState:
-        """The same state for other objects; those that are new have no past."""
+        """The state for other objects; new ones have no past."""
         window = mapped(state.window, lambda v: pick(v, UNKNOWN))
         return EndedState(pick(state.standing, UNKNOWN), window)
 
 
 class LateState(NamedTuple):
-    """What `DelayedUnbounded` retains.
+    """The state of `DelayedUnbounded`.
 
     Attributes:
         then: Time of the last sample, microseconds.
-        born: Time of the first sample, as an interval without width; infinite before it.
+        born: Time of the first sample, as a degenerate interval; infinite before it.
         kept: The value so far.
     """
 
@@ -184,27 +184,27 @@ class LateState(NamedTuple):
 
 @dataclass(frozen=True)
 class DelayedUnbounded:
-    """`always`, `once` and `since` of what is told late: from the first sample's moment on.
+    """`always`, `once` and `since` of delayed values, from the time of the first sample on.
 
-    What is told first is about moments before the first sample, which are no part of what was
-    watched; of these nothing is known.
+    The first delayed values are about times before the first sample, which do not count as observed and
+    are unknown.
 
     Attributes:
         kind: 'always', 'once' or 'since'.
-        delay: How late the parts are told, microseconds.
+        delay: Delay of the operands, microseconds.
     """
 
     kind: str
     delay: int
 
     def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its parts at a sample."""
+        """The update function for a sample of its operands."""
         a, unknown = algebra, algebra.constant(UNKNOWN)
         lasts = self.kind == "always"
 
         def started(born: Any, moment: int) -> Any:
-            """TRUE where a moment is not before the first sample, else FALSE."""
-            # Half a microsecond more, so that nothing is 0, which has no sign.
+            """TRUE if a moment is not before the first sample, else FALSE."""
+            # Half a microsecond is added to avoid 0, which has no sign.
             return a.scaled(a.shifted(a.scaled(born, -1.0), moment + 0.5), inf)
 
         def joined(kept: Any, on: Any, *values: Any) -> Any:
@@ -225,10 +225,10 @@ class DelayedUnbounded:
             on = started(born, now - self.delay)
             kept = joined(kept, on, *values)
             if lasts:
-                told = a.least(kept, a.most(unknown, on))
+                reported = a.least(kept, a.most(unknown, on))
             else:
-                told = a.most(kept, a.least(unknown, a.scaled(on, -1.0)))
-            return LateState(now, born, kept), told
+                reported = a.most(kept, a.least(unknown, a.scaled(on, -1.0)))
+            return LateState(now, born, kept), reported
 
         return step
 
@@ -241,11 +241,11 @@ class DelayedUnbounded:
 
     @property
     def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
+        """Most intervals in the state for one binding of objects."""
         return 2
 
     def rows(self, state: LateState, pick: SelectObjects) -> LateState:
-        """The same state for other objects; those that are new have no past."""
+        """The state for other objects; new ones have no past."""
         return LateState(state.then, pick(state.born, _UNBORN), pick(state.kept, self._empty))
 
 
