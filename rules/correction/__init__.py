@@ -1,5 +1,5 @@
-"""Error-correcting parsing: the smallest edit that brings a text into its grammar.
+"""Error-correcting parsing: the least-cost edit that brings a text into its grammar.
 
-It is independent of the language. Read `automaton.py` (the parser as a stack of states), `words.py` (what
-each word of a wrong text may be), then `search.py` (repairs of least cost).
+It is independent of the language. Read `automaton.py` (LR parsing with a stack of states), `words.py` (tokens
+of a faulty text), then `search.py` (least-cost repairs).
 """

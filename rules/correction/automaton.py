@@ -1,6 +1,6 @@
-"""The LR automaton of a Lark grammar as plain stacks of states: what may come next, and what follows.
+"""The LR automaton of a Lark grammar, as plain stacks of states.
 
-Lark's own parser builds a tree as it goes; to try thousands of changes of a text only the states are needed.
+Lark's parser builds a tree; trying thousands of edits needs only the states.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ class LrAutomaton:
     """The states of an LALR parser.
 
     Attributes:
-        states: What each state does at each terminal, and where it goes at each nonterminal.
-        first: The state in which it begins.
-        last: The state in which it has read all.
-        known: Steps that were taken before.
+        states: Action of each state per terminal, and goto per nonterminal.
+        first: The initial state.
+        last: The accepting state.
+        known: Cache of steps.
     """
 
     states: Mapping[int, Mapping[str, Any]]
@@ -39,11 +39,11 @@ class LrAutomaton:
         return cls(table.states, table.start_states[start], table.end_states[start])
 
     def offered(self, stack: Stack) -> list[str]:
-        """Terminals that may come next, and perhaps some that may not."""
+        """Terminals that may come next, and possibly some that may not."""
         return sorted(name for name in self.states[stack[-1]] if name.isupper() or name == END)
 
     def step(self, stack: Stack, terminal: str) -> Stack | None:
-        """The stack after a terminal; None where it cannot come."""
+        """The stack after a terminal; None if it is not accepted."""
         key = stack, terminal
         if key not in self.known:
             self.known[key] = self._step(stack, terminal)

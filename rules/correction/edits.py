@@ -1,7 +1,7 @@
-"""What may be meant where no usual slip is known: small edits next to a fault, each to be tried.
+"""Candidate edits near an error for which no usual slip is known.
 
-Nothing here knows a language: words are put in, replaced and left out, nearest to the fault first, and
-whoever asks tries each of them (local error repair after Burke and Fisher 1987).
+This is independent of the language: words are inserted, replaced and dropped, nearest to the error first, and
+the caller tries each (local error repair after Burke and Fisher 1987).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from visup.rules.correction.everyday import NUMBERS
 
 TOKEN = re.compile(r"::=|<[^<>\n]*>|\"[^\"\n]*\"|\w+(?:\.\d+)?|[<>=!]=|\S")
 NEAR = 3
-"""Words to either side of a fault that are looked at."""
+"""Words considered on either side of an error."""
 WITHIN = (", 2 s", ", 20 px", ", b")
 BEHIND_CALL = (" > 0", " < 5 px", " < 5 s", ")")
 BEHIND_WORD = ("()", ")")
@@ -27,12 +27,12 @@ JOINTS = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """A change of a text.
+    """An edit of a text.
 
-    Attributes:
-        begin: Offset of what is replaced.
-        end: Offset of its end; the same where something is put in.
-        new: What stands there instead.
+    begin: Start offset of the replaced text.
+    end: Its end; equal to the start for an insertion.
+    new: The replacement.
+    old: The replaced text.
         old: What stood there.
     """
 
@@ -42,11 +42,11 @@ class Repair:
     old: str = ""
 
     def applied(self, text: str) -> str:
-        """The text with the change."""
+        """The edited text."""
         return text[: self.begin] + self.new + text[self.end :]
 
     def hint(self, text: str) -> str:
-        """What to do, in words."""
+        """The edit in words."""
         old, new = " ".join(text[self.begin : self.end].split()), " ".join(self.new.split())
         if not old:
             return f"put `{new}` here"
@@ -56,18 +56,18 @@ class Repair:
 def edits(
     line: str, begin: int, length: int, words: Sequence[str], *, unread: bool = True
 ) -> Iterator[Repair]:
-    """Edits of a line, those that keep most of it first.
+    """Edits of a line, least destructive first.
 
     Args:
-        line: The line of the fault.
-        begin: Where the fault begins in it.
-        length: How long it is.
-        words: What may be meant by a word that is not known.
-        unread: Whether the line cannot be read, so that a sign may be missing.
+        line: The line of the error.
+        begin: Start of the error in it.
+        length: Length of the error.
+        words: Possible meanings of an unknown word.
+        unread: Whether the line does not parse, so that a sign may be missing.
     """
     end = min(len(line), begin + max(1, length))
     tokens = [(m.start(), m.end(), m[0]) for m in TOKEN.finditer(line)]
-    # Words are left out whole.
+    # Words are dropped whole.
     end = max([end, *(stop for start, stop, _ in tokens if start < end <= stop)])
     yield from (Repair(at, at, new) for at, new in _put_in(line, begin, end))
     tokens.sort(key=lambda t: _away(t, begin, end))
@@ -89,7 +89,7 @@ def edits(
 
 
 def _ranked(word: str, words: Sequence[str]) -> list[str]:
-    """What may be meant by a word: what is spelt alike."""
+    """Words spelt similarly, best first."""
     return get_close_matches(word, words, n=5, cutoff=ALIKE) if len(word) > 2 else []
 
 
@@ -102,7 +102,7 @@ def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
 
 
 def _of_call(line: str, begin: int) -> Iterator[Repair]:
-    """A call without one of its arguments, or an argument without the call around it."""
+    """Drop an argument of a call, or the call around an argument."""
     name = re.compile(r"\w+\s*\(").match(line, begin)
     parts = list(_arguments(line, name.end())) if name else []
     if name is None or not parts or line[parts[-1][1] : parts[-1][1] + 1] != ")":
@@ -118,7 +118,7 @@ def _of_call(line: str, begin: int) -> Iterator[Repair]:
 
 
 def _arguments(line: str, at: int) -> Iterator[tuple[int, int]]:
-    """Where each argument of a call begins and ends, from behind its bracket on."""
+    """Start and end of each argument of a call, from after its bracket."""
     depth, start = 0, at
     for n in range(at, len(line)):
         depth += (line[n] == "(") - (line[n] == ")")
@@ -132,7 +132,7 @@ def _arguments(line: str, at: int) -> Iterator[tuple[int, int]]:
 def _fillers(
     line: str, near: Iterable[tuple[int, int, str]], words: Sequence[str]
 ) -> Iterator[Repair]:
-    """Several words in a row of which none is known, left out, or taken for a joint of two parts."""
+    """Drop several unknown words in a row, or replace them by a connective."""
     known, run = {*words, *JOINTS}, r"[A-Za-z_]\w*(?:[ ]+[A-Za-z_]\w*)+(?![\w(])"
     places = {start for start, _, _ in near}
     for found in re.finditer(run, line):
@@ -145,7 +145,7 @@ def _fillers(
 def _left_out(
     line: str, begin: int, end: int, near: Iterable[tuple[int, int, str]]
 ) -> Iterator[Repair]:
-    """The fault with what joins it to the rest, then all from a word near it to the end of the line."""
+    """Drop the error with its connective, then everything from a nearby word to the end of the line."""
     joints = "|".join(rf"\b{j}\b" if j.isalpha() else re.escape(j) for j in JOINTS)
     before = re.search(rf"(?:{joints})\s*$", line[:begin])
     after = re.compile(rf"\s*(?:{joints})\s*").match(line, end)
@@ -162,7 +162,7 @@ def _left_out(
 
 
 def _clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
-    """All that stands between the joints to either side of a fault, with one of them."""
+    """Drop the clause between the connectives around an error, with one of them."""
     before = list(re.finditer(joints, line[:begin]))
     after = re.compile(joints).search(line, end)
     start = before[-1].start() if before else None
@@ -173,13 +173,13 @@ def _clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
 
 
 def _away(token: tuple[int, int, str], begin: int, end: int) -> int:
-    """How far a word lies from the fault; 0 within it."""
+    """Distance of a word from the error; 0 inside it."""
     start, stop, _ = token
     return max(0, start - end + 1, begin - stop + 1)
 
 
 def hint_of(line: str, repair: Repair) -> str | None:
-    """A change in the words that `fix_of` understands; None where there is nothing to hold on to."""
+    """An edit in the words that `fix_of` understands; None if it cannot be anchored."""
     old, new = line[repair.begin : repair.end], repair.new
     if not old.strip():
         tokens = [m for m in TOKEN.finditer(line) if m.end() <= repair.begin]

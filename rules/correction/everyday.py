@@ -1,4 +1,4 @@
-"""Everyday speech, whatever the language of a file: signs in words, joints in other tongues, empty words."""
+"""Everyday phrases: signs in words, connectives in other natural languages, filler words."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ FILLERS = frozenset(
         "immediately",
     ]
 )
-"""Words that may be left out without loss."""
+"""Words that may be dropped without loss."""
 
 
 def _phrases(table: Mapping[str, str]) -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
@@ -118,7 +118,7 @@ PHRASES = _by_first_word(_SIGNS, _JOINTS)
 
 
 def meant_by(words: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """What the first of some words mean: how many of them, and the sign or joint.
+    """Meanings of the first words: how many of them, and the sign or connective.
 
     >>> list(meant_by(["at", "least", "20"]))
     [(2, '>=')]

@@ -1,7 +1,7 @@
-"""The least changes after which a text can be read: words put in, left out, or written otherwise.
+"""Search for least-cost repairs of a text: words inserted, dropped or replaced.
 
-The least-cost repair of LR parse errors (Corchuelo et al. 2002, Diekmann and Tratt 2020): stacks of states
-are followed through the words of the text from where it can last be read, the cheapest changes first.
+Least-cost repair of LR parse errors (Corchuelo et al. 2002, Diekmann and Tratt 2020): stacks of states are
+advanced through the words of the text from where it last parses, cheapest edits first.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from visup.rules.correction.words import Terminals, Word, words_of
 
 MOST_PUT_IN_A_ROW = 4
 SPELLINGS_TRIED = 8
-"""Of one correction, in which a unit or a name that is put in may be one of several."""
+"""Most spellings tried of one correction, where an inserted unit or name may be one of several."""
 ALIKE = 3
-"""Readings that are followed beside each other, though what may follow is the same: a bracket may be
-missing in several places."""
+"""Most parses followed with the same continuation: a bracket may be missing in several places.
+"""
 NEARLY = 0.1
-"""What it costs to take a word for what it would be if other words followed it."""
+"""Cost of reading a word as the terminal it would be if other words followed."""
 _NO_BLANK_BEFORE = (",", ")", "]", ":", "?", "*", "+", "..")
 _NO_BLANK_AFTER = ("(", "[")
 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What some words may mean that are not of the language, or not where they stand.
+    """A possible meaning of words that the language does not allow there.
 
     Attributes:
-        words: How many words it stands for.
-        terminals: What they mean.
-        text: How that is written.
-        cost: How far-fetched it is.
+        words: Number of words it replaces.
+        terminals: Their meaning as terminals.
+        text: The replacement text.
+        cost: Its cost.
     """
 
     words: int
@@ -47,15 +47,15 @@ class Meaning:
 
 @dataclass(frozen=True)
 class Speller:
-    """How words of a language are put in, left out and taken for others.
+    """Edit costs of a language.
 
     Attributes:
-        automaton: Of its grammar.
-        terminals: Of its grammar.
-        put: What it costs to put in a terminal, and how it may be written; no others are put in.
-        drop: What it costs to leave a word out.
-        meant: What may be meant by the words from one on.
-        loose: Terminals that take in so much that words are not cut by them.
+        automaton: Automaton of its grammar.
+        terminals: Terminals of its grammar.
+        put: Terminal -> cost of inserting it, and its spellings; no others are inserted.
+        drop: Cost of dropping a word.
+        meant: Possible meanings of the words from an index on.
+        loose: Terminals so general that they do not split words.
     """
 
     automaton: LrAutomaton
@@ -68,7 +68,7 @@ class Speller:
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """A word written otherwise, put in (`words` is 0), or left out (no `texts`), behind other changes."""
+    """A word replaced, inserted (`words` is 0) or dropped (no `texts`), linked to earlier changes."""
 
     at: int
     words: int
@@ -79,13 +79,13 @@ class _Change:
 def corrections(
     text: str, since: int, speller: Speller, may_go_on: Callable[[], bool]
 ) -> Iterator[Repair]:
-    """Corrections of a text, the least first; none where it takes too long to find any.
+    """Corrections of a text, cheapest first; none if the search takes too long.
 
     Args:
-        text: It cannot be read.
-        since: Offset from which it may be changed.
-        speller: Of its language.
-        may_go_on: Asked before each reading that is followed.
+        text: A text with a syntax error.
+        since: Offset from which it may be edited.
+        speller: Edit costs of its language.
+        may_go_on: Called before each explored configuration; stops the search when false.
     """
     words = list(words_of(text, speller.terminals, speller.loose))
     for last in _Search(words, since, speller, may_go_on).found():
@@ -96,7 +96,7 @@ def corrections(
 
 
 class _Search:
-    """Readings of some words, followed in the order of what their changes cost."""
+    """Best-first search over parses of some words, by the cost of their edits."""
 
     def __init__(
         self, words: list[Word], since: int, speller: Speller, may_go_on: Callable[[], bool]
@@ -110,7 +110,7 @@ class _Search:
         self.order = count()
 
     def found(self) -> Iterator[_Change | None]:
-        """The changes of each reading that comes to the end, linked from the last."""
+        """The edits of each complete parse, linked from the last."""
         self.push(0.0, 0, (self.speller.automaton.first,), None, 0)
         while self.heap and self.may_go_on():
             cost, behind, _, stack, change, put = heappop(self.heap)
@@ -123,7 +123,7 @@ class _Search:
                 self.leave_out(cost, at, stack, change)
 
     def push(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
-        """Follow a reading, unless enough are followed that come to the same and cost no more."""
+        """Queue a configuration, unless enough equivalent ones at no higher cost are queued."""
         costs = self.costs.setdefault((at, stack, put), [])
         if len(costs) < ALIKE or cost < costs[-1]:
             insort(costs, cost)
@@ -131,7 +131,7 @@ class _Search:
             heappush(self.heap, (cost, -at, next(self.order), stack, change, put))
 
     def read_on(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
-        """The next word, as it is or as it may be meant."""
+        """Consume the next word, as written or as possibly meant."""
         if at == len(self.words):
             return
         step = self.speller.automaton.step
@@ -151,20 +151,20 @@ class _Search:
                 self.push(cost + meant.cost, at + meant.words, after, new, 0)
 
     def meant_at(self, at: int) -> Sequence[Meaning]:
-        """What may be meant by the words from one on."""
+        """Possible meanings of the words from an index on."""
         if at not in self.meanings:
             self.meanings[at] = self.speller.meant(self.words, at)
         return self.meanings[at]
 
     def steps(self, stack: Stack, terminals: Iterable[str]) -> Stack | None:
-        """The stack after several terminals; None where one of them cannot come."""
+        """The stack after several terminals; None if one is not accepted."""
         after: Stack | None = stack
         for terminal in terminals:
             after = None if after is None else self.speller.automaton.step(after, terminal)
         return after
 
     def put_in(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
-        """Each word that may stand before the next one."""
+        """Insert each word that may precede the next one."""
         if put >= MOST_PUT_IN_A_ROW:
             return
         if stack not in self.offered:
@@ -173,7 +173,7 @@ class _Search:
             self.push(cost + price, at, after, _Change(at, 0, texts, change), put + 1)
 
     def offers(self, stack: Stack) -> Iterator[tuple[float, tuple[str, ...], Stack]]:
-        """What may be put in: what it costs, how it may be written, and what follows."""
+        """Possible insertions: cost, spellings, and the resulting stack."""
         for terminal in self.speller.automaton.offered(stack):
             price, texts = self.speller.put.get(terminal, (0.0, ()))
             after = self.speller.automaton.step(stack, terminal) if texts else None
@@ -181,7 +181,7 @@ class _Search:
                 yield price, texts, after
 
     def leave_out(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
-        """The next word left out; what was put in stands behind it just as well."""
+        """Drop the next word; earlier insertions commute with it."""
         if at < len(self.words):
             price = self.speller.drop(self.words[at])
             self.push(cost + price, at + 1, stack, _Change(at, 1, (), change), 0)
@@ -194,14 +194,14 @@ def _in_order(last: _Change | None) -> Iterator[_Change]:
 
 
 def _joined(text: str, words: list[Word], changes: list[_Change], texts: tuple[str, ...]) -> Repair:
-    """All changes as one, of the part of the text that holds them."""
+    """All edits combined into one, over the part of the text that contains them."""
     first, last = changes[0].at, changes[-1].at + changes[-1].words
     parts: list[str] = []
     at = first
     for change, new in zip(changes, texts, strict=True):
         parts += [w.text for w in words[at : change.at]] + ([new] if new else [])
         at = change.at + change.words
-    if first == last:  # something is put in
+    if first == last:  # an insertion
         begin = end = words[first - 1].end if first else 0
         new = spaced(parts)
         if first and new not in _NO_BLANK_BEFORE and not (new == "(" or text[begin - 1] in "(["):
@@ -213,7 +213,7 @@ def _joined(text: str, words: list[Word], changes: list[_Change], texts: tuple[s
 
 
 def spaced(parts: Sequence[str]) -> str:
-    """Words as one writes them, with blanks where they belong.
+    """Words joined with blanks where appropriate.
 
     >>> spaced(["touching", "(", "a", ",", "b", ")", "for", "2", "s"])
     'touching(a, b) for 2 s'

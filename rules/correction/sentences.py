@@ -1,4 +1,4 @@
-"""What is said of things in plain words, `the arm holds the part`, as a call: `coupled(arm, part)`."""
+"""Plain sentences about objects, `the arm holds the part`, as calls: `coupled(arm, part)`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Container, Iterator, Sequence
 from visup.rules.correction.everyday import FILLERS
 
 LONGEST = 9
-"""Words of a sentence, those that say nothing included."""
+"""Most words of a sentence, including fillers."""
 _BETWEEN = FILLERS | frozenset(
     [
         "with",
@@ -28,21 +28,21 @@ _BETWEEN = FILLERS | frozenset(
 )
 
 Verb = Callable[[str, int], str | None]
-"""The relation of so many things that is meant by a word, or None."""
+"""The relation between this many objects meant by a word, or None."""
 
 
 def sentences(
     words: Sequence[str], names: Container[str], verb: Verb
 ) -> Iterator[tuple[int, tuple[str, ...]]]:
-    """How many words say something of one thing or of two, and what: the relation and the things.
+    """Leading words that state a relation of one or two objects: their number, the relation and the objects.
 
     >>> list(sentences("a is touching b".split(), ["a", "b"], lambda w, n: w if n == 2 else None))
     [(4, ('touching', 'a', 'b'))]
 
     Args:
-        words: From the first word of the sentence on.
-        names: What things are called.
-        verb: The relation that a word means.
+        words: Words from the start of the sentence on.
+        names: Names of objects.
+        verb: The relation meant by a word.
     """
     run = list(enumerate(_run(words)))
     plain = [(n, w) for n, w in run if w in names or w not in _BETWEEN]
@@ -67,7 +67,7 @@ def _said(
 
 
 def _run(words: Sequence[str]) -> Iterator[str]:
-    """The words up to the first sign."""
+    """The words before the first sign."""
     for word in words[:LONGEST]:
         if not word.isidentifier():
             return
@@ -75,10 +75,10 @@ def _run(words: Sequence[str]) -> Iterator[str]:
 
 
 def called(said: Sequence[str]) -> str:
-    """A relation of things, as it is written."""
+    """A relation of objects in source form."""
     return f"{said[0]}({', '.join(said[1:])})"
 
 
 def terminals_of_call(things: int) -> tuple[str, ...]:
-    """The terminals of a call with so many names."""
+    """The terminals of a call with this many names."""
     return ("NAME", "LPAR", "NAME", *("COMMA", "NAME") * (things - 1), "RPAR")

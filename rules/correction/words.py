@@ -1,4 +1,4 @@
-"""The words of a text that cannot be read, each with the terminals of the grammar that it may be."""
+"""Tokens of a faulty text, each with its possible terminals of the grammar."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Word:
 
     Attributes:
         begin: Its offset.
-        text: How it is written.
-        terminals: What it is, the surest first; nothing when the language has no such word.
-        nearly: What it would be if other words followed it.
+        text: Its spelling.
+        terminals: Possible terminals, most specific first; empty if the language has no such word.
+        nearly: Terminals it would be if other words followed it.
     """
 
     begin: int
@@ -32,7 +32,7 @@ class Word:
 
     @property
     def end(self) -> int:
-        """The offset behind it."""
+        """The offset after it."""
         return self.begin + len(self.text)
 
 
@@ -42,8 +42,8 @@ class Terminal:
 
     Attributes:
         name: Its name.
-        pattern: What it is.
-        alone: The same, whatever follows.
+        pattern: Its pattern.
+        alone: The same, without lookahead.
     """
 
     name: str
@@ -56,7 +56,7 @@ Terminals = Sequence[Terminal]
 
 @lru_cache(maxsize=4)
 def terminals_of(parser: Lark) -> Terminals:
-    """The terminals of a grammar, the surest first."""
+    """The terminals of a grammar, most specific first."""
     ordered = sorted(
         (t for t in parser.terminals if t.name not in parser.ignore_tokens),
         key=lambda t: (-t.priority, t.pattern.type != "str", t.name),
@@ -66,12 +66,12 @@ def terminals_of(parser: Lark) -> Terminals:
 
 
 def words_of(text: str, terminals: Terminals, loose: Container[str] = ()) -> Iterator[Word]:
-    """The words of a text, blanks and comments left out.
+    """The words of a text, without blanks and comments.
 
     Args:
-        text: It need not be in the grammar.
+        text: The text; it need not be in the grammar.
         terminals: See `terminals_of`.
-        loose: Terminals that take in so much that words are not cut by them.
+        loose: Terminals so general that they do not split words.
     """
     at = 0
     while True:

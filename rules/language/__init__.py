@@ -1,7 +1,7 @@
-"""The language of rule files: text to checked trees.
+"""The rule language: from text to type-checked syntax trees.
 
 Read in this order: `rules.lark` (the grammar), `parser.py` (text to rules, all errors at once),
-`transform.py` (Lark's tree to ours), `typecheck.py` and `dimensions.py` (names, arguments, units),
-`cost.py` (what a rule retains and how late its verdict comes), `rule_builder.py` (the same trees in Python);
-`diagnostics.py` (errors with their places, for rules and tasks).
+`transform.py` (Lark's tree to AST), `typecheck.py` and `dimensions.py` (names, arguments, units), `cost.py`
+(memory and delay of a rule), `rule_builder.py` (the same trees built in Python); `diagnostics.py` (errors
+with locations, for rules and tasks).
 """

@@ -1,4 +1,4 @@
-"""What a rule costs, computed when it is loaded: how much it keeps, how late its verdict comes."""
+"""Static cost of a rule, computed when it is loaded: memory and delay of its verdict."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from visup.rules.monitoring.compiler import Compiler
 from visup.rules.monitoring.early import EarlyCompiler
 
 MAX_STATE = 100_000
-"""Most intervals that a rule may keep for one choice of objects: 8 minutes of a quantity."""
+"""Most intervals that a rule may retain per binding of objects: 8 minutes of a quantity."""
 MAX_VARIABLES = 3
-"""Most objects that a rule may look at together; of 64 there are 250,000 choices of three."""
+"""Most objects that a rule may relate; 64 objects have 250,000 combinations of three."""
 INTERVAL_BYTES = 16
 
 
 @dataclass(frozen=True, slots=True)
 class RuleCost:
-    """What a rule costs.
+    """The cost of a rule.
 
     Attributes:
-        kept: Most intervals that it keeps for one choice of objects.
-        delay_s: How many seconds late its verdict comes.
-        early_delay_s: How many seconds late at least where it is told as soon as it is decided.
+        kept: Most intervals retained per binding of objects.
+        delay_s: Delay of its verdict, seconds.
+        early_delay_s: Least delay of an early verdict, seconds.
     """
 
     kept: int
@@ -32,18 +32,18 @@ class RuleCost:
 
     @property
     def bytes(self) -> int:
-        """Most bytes for one choice of objects."""
+        """Most bytes per binding of objects."""
         return self.kept * INTERVAL_BYTES
 
 
 def cost_of(rule: Rule) -> RuleCost:
-    """The bounds of a rule whose windows are all bounded.
+    """The cost of a rule whose windows are all bounded.
 
     Args:
-        rule: A rule without faults of meaning.
+        rule: A rule without semantic errors.
 
     Returns:
-        What it costs at most, whatever it sees.
+        Upper bounds, whatever the input.
     """
     compiler = Compiler()
     latest = compiler.rule(rule)[0].delay
@@ -53,11 +53,11 @@ def cost_of(rule: Rule) -> RuleCost:
 
 
 def variables_of(rule: Rule) -> int:
-    """How many objects a rule looks at together."""
+    """Number of objects that a rule relates."""
     return len(rule.variables) + max(depth(f) for f in rule.formulas)
 
 
 def depth(node: Node) -> int:
-    """How many quantifiers of a formula stand one within another."""
+    """Nesting depth of a formula's quantifiers."""
     inner = max((depth(c) for c in children(node)), default=0)
     return inner + isinstance(node, Quantified)

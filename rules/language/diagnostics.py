@@ -1,4 +1,4 @@
-"""Errors found in a file of rules or tasks: a record with a place, and how it becomes an exception."""
+"""Diagnostics of rule and task files: errors with locations, and their conversion to exceptions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Diagnostic:
     """An error in a file.
 
     Attributes:
-        code: A stable code; empty in a language that has none.
+        code: A stable code; empty in a language without codes.
         message: What is wrong, one clause.
-        place: Where it stands.
+        place: Its location.
         expected: What was expected instead.
         hint: How to correct it.
     """
@@ -28,7 +28,7 @@ class Diagnostic:
     hint: str | None = None
 
     def error(self, kind: type[VisupError]) -> VisupError:
-        """The exception that tells of it."""
+        """The exception for it."""
         what = f"[{self.code}] {self.message}" if self.code else self.message
         error = kind(what, where=self.place, expected=self.expected, hint=self.hint)
         error.code = self.code or None
@@ -40,12 +40,12 @@ class Diagnostic:
 
 
 def raise_all(diagnostics: Sequence[Diagnostic], kind: type[VisupError]) -> None:
-    """Raise some diagnostics, if there are any; see `raise_errors`."""
+    """Raise diagnostics, if any; see `raise_errors`."""
     raise_errors([d.error(kind) for d in diagnostics])
 
 
 def raise_errors(errors: Sequence[VisupError]) -> None:
-    """Raise some errors, if there are any.
+    """Raise errors, if any.
 
     Raises:
         VisupError: The error, when there is one.
@@ -58,14 +58,14 @@ def raise_errors(errors: Sequence[VisupError]) -> None:
 
 
 class Source:
-    """The lines of a file, to find the places of errors.
+    """The lines of a file, to locate errors.
 
     Args:
-        text: The whole text, as the user wrote it.
+        text: The whole text, as written by the user.
         file: Its name, for messages.
 
     Attributes:
-        included: The files that it includes, by name.
+        included: Included files, by name.
     """
 
     def __init__(self, text: str, file: str) -> None:
@@ -74,7 +74,7 @@ class Source:
         self._lines = text.split("\n")
 
     def place(self, line: int, column: int, length: int = 1) -> SourceLocation:
-        """The place at a line and column, counted from 1; past the end it is the end."""
+        """The location at a line and column, counted from 1, clamped to the end."""
         if line > len(self._lines) or line < 1:
             line = len(self._lines)
             column = len(self._line(line)) + 1
@@ -85,7 +85,7 @@ class Source:
         )
 
     def at(self, span: Span) -> SourceLocation:
-        """The place of a node; of a node over several lines, its part of the first."""
+        """The location of a node; for several lines, its part on the first."""
         if span == NOWHERE:
             return self.place(1, 1)
         if span.file:
@@ -101,7 +101,7 @@ class Source:
         expected: str | None = None,
         hint: str | None = None,
     ) -> Diagnostic:
-        """A diagnostic at the place of a node."""
+        """A diagnostic at the location of a node."""
         return Diagnostic(code, what, self.at(span), expected, hint)
 
     def _line(self, line: int) -> str:
@@ -109,6 +109,6 @@ class Source:
 
 
 def either(words: Iterable[str]) -> str:
-    """Words as one offers them: `a`, `a or b`, `a, b or c`."""
+    """Words as alternatives: `a`, `a or b`, `a, b or c`."""
     *first, last = words
     return f"{', '.join(first)} or {last}" if first else last

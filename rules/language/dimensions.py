@@ -1,4 +1,4 @@
-"""Units: what is compared or added must measure the same; products and quotients make new measures."""
+"""Dimensional analysis: comparisons and sums need equal dimensions; products and quotients combine them."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from visup.rules.predicates.vocabulary import Vocabulary
 
 
 def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault]:
-    """The faults of units of a comparison.
+    """Unit errors of a comparison.
 
     Args:
         node: The comparison.
-        vocabulary: Tells what quantities measure; of one that it does not hold nothing is said.
+        vocabulary: Dimensions of quantities; unknown ones are ignored.
 
     Yields:
-        Place, what is wrong, what was expected, hint.
+        Location, what is wrong, what was expected, hint.
     """
     faults: list[Fault] = []
     left, right = (_measured(side, vocabulary, faults) for side in (node.left, node.right))
@@ -50,21 +50,21 @@ def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault
 
 
 def example_amount(node: Comparison, vocabulary: Vocabulary) -> str:
-    """A number of what is compared, such as '20 px'."""
+    """An example of the compared quantity, such as '20 px'."""
     kinds = (_measured(side, vocabulary, []) for side in (node.left, node.right))
     kind = next((k for k in kinds if k is not None), SHARE)
     return f"20 {_base_unit(kind) or ''}".rstrip()
 
 
 def check_value(term: Term, vocabulary: Vocabulary) -> Iterator[Fault]:
-    """The faults of units of a quantity that stands in no comparison."""
+    """Unit errors of a quantity outside comparisons."""
     faults: list[Fault] = []
     _measured(term, vocabulary, faults)
     yield from faults
 
 
 def check_constant(node: Comparison) -> Iterator[Fault]:
-    """A comparison that never changes: right in a calculation, in a rule a mistake."""
+    """An error for a comparison of constants, which is legal in arithmetic but a mistake in a rule."""
     if _constant(node.left) and _constant(node.right):
         yield node.span, "two numbers are compared", "a quantity on one side", None
 
@@ -87,7 +87,7 @@ def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
 
 
 def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimension | None:
-    """What a quantity measures; None when it is not known."""
+    """The dimension of a quantity; None when unknown."""
     match term:
         case Number():
             return term.dimension
@@ -97,7 +97,7 @@ def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimens
         case Negative(part=part):
             return _measured(part, vocabulary, faults)
         case Variable(part=part):
-            # What is wrong with it is told where it is bound.
+            # Its errors are reported where it is bound.
             return None if part is None else _measured(part, vocabulary, [])
         case WindowFunction(name=name, part=part):
             inner = _measured(part, vocabulary, faults)
@@ -130,7 +130,7 @@ _EXAMPLES = {
 def _powered(
     name: str, parts: tuple[Term, ...], span: Span, vocabulary: Vocabulary, faults: list[Fault]
 ) -> Dimension | None:
-    """What a root, a power or an exponential measures."""
+    """The dimension of a root, a power or an exponential."""
     if len(parts) != (2 if name == "power" else 1):
         what = f"'{name}' does not take {len(parts)} quantities"
         faults.append((span, what, f"such as {_EXAMPLES[name]}", None))
@@ -189,12 +189,12 @@ def _named(dimension: Dimension) -> str:
 
 
 def _base_unit(wanted: Dimension) -> str | None:
-    """The unit of a dimension in which numbers are kept, or None."""
+    """The base unit of a dimension, or None."""
     return next((str(u) for u, (d, by) in UNITS.items() if d == wanted and by == 1.0), None)
 
 
 def _with_unit(node: Comparison, wanted: Dimension) -> str | None:
-    """The comparison with a unit of what is measured, and with a number where there is none."""
+    """The comparison with a fitting unit, and with a number if there is none."""
     unit = _base_unit(wanted)
     if unit is None:
         return None

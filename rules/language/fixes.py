@@ -1,4 +1,4 @@
-"""Hints that are changes: what an editor does when one takes up a hint, in either language."""
+"""Text edits from hints: what an editor applies when the user accepts a hint, in either language."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from visup.agent.model.errors import SourceLocation
 
 @dataclass(frozen=True, slots=True)
 class TextFix:
-    """A change of a text on one line or over several.
+    """An edit of a text, on one line or over several.
 
     Attributes:
-        line: Where it begins, from 1.
-        column: From 1.
-        length: How many characters are replaced, line ends counted as one.
-        new: What stands there instead.
+        line: Line where it starts, from 1.
+        column: Column, from 1.
+        length: Number of characters to replace, with line ends counted as one.
+        new: The replacement.
     """
 
     line: int
@@ -25,7 +25,7 @@ class TextFix:
     new: str
 
     def applied(self, text: str) -> str:
-        """The text with the change."""
+        """The edited text."""
         lines = text.split("\n")
         at = sum(len(x) + 1 for x in lines[: self.line - 1]) + self.column - 1
         return text[:at] + self.new + text[at + self.length :]
@@ -41,12 +41,12 @@ _NAME = re.compile(r"[^\W\d]\w*")
 
 
 def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None:
-    """The change that a hint speaks of, or None when it speaks of none.
+    """The edit described by a hint, or None if it describes none.
 
     Args:
-        text: The text in which the fault stands.
-        where: Where it stands.
-        hint: Of the message.
+        text: The faulty text.
+        where: Location of the fault.
+        hint: The hint of the message.
     """
     if hint is None:
         return None
@@ -76,14 +76,14 @@ def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None
 
 
 def _at_the_end(text: str, new: str) -> TextFix:
-    """A line put behind all others."""
+    """A line appended to the text."""
     lines = text.split("\n")
     new = f"{new}\n" if text.endswith("\n") else f"\n{new}"
     return TextFix(len(lines), len(lines[-1]) + 1, 0, new)
 
 
 def _on_line(where: SourceLocation, pattern: str, new: str) -> TextFix | None:
-    """Something replaced that stands elsewhere on the line, nearest to the caret."""
+    """Replace a match elsewhere on the line, nearest to the caret."""
     found = list(re.finditer(pattern, where.text))
     if not found:
         return None
@@ -92,7 +92,7 @@ def _on_line(where: SourceLocation, pattern: str, new: str) -> TextFix | None:
 
 
 def _further(where: SourceLocation, pattern: str, rest: str, new: str) -> TextFix | None:
-    """Something replaced that stands on a later line, such as the sentence of a rule."""
+    """Replace a match on a later line, such as in the sentence of a rule."""
     found = re.search(pattern, rest)
     return None if found is None else _replacing(where, found, new)
 
@@ -102,7 +102,7 @@ def _replacing(where: SourceLocation, old: re.Match[str], new: str) -> TextFix:
 
 
 def _renamed(where: SourceLocation, rest: str, new: str) -> TextFix:
-    """The name at the caret replaced; of a call only its name."""
+    """Replace the name at the caret; for a call only its name."""
     found = _NAME.match(rest) if _NAME.match(new) else None
     length = len(found[0]) if found else where.length
     return TextFix(where.line, where.column, length, new)

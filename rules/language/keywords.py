@@ -1,4 +1,4 @@
-"""The words of the language itself: how each is written, and what it says; editors show it."""
+"""Keywords of the language with their syntax and meaning, as shown by editors."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 Entry = tuple[str, str]
-"""How it is written, and what it says."""
+"""Syntax and meaning."""
 
 _WINDOW = ("f for 2 s to 5 s ago", "f was true during all of that time; also with `within`")
 _SHARE = ("f in 60 % of 2 s", "f was true for at least 60 % of the last 2 s")
@@ -57,7 +57,7 @@ _ENTRIES: dict[str, Entry] = {
     "at": _LET,
 }
 KEYWORDS: Mapping[str, Entry] = MappingProxyType(_ENTRIES)
-"""Words of the language itself, which name nothing else."""
+"""Reserved words of the language."""
 
 FUNCTIONS: Mapping[str, Entry] = MappingProxyType(
     {

@@ -31,9 +31,9 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         The rules in the order of the text; `parse_rules(str(rule)) == (rule,)`.
 
     Raises:
-        RuleError: The text has one fault; says where, what was expected and what to do.
-        ManyErrors: It has several; each rule is read by itself, so that one syntax fault in a rule
-            hides nothing of the others.
+        RuleError: The text has one error; the message has its location, what was expected and a fix.
+        ManyErrors: It has several; each rule is parsed separately, so that a syntax error in one rule
+            hides no errors of others.
     """
     check_length(text, file)
     try:
@@ -48,9 +48,9 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
     patience = Patience()
     for block in _blocks(text):
         found = read_repaired(block, "start", file, RULES, patience)
-        told = found.told(text)
+        diagnostics = found.diagnostics(text)
         errors += with_tried_edits(
-            block, told, partial(weight, patience=patience), len(found.syntax)
+            block, diagnostics, partial(weight, patience=patience), len(found.syntax)
         )
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)
@@ -59,17 +59,17 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
 
 
 LONGEST_FILE = 200_000
-"""Characters of a rules file; that which ships has a twentieth of it."""
+"""Most characters in a rule file, twenty times the one that ships."""
 LONG_NUMBER = re.compile(r"[\d_]{41}|\d[eE]\+?\d{3}")
-"""What would be read as infinity, or with other digits than it has."""
+"""Numbers that would become infinite or lose digits."""
 LONGEST_RULE = 10_000
 MOST_RULES = 1_000
 MOST_FAULTS = 100
-"""Faults of a file that are told; who made more knows enough."""
+"""Most errors reported of a file."""
 
 
 def check_length(text: str, file: str) -> None:
-    """Refuse a text that takes long to read.
+    """Reject a text that would take long to parse.
 
     Raises:
         RuleError: It, or one of its rules, is too long.
@@ -92,17 +92,17 @@ def check_length(text: str, file: str) -> None:
 
 
 def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
-    """Read one formula without object variables, such as one of signals.
+    """Parse one formula without object variables, such as one over signals.
 
     Args:
         text: The formula.
-        vocabulary: What it may name.
+        vocabulary: The names it may use.
 
     Returns:
         Its tree.
 
     Raises:
-        RuleError: It has one fault.
+        RuleError: It has one error.
         ManyErrors: It has several.
     """
     file = "<formula>"
@@ -115,7 +115,7 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
 
 def _formula(text: str, file: str, vocabulary: Vocabulary) -> Formula:
     found = read_repaired(text, "formula", file, vocabulary, Patience())
-    raise_all(sorted(found.told(text), key=_position), RuleError)
+    raise_all(sorted(found.diagnostics(text), key=_position), RuleError)
     return cast("Formula", found.tree)
 
 
@@ -129,8 +129,8 @@ def load_rules(path: str | Path) -> tuple[Rule, ...]:
         Its rules.
 
     Raises:
-        RuleError: It cannot be read or has a fault.
-        ManyErrors: It has several faults.
+        RuleError: It cannot be read or has an error.
+        ManyErrors: It has several errors.
     """
     try:
         text = read_text_file(Path(path))
@@ -144,13 +144,13 @@ def load_rules(path: str | Path) -> tuple[Rule, ...]:
 
 @cache
 def shipped_rules() -> tuple[Rule, ...]:
-    """The rules of `safety.rules`, which ships with visup; read once a process."""
+    """The rules of `safety.rules`, which ships with visup; read once per process."""
     text = files("visup.rules.safety").joinpath("safety.rules").read_text(encoding="utf-8")
     return parse_rules(text, "safety.rules")
 
 
 def _blocks(text: str) -> list[str]:
-    """The text of each rule by itself, each with the lines before it blank so that places hold."""
+    """The text of each rule, preceded by blank lines so that line numbers are preserved."""
     starts = [m.start() for m in _HEAD.finditer(text)]
     if not starts or text[: starts[0]].strip():
         starts = [0, *starts]

@@ -1,4 +1,4 @@
-"""Reading with repairs: one slip hides nothing of what else is wrong, and every hint has been tried."""
+"""Parsing with error recovery: one error hides no others, and every hint has been verified."""
 
 from __future__ import annotations
 
@@ -60,28 +60,28 @@ _WANTED = {
 
 
 CHARACTERS_TRIED = 200_000
-"""Of repairs of one file: who made more slips than that allows has them told without hints."""
+"""Characters parsed to find repairs of one file; errors beyond this budget get no hints."""
 
 
 @dataclass
 class Patience:
-    """How much may still be tried to repair a file; counted, so that the same text gives the same messages.
+    """The remaining budget for repairs of a file; counted work, so that messages are reproducible.
 
     Attributes:
-        left: Characters that may still be read.
+        left: Characters that may still be parsed.
     """
 
     left: int = CHARACTERS_TRIED
 
     def spend(self, text: str, start: str) -> UnexpectedInput | None:
-        """The syntax error of a text; while nothing is left to spend every text has its first one."""
+        """The syntax error of a text, or None; once the budget is spent every text counts as faulty."""
         self.left -= len(text)
         if self.left < 0:
             return _syntax_fault("", "formula")
         return _syntax_fault(text, start)
 
     def corrections(self, text: str, start: str, since: int) -> Iterator[Repair]:
-        """The least changes from an offset on that bring a text into the grammar, while patience lasts."""
+        """Least-cost corrections of a text from an offset on, while the budget lasts."""
         least = max(0, self.left - MOST_READINGS * READING_COST)
 
         def may_go_on() -> bool:
@@ -92,9 +92,9 @@ class Patience:
 
 
 MOST_READINGS = 4000
-"""Of a text that cannot be read, when the least corrections of it are looked for."""
+"""Most parser configurations explored in a search for corrections."""
 READING_COST = 5
-"""To follow a reading of a text takes as long as to parse so many characters."""
+"""Cost of one configuration, in parsed characters."""
 
 
 def grammar() -> str:
@@ -112,15 +112,15 @@ def _parser() -> Lark:
 
 @dataclass
 class RepairedText:
-    """A rule or a formula as it was read, perhaps only after repairs.
+    """A parsed rule or formula, possibly after repairs.
 
     Attributes:
-        tree: Rules, or a formula; nothing when it could not be read.
+        tree: Rules, or a formula; empty when it could not be parsed.
         file: Its name.
         text: The text after all repairs.
-        repairs: In the order in which they were made, each of the text that those before it left.
-        faults: What is wrong beside them, by places of the repaired text.
-        syntax: What stopped the reading at each repair, and at last.
+        repairs: In the order in which they were made, each relative to the text left by earlier ones.
+        faults: Other errors, located in the repaired text.
+        syntax: The syntax error at each repair, and the final one.
     """
 
     tree: Any
@@ -130,8 +130,8 @@ class RepairedText:
     faults: list[Diagnostic]
     syntax: list[Diagnostic]
 
-    def told(self, whole: str) -> list[Diagnostic]:
-        """All diagnostics by places of the text as it was written."""
+    def diagnostics(self, whole: str) -> list[Diagnostic]:
+        """All diagnostics, located in the original text."""
         source = Source(whole, self.file)
         return [*self.syntax, *(self._placed(f, source) for f in self.faults)]
 
@@ -155,14 +155,14 @@ class RepairedText:
 def read_repaired(
     block: str, start: str, file: str, vocabulary: Vocabulary, patience: Patience
 ) -> RepairedText:
-    """Read a rule or a formula; errors are reported, repaired, and parsing continues.
+    """Parse a rule or a formula; errors are reported and repaired, and parsing continues.
 
     Args:
         block: The text.
-        start: What it is: 'start' of rules, or 'formula'.
+        start: Start symbol: 'start' for rules, or 'formula'.
         file: Its name, for messages.
-        vocabulary: What it may name.
-        patience: How much may still be tried.
+        vocabulary: The names it may use.
+        patience: The budget for repairs.
     """
     text, repairs, syntax = block, list[Repair](), list[Diagnostic]()
     while True:
@@ -183,18 +183,18 @@ def read_repaired(
             return RepairedText([], file, text, repairs, [], syntax)
         repairs.append(repair)
         text = repair.applied(text)
-    found, told = _semantic(text, start, file, vocabulary)
-    return RepairedText(found, file, text, repairs, told, syntax)
+    found, diagnostics = _semantic(text, start, file, vocabulary)
+    return RepairedText(found, file, text, repairs, diagnostics, syntax)
 
 
 def _semantic(
     text: str, start: str, file: str, vocabulary: Vocabulary
 ) -> tuple[Any, list[Diagnostic]]:
-    """The tree of a text without syntax errors, and what is wrong with its meaning."""
+    """The tree of a text without syntax errors, and its semantic errors."""
     found, faults = read_tree(_parser().parse(text, start=start), file)
     checker = TypeChecker(text, file, vocabulary)
-    told = [checker.fault(*f) for f in faults]
-    return found, told or list(_checked(checker, found))
+    diagnostics = [checker.fault(*f) for f in faults]
+    return found, diagnostics or list(_checked(checker, found))
 
 
 def _checked(checker: TypeChecker, found: Any) -> Iterator[Diagnostic]:
@@ -214,7 +214,7 @@ def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
 
 
 def _before_repairs(at: int, repairs: Sequence[Repair]) -> int:
-    """Where a place of the repaired text stood before the repairs."""
+    """Map an offset of the repaired text back to the original."""
     for repair in reversed(repairs):
         if at >= repair.begin + len(repair.new):
             at -= len(repair.new) - len(repair.old)
@@ -229,13 +229,13 @@ def _line_of(text: str, at: int) -> tuple[int, int]:
 
 
 Weight = tuple[int, int]
-"""How bad a text is: 1 and how much of it is left unread, or 0 and how many faults of meaning it has."""
+"""Badness of a text: 1 and its unparsed length, or 0 and its number of semantic errors."""
 UNTRIED: Weight = (2, 0)
 SOUND: Weight = (0, 0)
 
 
 def weight(text: str, patience: Patience) -> Weight:
-    """How bad the text of a rule is; of one that cannot be tried any more as bad as can be."""
+    """Badness of a rule's text; the worst once the budget is spent."""
     patience.left -= len(text)
     if patience.left < 0:
         return UNTRIED
@@ -248,27 +248,27 @@ def weight(text: str, patience: Patience) -> Weight:
 def with_tried_edits(
     block: str, faults: Sequence[Diagnostic], weigh: Callable[[str], Weight], unread: int = 0
 ) -> list[Diagnostic]:
-    """The faults of a rule; one whose hint is no change gets a small edit that helps, where one does.
+    """The errors of a rule; those without an applicable hint get a small edit that helps, if there is one.
 
     Args:
         block: The rule, its lines numbered as in the file.
-        faults: What is wrong with it.
-        weigh: How bad a text is.
-        unread: How many of the faults, the first ones, are of syntax; while there are any, no edits are
-            looked for to help the others, which may follow from them.
+        faults: Its errors.
+        weigh: Badness of a text.
+        unread: Number of leading errors that are syntax errors; while there are any, no edits are
+            sought for the others, which may follow from them.
     """
-    told = list(faults)
+    diagnostics = list(faults)
     before = weigh(block)
     if before == UNTRIED:
-        return told
+        return diagnostics
     with suppress(_OutOfPatienceError):
         for n, fault in enumerate(faults[: unread or None]):
-            told[n] = _with_edit(block, fault, before, weigh)
-    return told
+            diagnostics[n] = _with_edit(block, fault, before, weigh)
+    return diagnostics
 
 
 class _OutOfPatienceError(Exception):
-    """Nothing may be tried any more: to look for further edits would be in vain, and takes long."""
+    """The budget is spent: a search for further edits would be slow and in vain."""
 
 
 def _with_edit(
@@ -306,7 +306,7 @@ EDIT_WORDS = (*RULES.quantities, *RULES.words, *WORDS)
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a syntax error stands: the text as written, as repaired so far, the repairs, the file."""
+    """Location of a syntax error: the original text, the text repaired so far, the repairs, the file."""
 
     written: str
     text: str
@@ -314,7 +314,7 @@ class _Place:
     file: str
 
     def at(self, begin: int, length: int) -> SourceLocation:
-        """The place of some characters of the repaired text."""
+        """The location of some characters of the repaired text."""
         line, column = _line_of(self.written, _before_repairs(begin, self.repairs))
         return Source(self.written, self.file).place(line, column, max(1, length))
 
@@ -325,7 +325,7 @@ def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) 
     wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
     wanted = wanted or getattr(fault, "allowed", set()) or set()
     if "COMMA" in wanted and _NAME_IN_CALL.search(where.text[:at]):
-        # Only the name of a value could be counted with, and none has been bound.
+        # Arithmetic would need the name of a value, but none is bound.
         wanted = {"COMMA", "RPAR"}
     what = f"'{found}' does not belong here" if found else "the rule ends too early"
     if repair is None:
@@ -333,7 +333,7 @@ def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) 
         hint = _slip(found, wanted)
         return Diagnostic("", what, where.at(begin, length), _expected(wanted), hint)
     if repair.begin == repair.end and repair.begin < at:
-        # Something is missing: the caret stands where it goes, and not at the next word.
+        # For an insertion the caret marks where it goes, not the next word.
         what = f"{_put(repair.new)} is missing" if repair.new.strip() else what
     span = max(1, repair.end - repair.begin)
     hint = repair.hint(where.text)
@@ -341,7 +341,7 @@ def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) 
 
 
 _NAME_IN_CALL = re.compile(r"\A(?![\s\S]*\blet\b)[\s\S]*[(,]\s*[A-Za-z_]\w*\s*\Z")
-"""A text without values of `let` that ends with a bare name in the parentheses of a call."""
+"""A text without `let` that ends with a bare name inside a call."""
 
 
 def _put(new: str) -> str:
@@ -356,7 +356,7 @@ def _expected(wanted: set[str]) -> str:
 
 
 MOST_EXPECTED = 8
-"""More words than so many help nobody; the rarer ones are left out."""
+"""Most expected words listed; rarer ones are left out."""
 _SELDOM = frozenset(
     f"'{w}'"
     for w in (

@@ -1,7 +1,7 @@
-"""What a text with a slip was meant to be: the smallest change after which it can be read on.
+"""Syntax repair: the smallest edit after which parsing can continue.
 
-Each repair is tried on the text before it is offered, so that a hint is always legal, and what else
-is wrong in the same rule is told as well.
+Each repair is tried before it is offered, so that a hint is always legal, and further errors in the same rule
+are reported as well.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from visup.rules.language.slips import SLIPS
 
 MOST_REPAIRS = 12
 MOST_CORRECTIONS = 16
-"""That are tried of each error, the least first."""
+"""Most corrections tried per error, cheapest first."""
 NEAR = 60
-"""Characters before an error from which on its cause is looked for; the whole line always."""
+"""Characters before an error that are searched for its cause; the whole line always is."""
 MUCH_FURTHER = 8
-"""Where a usual slip lets so many more characters be read, it is what was meant, whatever else is wrong."""
+"""A usual slip whose fix lets this many more characters parse is accepted, whatever else is wrong."""
 
 
 WORDS = (
@@ -48,7 +48,7 @@ PUT_IN = (
     " when",
 )
 AMOUNTS = ("0", "20 px", "2 s", "20 px/s", "20 deg", "20 deg/s", "2 m")
-"""What may be compared with, where nothing stands behind a sign."""
+"""Amounts to insert after a comparison sign without a right side."""
 Parses = Callable[[str], UnexpectedInput | None]
 """The syntax error of a text, or None."""
 
@@ -60,17 +60,17 @@ def find_repair(
     is_sound: Callable[[str], bool],
     corrected: Callable[[int], Iterable[Repair]],
 ) -> Repair | None:
-    """The first change after which a text can be read further than before.
+    """The first edit after which a text parses further than before.
 
     Args:
-        text: It cannot be read.
-        error: Where it cannot.
-        error_of: Reads a text.
-        is_sound: Whether a text without syntax errors makes sense, too.
-        corrected: Changes from an offset on that bring the text into its grammar, the least first.
+        text: A text with a syntax error.
+        error: The error.
+        error_of: Parses a text.
+        is_sound: Whether a text without syntax errors is also semantically correct.
+        corrected: Corrections from an offset on, cheapest first.
 
     Returns:
-        A change after which all makes sense, else there is no syntax error left, else only later ones.
+        An edit after which the text is correct, else has no syntax error, else only later ones.
     """
     at, length = place_of(text, error)
     trial = _RepairTrial(text, at, length, error_of, is_sound)
@@ -90,16 +90,16 @@ def find_repair(
 
 @dataclass
 class _RepairTrial:
-    """Changes of a text that cannot be read, tried one by one.
+    """A trial of edits of a text with a syntax error.
 
     Attributes:
-        text: It cannot be read.
-        at: Where it cannot.
-        length: How long that is.
-        error_of: Reads a text.
-        is_sound: Whether a text without syntax errors makes sense, too.
-        moved: By how many characters the last that was chosen lets the text be read further.
-        sound: Whether a change was found after which all makes sense.
+        text: The text.
+        at: Offset of the error.
+        length: Length of the error.
+        error_of: Parses a text.
+        is_sound: Whether a text without syntax errors is also semantically correct.
+        moved: How many more characters parse after the last chosen edit.
+        sound: Whether an edit was found after which the text is correct.
     """
 
     text: str
@@ -111,7 +111,7 @@ class _RepairTrial:
     sound: bool = False
 
     def best(self, repairs: Iterable[Repair]) -> Repair | None:
-        """The first that makes sense, else that can be read, else that can be read further."""
+        """The first edit after which the text is correct, else parses, else parses further."""
         further: Repair | None = None
         readable: Repair | None = None
         slips_first = False
@@ -141,7 +141,7 @@ class _RepairTrial:
 
 
 def place_of(text: str, error: UnexpectedInput) -> tuple[int, int]:
-    """Offset and length of what cannot be read; at the end of the text the length is 0."""
+    """Offset and length of the error; at the end of the text the length is 0."""
     if isinstance(error, UnexpectedToken) and error.token.type != "$END":
         return error.token.start_pos or 0, len(error.token)
     if isinstance(error, UnexpectedCharacters):
@@ -150,7 +150,7 @@ def place_of(text: str, error: UnexpectedInput) -> tuple[int, int]:
 
 
 def end_before(text: str, at: int) -> int:
-    """Where what stands before an offset ends, blanks and comments left out."""
+    """End of the token before an offset, skipping blanks and comments."""
     lines = text[:at].split("\n")
     while lines and not lines[-1].split("#")[0].strip():
         lines.pop()
@@ -162,14 +162,14 @@ def end_before(text: str, at: int) -> int:
 def usual_slips(
     text: str, at: int, length: int, low: int = 0, high: int | None = None
 ) -> Iterator[Repair]:
-    """What is usually meant where a frequent slip holds a place, or ends or begins next to it.
+    """Fixes of frequent slips that contain an offset or are adjacent to it.
 
     Args:
-        text: It holds a fault.
-        at: Offset of the fault.
-        length: Of the fault.
-        low: Offset from which slips are looked for.
-        high: Offset up to which they are; None for the end of the text.
+        text: The faulty text.
+        at: Offset of the error.
+        length: Length of the error.
+        low: Offset from which to search for slips.
+        high: Offset up to which to search; None for the end of the text.
     """
     end = len(text) if high is None else high
     for slip in SLIPS:
@@ -194,7 +194,7 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
     if found[:1].isdigit():
         yield Repair(before, before, " <")
     for match in re.finditer(r"\)", text[max(low, text.rfind("\n", 0, before)) : before]):
-        # A bracket may be missing further back in the line.
+        # A bracket may be missing earlier in the line.
         place = max(low, text.rfind("\n", 0, before)) + match.end()
         yield Repair(place, place, ")")
     if text[before - 1 : before] in ("<", ">", "="):
@@ -210,11 +210,11 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
 
 
 def _edited(text: str, at: int) -> Iterator[Repair]:
-    """Small edits of the line that holds a place."""
+    """Small edits of the line at an offset."""
     begin, end = text.rfind("\n", 0, at) + 1, text.find("\n", at)
     line = text[begin : end if end >= 0 else len(text)]
     if line.lstrip().startswith("rule"):
-        return  # without its variables nothing else of a rule makes sense
+        return  # without variables the rest of a rule is meaningless
     for edit in edits(line, at - begin, 1, WORDS):
         yield Repair(begin + edit.begin, begin + edit.end, edit.new)
 

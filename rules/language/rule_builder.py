@@ -1,4 +1,4 @@
-"""Rules in Python: the same trees as rule files give, built with operators.
+"""Rules in Python: the same trees as from rule files, built with operators.
 
 >>> from visup.rules.language.rule_builder import fact, quantity, px, rule, s
 >>> near = (quantity.gap("a", "b") < px(20)).lasting(s(1)) & ~fact.coupled("a", "b")
@@ -9,8 +9,8 @@ rule near(a, b): warning
     hold 3 s
     say "{a} {is} near {b}."
 
-Comparisons give a `FormulaBuilder`, which joins with `&`, `|`, `~`; a `TermBuilder` adds, subtracts,
-multiplies and divides.
+Comparisons return a `FormulaBuilder`, which supports `&`, `|`, `~`; a `TermBuilder` supports addition,
+subtraction, multiplication and division.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ from visup.rules.language.typecheck import TypeChecker
 
 @dataclass(frozen=True, eq=False)
 class TermBuilder:
-    """A quantity that Python's operators work on; `node` is its tree."""
+    """A quantity with Python operators; `node` is its tree."""
 
     node: Term
 
@@ -92,13 +92,13 @@ class TermBuilder:
         return FormulaBuilder(Comparison(self.node, ">=", other.node))
 
     def over(self, function: str, span: TermBuilder) -> TermBuilder:
-        """`rate`, `before`, `lowest`, `highest` or `last` over a time: `speed.over("rate", s(2))`."""
+        """`rate`, `before`, `lowest`, `highest` or `last` over a duration: `speed.over("rate", s(2))`."""
         return TermBuilder(WindowFunction(function, self.node, _number(span)))
 
 
 @dataclass(frozen=True, eq=False)
 class FormulaBuilder:
-    """A formula that Python's operators work on; `node` is its tree."""
+    """A formula with Python operators; `node` is its tree."""
 
     node: Formula
 
@@ -122,7 +122,7 @@ class FormulaBuilder:
         return FormulaBuilder(PastOperator("once", self.node, _window(span, to)))
 
     def leaving(self, bound: TermBuilder) -> FormulaBuilder:
-        """A comparison that, once true, ends only at another bound: `... leave 3 px/s`."""
+        """A comparison that once true ends only at another bound: `... leave 3 px/s`."""
         assert isinstance(self.node, Comparison), "only a comparison has a bound to leave"
         c = self.node
         return FormulaBuilder(Comparison(c.left, c.operator, c.right, _number(bound)))
@@ -180,12 +180,12 @@ def forall(variable: str, claim: FormulaBuilder, may_repeat: bool = False) -> Fo
 
 
 def noted(name: str) -> TermBuilder:
-    """The value that `let` names."""
+    """The value bound by `let`."""
     return TermBuilder(Variable(name))
 
 
 def let(name: str, value: TermBuilder, at: FormulaBuilder, claim: FormulaBuilder) -> FormulaBuilder:
-    """`let x be q at f: g`, where g speaks of `noted("x")`."""
+    """`let x be q at f: g`, where g uses `noted("x")`."""
     part = bound(claim.node, Variable(name, value.node, at.node))
     return FormulaBuilder(Let(name, value.node, at.node, part))
 
@@ -254,7 +254,7 @@ def px_s(value: float) -> TermBuilder:
 
 
 def percent(value: float) -> TermBuilder:
-    """Hundredths."""
+    """Per cent."""
     return number(value, Unit.PERCENT)
 
 
@@ -275,24 +275,24 @@ def rule(
     cooldown: TermBuilder | None = None,
     may_repeat: str = "",
 ) -> Rule:
-    """A rule, checked as those of files are.
+    """A rule, checked like those of files.
 
     Args:
         name: Its name.
-        variables: Names of its objects, with blanks between them.
+        variables: Names of its objects, separated by blanks.
         severity: 'info', 'warning' or 'critical'.
-        when: What must be true.
+        when: The condition.
         say: The sentence.
-        unless: What suspends it.
-        hold: How long its concern stays.
-        cooldown: How long the same objects raise none afterwards.
-        may_repeat: Variables that may stand for an object of another one.
+        unless: The exception.
+        hold: How long its alarm stays.
+        cooldown: How long the same objects raise no alarm afterwards.
+        may_repeat: Variables that may be bound to the object of another one.
 
     Returns:
-        The same tree as its text gives.
+        The same tree as parsed from its text.
 
     Raises:
-        RuleError: It has one fault; the place is in its text as printed.
+        RuleError: It has one error; the location refers to its printed text.
         ManyErrors: It has several.
     """
     made = Rule(

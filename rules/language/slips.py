@@ -1,4 +1,4 @@
-"""Frequent slips of the rule language, and what is meant by them."""
+"""Frequent slips in the rule language, and their corrections."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Slip:
     """A frequent slip.
 
     Attributes:
-        pattern: What it looks like.
-        new: What is meant; a template as of `re.Match.expand`, or a function of the match.
+        pattern: Pattern of the slip.
+        new: Its correction; a template as for `re.Match.expand`, or a function of the match.
     """
 
     pattern: re.Pattern[str]
@@ -41,7 +41,7 @@ _AMOUNT = r"-?[\d.]+ ?(?:px/s2|px/s|px|%|ms|min|mm|m/s|m|cm|s|h|deg/s|deg|/s)?"
 
 
 def _some_of(least: int, parts: list[str]) -> str:
-    """That some of several are true, as the language says it."""
+    """That at least some of several are true, in the rule language."""
     return f"({' or '.join(' and '.join(some) for some in combinations(parts, least))})"
 
 
@@ -246,4 +246,4 @@ SLIPS = (
     _slip(r"\bunless\b", "or"),
     _slip(r"\b(\w+)\s+(\w)\s*,?\s+(\w)\b(?!\s*[:(])", r"\1(\2, \3)"),
 )  # fmt: skip
-"""In the order in which they are tried; each only where it meets the place of the error."""
+"""Tried in order; each only where it overlaps the error."""

@@ -1,4 +1,4 @@
-"""How words of rules are put in, left out and taken for others, when a text is brought into the grammar."""
+"""Edit costs of the rule language: inserting, dropping and replacing words in error correction."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from visup.rules.language.synonyms import synonym
 from visup.rules.predicates.vocabulary import RULES
 
 SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
-"""What it costs to take a word for another: written so but for its case; said so; spelt nearly so."""
+"""Cost of replacing a word: by one that differs in case; by a synonym; by one spelt similarly."""
 NOISE, PLAIN, KNOWN = 0.2, 0.7, 2.5
-"""What it costs to leave out a word that says nothing, one that is not known, and one that is."""
+"""Cost of dropping a filler word, an unknown word, and a known word."""
 LONGEST_NAME = 4
-"""Words that may have been meant as one name, `time to contact` for `time_to_contact`."""
+"""Most words joined to one name, such as `time to contact` for `time_to_contact`."""
 
 _SIGNS = {"RPAR": ")", "LPAR": "(", "COMMA": ",", "COLON": ":", "RSQB": "]", "LSQB": "["}
 _PUT_IN = {
@@ -47,12 +47,12 @@ _VOCABULARY = (*RULES.words, *RULES.quantities, *FUNCTIONS)
 
 
 def speller(parser: Lark, start: str, text: str) -> Speller:
-    """How the words of a text of rules are spelt.
+    """The edit costs for a text of rules.
 
     Args:
-        parser: Of rules.
-        start: What the text is, 'start' of rules or 'formula'.
-        text: It cannot be read.
+        parser: Parser of rules.
+        start: Start symbol, 'start' for rules or 'formula'.
+        text: A text with a syntax error.
     """
     variables, lacking = variables_of(text)
     put: dict[str, tuple[float, tuple[str, ...]]] = dict(_PUT_IN)
@@ -64,10 +64,10 @@ def speller(parser: Lark, start: str, text: str) -> Speller:
 
 
 def variables_of(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The variables of a rule that cannot be read, and those that it uses and its head lacks.
+    """The variables of a faulty rule, and those that it uses but its head lacks.
 
-    The first are the names in its head that it uses; where there are none, all in its head, or all
-    that it uses.
+    The first are the names in its head that it uses; if there are none, all in its head, or all that it
+    uses.
     """
     head = _HEAD.search(text)
     rest = text[head.end() :] if head else text
@@ -125,7 +125,7 @@ def _meant(
 
 
 def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Meaning]:
-    """Calls that are meant by words without brackets, or that are missing before what follows."""
+    """Calls written as words without brackets, or missing before what follows."""
     first, follows = said[0], said[1] if len(said) > 1 else ""
     if first in _TAKES and follows != "(":
         takes = _TAKES[first]
@@ -144,7 +144,7 @@ def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Mean
 
 
 def _head_meant(said: Sequence[str], variables: Sequence[str]) -> Meaning | None:
-    """The head of a rule, made of what stands before `when`: a name, the variables in use, the severity."""
+    """The head of a rule, from the words before `when`: a name, the used variables, the severity."""
     ends = (n for n, w in enumerate(said) if w.casefold() in _WHEN)
     before = said[: next(ends, 0)]
     severity = next((s for w in before if (s := _severity(w))), "warning")
@@ -162,7 +162,7 @@ def _head_meant(said: Sequence[str], variables: Sequence[str]) -> Meaning | None
 
 
 def _severity(word: str) -> str | None:
-    """The severity that is meant by a word."""
+    """The severity meant by a word."""
     low = word.strip('"').casefold()
     return next((s for s, words in SEVERITIES.items() if low == s or low in words), None)
 
@@ -191,13 +191,13 @@ SEVERITIES: Mapping[str, frozenset[str]] = MappingProxyType(
         ),
     }
 )
-"""What people write in place of a severity."""
+"""Common words for severities."""
 LONGEST_HEAD = 24
 _WHEN = frozenset(("when", "if", "whenever", "wenn", "si", "quand", "wen", "whn"))
 
 
 def _verb(word: str, things: int) -> str | None:
-    """The relation between so many things that is meant by a word."""
+    """The relation between this many objects meant by a word."""
     known = _RELATIONS[things - 1]
     return word if word in known else synonym(word, known) or closest(word, known, 0.8)
 
@@ -211,7 +211,7 @@ _RELATIONS = [
 
 
 def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
-    """What the words from one on may mean."""
+    """Possible meanings of the words from an index on."""
     said = [w.text for w in words[at : at + LONGEST_NAME]]
     first, called = said[0], len(said) > 1 and said[1] == "("
     for length, meant in meant_by(said):
@@ -257,7 +257,7 @@ TEMPORAL: Mapping[str, str] = MappingProxyType(
         "alw": "henceforth", "next": "eventually",
     }
 )  # fmt: skip
-"""Operators of other temporal logics, before a window."""
+"""Temporal operators of other logics, before a window."""
 
 
 def _terminal(word: str) -> str:

@@ -1,4 +1,4 @@
-"""Words of everyday speech and of other tools, and the words of both languages that are meant by them."""
+"""Synonyms: words of everyday speech and of other tools for words of both languages."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ _MEANT = (
     ("confidence", "score probability certainty"),
     ("time_to_contact", "ttc"),
 )
-"""What is meant, the likeliest first, and by which words."""
+"""(meanings, likeliest first; words with these meanings)."""
 
 
 def stem(word: str) -> str:
-    """What a word shares with its other forms: `moves`, `moved` and `moving` give `mov`."""
+    """The stem of a word: `moves`, `moved` and `moving` give `mov`."""
     return re.sub(r"(?:ings?|ed|es|s|e)$", "", word.casefold())
 
 
@@ -57,18 +57,18 @@ def _by_stem() -> Mapping[str, tuple[str, ...]]:
 
 
 SYNONYMS: Mapping[str, tuple[str, ...]] = _by_stem()
-"""Stem of a word -> what may be meant by it."""
+"""Stem of a word -> possible meanings."""
 
 
 def synonym(name: str, known: Iterable[str]) -> str | None:
-    """The known word that is meant by the whole of a name, or by a part of it; None when there is none.
+    """The known word meant by a whole name, or by a part of it; None without one.
 
     >>> synonym("moves", ["moving", "gap"]), synonym("distance_to", ["moving", "gap"])
     ('moving', 'gap')
 
     Args:
-        name: What was written.
-        known: What there is.
+        name: The written name.
+        known: The known words.
     """
     words = tuple(known)
     forms = {stem(word): word for word in words}

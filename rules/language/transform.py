@@ -1,4 +1,4 @@
-"""From Lark's tree to ours; finds where a quantity stands for something true or false, or reversed."""
+"""From Lark's tree to the AST; reports quantities used as conditions, and the reverse."""
 
 from __future__ import annotations
 
@@ -46,16 +46,16 @@ from visup.rules.formula.terms import (
 from visup.rules.formula.units import TIME, Number, Span, Unit
 
 Fault = tuple[Span, str, str | None, str | None]
-"""Place, what is wrong, what was expected, hint."""
+"""Location, what is wrong, what was expected, hint."""
 
 
 EDGES = ("rising", "falling")
-"""What is true at the sample at which a formula becomes true, or ceases to be."""
+"""Functions that are true at the sample where a formula becomes true, or false."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnresolvedCall:
-    """`name(...)` while it is not yet known whether it stands for a quantity or for a fact."""
+    """`name(...)`, not yet resolved to a quantity or a fact."""
 
     name: str
     arguments: tuple[Any, ...]
@@ -71,17 +71,17 @@ class NameArgument:
 
 
 class CallResolver:
-    """What a call stands for, by where it stands.
+    """Resolves calls by their context.
 
     Args:
-        fault: Takes a fault.
+        fault: Records an error.
     """
 
     def __init__(self, fault: Callable[[Fault], None]) -> None:
         self.fault = fault
 
     def formula(self, node: Any) -> Formula:
-        """A node where something true or false is wanted."""
+        """Resolve a node where a condition is expected."""
         if isinstance(node, UnresolvedCall):
             if node.name == "last":
                 spanned = self._spanned(node)
@@ -103,7 +103,7 @@ class CallResolver:
         return cast("Formula", node)
 
     def term(self, node: Any) -> Term:
-        """A node where a quantity is wanted."""
+        """Resolve a node where a quantity is expected."""
         if isinstance(node, UnresolvedCall):
             if node.name in POINTWISE:
                 return PointwiseFunction(
@@ -127,7 +127,7 @@ class CallResolver:
         return Number(0.0, span=_place(node))
 
     def _edge(self, call: UnresolvedCall) -> Formula:
-        """`rising(f)` and `falling(f)`, of which the language is made no larger."""
+        """`rising(f)` and `falling(f)`, as syntactic sugar."""
         if len(call.arguments) != 1:
             what = f"'{call.name}' takes one formula"
             self.fault((call.span, what, f"such as {call.name}(touching(a, b))", None))
@@ -147,7 +147,7 @@ class CallResolver:
         return tuple(a.name for a in call.arguments)
 
     def _spanned(self, call: UnresolvedCall) -> tuple[Any, Number] | None:
-        """The parts of `rate(x, 2 s)` and its like, or None after a fault."""
+        """The arguments of `rate(x, 2 s)` and the like, or None after an error."""
         parts = call.arguments
         if len(parts) == 2 and isinstance(parts[1], Number) and parts[1].dimension == TIME:
             return parts[0], parts[1]
@@ -165,19 +165,19 @@ def _place(node: Any) -> Span:
 
 
 def _span_of(meta: Any) -> Span:
-    """The place of a node of Lark's tree."""
+    """The span of a node of Lark's tree."""
     return Span(meta.line, meta.column, meta.end_line, meta.end_column)
 
 
 def read_tree(tree: Tree[Token], file: str) -> tuple[Any, list[Fault]]:
-    """Rules, or one formula, from the tree that the parser gives.
+    """Build rules, or one formula, from a parse tree.
 
     Args:
-        tree: Of a rule file or of a formula.
+        tree: Parse tree of a rule file or a formula.
         file: Its name, for messages.
 
     Returns:
-        A list of rules or a formula; and the faults that were found on the way.
+        A list of rules or a formula; and the errors found.
     """
     reading = _RuleBuilder(file)
     return reading.transform(tree), reading.faults
@@ -185,13 +185,13 @@ def read_tree(tree: Tree[Token], file: str) -> tuple[Any, list[Fault]]:
 
 @with_meta(meta=True)
 class _RuleBuilder(Transformer[Token, Any]):
-    """Lark's tree to ours.
+    """Transforms Lark's tree to the AST.
 
     Args:
         file: Name of the file, for messages.
 
     Attributes:
-        faults: Faults found on the way, in the order of the text.
+        faults: Errors found, in source order.
     """
 
     def __init__(self, file: str) -> None:
@@ -332,12 +332,12 @@ class _RuleBuilder(Transformer[Token, Any]):
     def comparison(self, meta: Any, parts: list[Any]) -> Formula:
         left, operator, right, leave = parts
         if isinstance(right, Literal) and operator in ("==", "!="):
-            return self._told_twice(left, right.value == (operator == "=="), _span_of(meta))
+            return self._redundant_truth(left, right.value == (operator == "=="), _span_of(meta))
         sides = self.meaning.term(left), self.meaning.term(right)
         return Comparison(sides[0], str(operator), sides[1], leave, _span_of(meta))
 
-    def _told_twice(self, left: Any, holds: bool, span: Span) -> Formula:
-        """`touching(a, b) == true`, which says no more than `touching(a, b)`."""
+    def _redundant_truth(self, left: Any, holds: bool, span: Span) -> Formula:
+        """`touching(a, b) == true`, which is just `touching(a, b)`."""
         claim = self.meaning.formula(left)
         meant: Formula = claim if holds else Not(claim, span)
         hint = f"write `{meant}`"

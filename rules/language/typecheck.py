@@ -1,4 +1,4 @@
-"""Whether the names, arguments and units of rules make sense: every fault, with its place."""
+"""Type checker: names, arguments and units of rules; every error with its location."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ from visup.rules.wording.sentences import mentions
 
 
 class TypeChecker:
-    """Finds the faults of meaning of one text.
+    """Finds the semantic errors of one text.
 
     Args:
-        text: The text that rules were read from, for the lines in messages.
+        text: The source text, for the lines in messages.
         file: Its name.
-        vocabulary: What formulas may name.
+        vocabulary: The names that formulas may use.
     """
 
     def __init__(self, text: str, file: str, vocabulary: Vocabulary = RULES) -> None:
@@ -61,11 +61,11 @@ class TypeChecker:
         self.vocabulary = vocabulary
 
     def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> Diagnostic:
-        """An error at the place of a node."""
+        """A diagnostic at the location of a node."""
         return self.source.fault("", what, span, expected, hint)
 
     def twice(self, rules: Iterable[Rule]) -> Iterator[Diagnostic]:
-        """Rules that bear one name."""
+        """Errors for duplicate rule names."""
         names: set[str] = set()
         for rule in rules:
             if rule.name in names:
@@ -76,12 +76,12 @@ class TypeChecker:
             names.add(rule.name)
 
     def formula(self, formula: Formula) -> Iterator[Diagnostic]:
-        """The faults of a formula that stands by itself."""
+        """The errors of a formula."""
         for fault in _FormulaChecker(self.vocabulary, None).node(formula):
             yield self.fault(*fault)
 
     def rule(self, rule: Rule) -> Iterator[Diagnostic]:
-        """The faults of one rule."""
+        """The errors of one rule."""
         if not rule.variables and (missing := _objects_in(rule, self.vocabulary)):
             what = f"'{rule.name}' has no variables, but names {', '.join(missing)}"
             hint = f"write `{rule.name}({', '.join(missing)})` in place of `{rule.name}()`"
@@ -91,12 +91,12 @@ class TypeChecker:
         found = [f for formula in rule.formulas for f in reader.node(formula)]
         found += [f for w in ("hold", "cooldown") for f in _time(getattr(rule, w), w)]
         found += self._head(rule)
-        # A variable that is missing from a faulty call is no second fault.
+        # A variable missing because of a faulty call is no second error.
         for name in sorted(set(rule.variables) - reader.used) if not found else ():
             what = f"the variable '{name}' of '{rule.name}' is not used"
             hint = f"leave `{name}` out, or the rule is true for every object"
             found.append((rule.span, what, None, hint))
-        # What a rule keeps can be counted only when all else is well.
+        # The cost of a rule can only be computed if it is otherwise correct.
         for fault in found or self._bounds(rule):
             yield self.fault(*fault)
 
@@ -134,7 +134,7 @@ class TypeChecker:
 
 
 class _FormulaChecker:
-    """Goes through formulas; remembers which variables they use."""
+    """Walks formulas; records which variables they use."""
 
     def __init__(self, vocabulary: Vocabulary, variables: tuple[str, ...] | None) -> None:
         self.vocabulary = vocabulary
@@ -205,7 +205,7 @@ class _FormulaChecker:
         self.scope = outer
 
     def let(self, node: Let) -> Iterator[Fault]:
-        """What a value is of, when it is noted, and what is said of it."""
+        """Check a `let`: its value, its condition, and its body."""
         name, outer = node.variable, self.values
         if name in (*self.scope, *outer):
             what = f"'{name}' is already the name of {'a value' if name in outer else 'an object'}"
@@ -234,7 +234,7 @@ class _FormulaChecker:
             yield ahead.span, what, "what is true now or was", hint
 
     def variable(self, node: Variable) -> Iterator[Fault]:
-        """A bare name among quantities: what `let` has bound, or a call without its arguments."""
+        """A bare name among quantities: bound by `let`, or a call without arguments."""
         self.used.add(node.name)
         if node.name in self.values:
             return
@@ -281,7 +281,7 @@ class _FormulaChecker:
             yield call.span, what, "two different objects", hint
 
     def _compared(self, call: Predicate | Measure) -> str:
-        """What to write in place of a quantity that stands where something is true or false."""
+        """A suggestion for a quantity used as a condition."""
         said = f"{call.name}({', '.join(call.words)})"
         measured = Measure(call.name, call.words, call.span)
         amount = example_amount(Comparison(measured, "<", measured), self.vocabulary)
@@ -302,7 +302,7 @@ class _FormulaChecker:
 
 
 def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:
-    """The names that stand for objects in a rule, in their order."""
+    """The names used for objects in a rule, in order."""
     found: list[str] = []
     for node in (n for formula in rule.formulas for n in walk(formula)):
         table = vocabulary.words if isinstance(node, Predicate) else vocabulary.quantities
@@ -352,11 +352,11 @@ def _often(node: MOfN) -> Iterator[Fault]:
 
 
 def _nearest(word: str, known: Iterable[str]) -> str:
-    """All that is known if it is little, else what is spelt most like a word."""
+    """All known words if few, else those spelt most similarly."""
     return _nearest_of(word, tuple(known))
 
 
-@lru_cache(maxsize=4096)  # each edit that is tried meets all faults of its file anew
+@lru_cache(maxsize=4096)  # each tried edit repeats all errors of its file
 def _nearest_of(word: str, names: tuple[str, ...]) -> str:
     if len(names) <= MOST_LISTED:
         return _listed(names)
@@ -365,7 +365,7 @@ def _nearest_of(word: str, names: tuple[str, ...]) -> str:
 
 
 MOST_LISTED = 8
-"""Longer lists nobody reads."""
+"""Most words in a list."""
 
 
 def _listed(words: Iterable[str]) -> str:

@@ -187,7 +187,7 @@ def test_what_more_slips_cost_is_bounded(monkeypatch: pytest.MonkeyPatch) -> Non
     slip = 'rule r(a, b) info\n when touching(a, b) and and nearr(b)\n say "x"\n'
     spent = reading.Patience(left=-1)
     found = reading.read_repaired(slip, "start", "r.rules", VOCABULARY, spent)
-    told = found.told(slip)
+    told = found.diagnostics(slip)
     weigh = partial(reading.weight, patience=spent)
     assert told == reading.with_tried_edits(slip, told, weigh)
     assert not looked
@@ -206,7 +206,7 @@ def test_once_nothing_may_be_tried_any_more_no_further_hint_is_looked_for(
     monkeypatch.setattr(reading, "fix_of", counted)
     slips = " and ".join(f"standalon{n}(b)" for n in range(60))
     rule = f'rule r(a, b): info\n    when {slips}\n    say "x"\n'
-    told = reading.read_repaired(rule, "start", "r.rules", VOCABULARY, reading.Patience()).told(
+    told = reading.read_repaired(rule, "start", "r.rules", VOCABULARY, reading.Patience()).diagnostics(
         rule
     )
     assert len(told) == 60
