@@ -1,4 +1,4 @@
-"""Which behaviours are needed, and for which objects: coarse ones first, finer ones where they matter.
+"""Activation and attention: which behaviours run, and for which objects.
 
 Read in this order: `activation.py` (behaviours activated by a condition of the rule language),
 `attention.py` (objects whose identity is certain are matched less often).

@@ -1,10 +1,10 @@
-"""Activation: behaviours that run only when the scene requires them, coarse ones first.
+"""Activation: behaviours that run only when the scene requires them, coarse to fine.
 
-A behaviour's contract says when it is awake, as a condition of the rule language about one object `a`:
-"expected(a)" for one that a stage of a task asks something of now, "exists b: gap(a, b) < 60 px" for one that
-comes near another. What sees all the time is coarse; it hands over, by such a condition, to what
-looks more closely at that object, and takes over again when the condition ends or the finer one fails
-(`relieves`). What safety rules read is given by behaviours that never sleep.
+A behaviour's contract states when it is active, as a condition of the rule language about one object `a`:
+"expected(a)" for one that a task stage currently refers to, "exists b: gap(a, b) < 60 px" for one near
+another. A coarse behaviour that always runs hands over, by such a condition, to a finer one for that object,
+and takes over again when the condition ends or the finer one fails (`relieves`). Behaviours whose output
+safety rules read are always active.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _PREFIX = "awake_"
 
 
 def activation_rules(contracts: Sequence[Contract]) -> tuple[Rule, ...]:
-    """A rule for each behaviour that sleeps at times: when it is awake.
+    """A rule for the activation of each conditional behaviour.
 
     Raises:
-        BehaviourError: A condition is not one.
+        BehaviourError: A condition is invalid.
     """
     return tuple(_rule(c) for c in contracts if c.awake)
 
@@ -52,11 +52,11 @@ def _rule(contract: Contract) -> Rule:
 
 
 def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[str]:
-    """Names of behaviours that must not sleep, since safety rules depend on them alone.
+    """Names of behaviours that must stay active, since only they serve safety rules.
 
     Args:
-        contracts: Of all behaviours.
-        rules: What is watched; those that are more than information count.
+        contracts: Contracts of all behaviours.
+        rules: Monitored rules; those above severity 'info' count.
     """
     read = {
         kind
@@ -72,7 +72,7 @@ def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> froze
 
 @dataclass(frozen=True, slots=True)
 class ActivationReasoner:
-    """Reasoner of the attend phase: calls behaviours that are asleep else.
+    """Reasoner of the attend phase: activates conditional behaviours.
 
     Attributes:
         rules: From `activation_rules`.
@@ -85,13 +85,13 @@ class ActivationReasoner:
         object.__setattr__(self, "_reasoner", RuleReasoner(self.rules, ACTIVATION))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Reason about one step; see `Reasoner`."""
         asked = self._reasoner(mind, observation)
         return Outcome(asked.mind, directives=tuple(_directives(mind, asked.conditions)))
 
 
-def _directives(mind: Mind, concerns: Sequence[AlertCondition]) -> Iterator[Directive]:
-    for concern in concerns:
+def _directives(mind: Mind, conditions: Sequence[AlertCondition]) -> Iterator[Directive]:
+    for concern in conditions:
         (number,) = concern.objects
         region = mind.objects[number].region.id
         name = concern.kind.removeprefix(_PREFIX)

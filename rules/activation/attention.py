@@ -1,11 +1,10 @@
 """Attention: objects whose identity is certain are observed less closely, with the reason.
 
-Coarse to fine: motion and health see every frame, always; what a silhouette looks like is matched
-again and again only where that may still change anything: for objects whose identity is not settled,
-that turn, or that a task asks something of now. All others *rest*: they are matched again now and
-then, and what they looked like last is told meanwhile.
+Coarse to fine: motion and health process every frame; silhouettes are matched repeatedly only where that may
+change anything: for objects of unsettled identity, that rotate, or that a task stage currently refers to. All
+others *rest*: they are matched now and then, and keep their last result meanwhile.
 
-Off by default: between two looks a pose is not renewed, and what turns slowly is seen turning later.
+Off by default: between two matches a pose is not updated, so slow rotation is noticed later.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ ATTENTION: MemoryKey[Mapping[int, tuple[str, float]]] = MemoryKey(
 
 @dataclass(frozen=True, slots=True)
 class AttentionSettings:
-    """When an object may rest.
+    """Settings of attention.
 
     Attributes:
-        settled: Likelihood of its identity.
+        settled: Likelihood of the identity from which an object may rest.
         settled_s: How long it must have had it, seconds.
-        turning: Above this rate it is looked at, degrees per second.
-        every_s: How often it is looked at all the same, seconds.
+        turning: Rate of rotation above which it is matched, degrees per second.
+        every_s: Interval of matches at rest, seconds.
     """
 
     settled: float = 0.95
@@ -41,12 +40,12 @@ class AttentionSettings:
 
 @dataclass(frozen=True, slots=True)
 class AttentionReasoner:
-    """Reasoner of the attend phase: says which regions need not be matched now."""
+    """Reasoner of the attend phase: requests that regions not be matched now."""
 
     settings: AttentionSettings = field(default_factory=AttentionSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Reason about one step; see `Reasoner`."""
         old = mind.recall(ATTENTION)
         since = {b.id: self._since(b, old, mind.time) for b in mind.objects.values()}
         wanted = {i for t in mind.tasks for e in t.expected for i in e.objects}
@@ -59,7 +58,7 @@ class AttentionReasoner:
     def _since(
         self, b: ObjectBelief, old: Mapping[int, tuple[str, float]], now: float
     ) -> tuple[str, float]:
-        """The name that is settled, or none, and since when."""
+        """The settled name, or an empty one, and since when."""
         name = b.name if b.confidence >= self.settings.settled and b.candidates else ""
         before = old.get(b.id)
         return before if before is not None and before[0] == name else (name, now)

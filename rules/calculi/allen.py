@@ -24,11 +24,11 @@ NAMES = {
 
 
 def allen(a: tuple[float, float], b: tuple[float, float]) -> str:
-    """What interval a is to interval b.
+    """The relation of interval a to interval b.
 
     Args:
-        a: Begin and end, the end later.
-        b: Another.
+        a: Start and end, the end later.
+        b: Another interval.
 
     Returns:
         One of `ALLEN`.
@@ -54,5 +54,5 @@ def allen(a: tuple[float, float], b: tuple[float, float]) -> str:
 
 
 def rectangle_relation(a: Box, b: Box) -> tuple[str, str]:
-    """What box a is to box b along x and along y: two of `ALLEN`."""
+    """The relations of box a to box b along x and y: two of `ALLEN`."""
     return allen((a[0], a[2]), (b[0], b[2])), allen((a[1], a[3]), (b[1], b[3]))

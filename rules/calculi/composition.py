@@ -1,7 +1,7 @@
-"""Composition: if a is R to b, and b is S to c, what a may be to c.
+"""Composition tables: possible relations of a to c, given those of a to b and b to c.
 
-The table of RCC-8 is that of Cohn and others (1997); that of Allen follows from all ways in which
-three intervals can lie, of which six moments suffice; that of rectangles is Allen's for each axis.
+The table of RCC-8 is from Cohn and others (1997); Allen's is derived from all configurations of three
+intervals, for which six moments suffice; the rectangle algebra's is Allen's along each axis.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ N       D       D       DEPTN   N       N       N       DEPTN   *
 t       DEPtn   EPtn    Ptn     t       PTtQ    PTN     tn      n
 n       DEPtn   Ptn     Ptn     n       Ptn     PTNtnQ  n       n
 """
-"""Rows: what a is to b; columns, in the order of `RCC8`: what b is to c; `*` is anything."""
+"""Rows: relation of a to b; columns, in the order of `RCC8`: relation of b to c; `*` is any."""
 
 
 @lru_cache(maxsize=1)
 def rcc8_composition() -> Table:
-    """(R, S) -> what a may be to c, in RCC-8."""
+    """(R, S) -> possible relations of a to c, in RCC-8."""
     found: dict[tuple[str, str], frozenset[str]] = {}
     for line in _ROWS.strip().splitlines():
         first, *cells = line.split()
@@ -44,7 +44,7 @@ def rcc8_composition() -> Table:
 
 @lru_cache(maxsize=8)
 def rcc_composition(calculus: str) -> Table:
-    """The table of a coarser calculus: that of RCC-8, joined."""
+    """The table of a coarser calculus, merged from that of RCC-8."""
     names, found = COARSER[calculus], dict[tuple[str, str], frozenset[str]]()
     for (first, second), cell in rcc8_composition().items():
         key = names[first], names[second]
@@ -54,7 +54,7 @@ def rcc_composition(calculus: str) -> Table:
 
 @lru_cache(maxsize=1)
 def allen_composition() -> Table:
-    """(R, S) -> what interval a may be to c."""
+    """(R, S) -> possible relations of interval a to c."""
     intervals = [(p, q) for p, q in product(range(6), repeat=2) if p < q]
     found: dict[tuple[str, str], frozenset[str]] = {}
     for a, b, c in product(intervals, repeat=3):

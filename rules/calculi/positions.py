@@ -1,4 +1,4 @@
-"""Where points are: cardinal directions, distances with names, movement, three points (TPCC)."""
+"""Positions of points: cardinal directions, named distances, movement, three points (TPCC)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SECTOR = 45.0
 
 
 def cardinal(a: Point, b: Point) -> str:
-    """Where a lies seen from b, y up: eight sectors of 45 degrees, or `eq` (Frank 1996)."""
+    """Direction of a from b, y up: eight sectors of 45 degrees, or `eq` (Frank 1996)."""
     x, y = a[0] - b[0], a[1] - b[1]
     if x == y == 0.0:
         return "eq"
@@ -32,12 +32,12 @@ def moving_or_stationary(before: Point, now: Point, slack: float = 0.0) -> str:
 
 
 def tpcc(origin: Point, relatum: Point, referent: Point) -> str:
-    """Where the referent is for one who went from the origin to the relatum (Moratz and others 2003).
+    """Position of the referent relative to the line from origin to relatum (Moratz and others 2003).
 
     Returns:
-        `sam` (at the relatum), `dou` (at the origin), `tri` (both of these are one place), or two
-        parts: `c` closer to the relatum than the origin is, `d` not; then straight (`s`) back,
-        front, left, right, or one of eight sectors between, such as `lf` (left, rather front).
+        `sam` (at the relatum), `dou` (at the origin), `tri` (relatum and origin coincide), or two parts:
+        `c` closer to the relatum than the origin is, `d` not; then straight (`s`) back, front, left,
+        right, or one of eight sectors between, such as `lf` (left, rather front).
     """
     if origin == relatum:
         return "tri" if referent == relatum else "dou"

@@ -1,7 +1,7 @@
 """The qualitative trajectory calculus of two points (Van de Weghe 2004): basic, double cross, both.
 
-The four signs: how k moves to where l is (-1 towards, 1 away), how l moves to where k is; on which
-side of the line from k to l point k moves (-1 left, 1 right, with y up), and likewise l.
+The four signs: motion of k towards (-1) or away from (1) l's position, motion of l relative to k's position;
+the side of the line from k to l to which k moves (-1 left, 1 right, with y up), and likewise for l.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from math import hypot
 Point = tuple[float, float]
 Signs = tuple[int, ...]
 DIGITS = 9
-"""Of movements so many decimals count, so that what is level is level."""
+"""Decimals to which movements are rounded, so that level motion gives 0."""
 
 
 def qtc_step(k: tuple[Point, Point], ell: tuple[Point, Point], slack: float = 0.0) -> Signs:
     """QTC-C of a step of two points.
 
     Args:
-        k: Where it was, and where it is now.
+        k: Its previous and current position.
         ell: The other point likewise.
-        slack: Movement up to it is none, in the unit of the places.
+        slack: Movement up to this counts as none, in the unit of the positions.
 
     Returns:
         Four signs; the first two of them are QTC-B.
@@ -40,19 +40,19 @@ def qtc_bc_step(
 
 
 def collapsed(states: Sequence[Signs]) -> list[Signs]:
-    """States that follow each other, equal neighbours once."""
+    """A sequence of states without repetitions."""
     return [s for n, s in enumerate(states) if n == 0 or s != states[n - 1]]
 
 
 def continuous(states: Sequence[Signs]) -> list[Signs]:
-    """The same with what must lie between: no sign goes from - to + without being 0."""
+    """Insert the states required by continuity: no sign changes from - to + without passing 0."""
     found: list[Signs] = []
     for state in states:
         if found:
             before = found[-1]
             shared = list(zip(before, state, strict=False))
             if any(p * s < 0 for p, s in shared):
-                # At the moment at which one passes 0, what comes from 0 has not left it.
+                # When one sign passes 0, one that starts from 0 has not left it yet.
                 between = tuple(s if p * s > 0 else 0 for p, s in shared)
                 found.append(between + state[len(before) :])
         found.append(state)
@@ -60,12 +60,12 @@ def continuous(states: Sequence[Signs]) -> list[Signs]:
 
 
 def _moved(p: tuple[Point, Point], other: Point, slack: float) -> tuple[int, int]:
-    """How a point moved to where another one was: towards or away, left or right."""
+    """Motion of a point relative to another's position: towards or away, left or right."""
     (x0, y0), (x1, y1) = p
     line = (other[0] - x0, other[1] - y0)
     length = hypot(*line)
     if length == 0.0:
-        return 0, 0  # from one place there is no line to the other
+        return 0, 0  # coincident points define no line
     along = -((x1 - x0) * line[0] + (y1 - y0) * line[1]) / length
     across = -(line[0] * (y1 - y0) - line[1] * (x1 - x0)) / length
     return _sign(along, slack), _sign(across, slack)

@@ -25,14 +25,14 @@ COARSER: Mapping[str, Mapping[str, str]] = MappingProxyType(
 
 
 def rcc(a: Box, b: Box, calculus: str = "RCC8", grown: float = 0.0) -> str:
-    """What box a is to box b.
+    """The relation of box a to box b.
 
     Args:
         a: A closed box.
-        b: Another.
+        b: Another closed box.
         calculus: One of `COARSER`.
-        grown: How far each box is grown when it is asked whether they are disconnected; boxes that
-            meet only so overlap partially.
+        grown: How far each box is grown for the test of disconnection; boxes that only then meet overlap
+            partially.
 
     Returns:
         The relation.

@@ -1,4 +1,4 @@
-"""How fast places on a path go on, compiled; see `relative_motion.py`."""
+"""Compiled loops of `relative_motion.py`: velocity along a path of positions."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from visup.rules.smoothing.hysteresis import Floats
 
 @compiled
 def first_recent(path: Floats, now: float, window: float, least: int) -> int:
-    """Number of the first place on a path that tells how it goes on now.
+    """Index of the first position of a path within the current window.
 
     Args:
         path: (N, 6); see `fused_velocity`.
         now: Seconds.
-        window: Over how long, seconds; longer where gaps leave too few places within.
-        least: Fewest places.
+        window: Length of the window, seconds; longer where gaps leave too few positions in it.
+        least: Fewest positions.
     """
     count = len(path)
     inside = long = 0
@@ -28,19 +28,19 @@ def first_recent(path: Floats, now: float, window: float, least: int) -> int:
 
 @compiled
 def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floats]:
-    """The slope of places, joined with the mean of velocities, each by its precision.
+    """The slope of positions fused with the mean of velocities, weighted by precision.
 
     Args:
-        path: (N, 6) of time, place (x, y), velocity (x, y) and its variance; see `RelativeTrack.path`.
-        begin: The first place that counts; those before tell of noise alone.
-        lasts: Errors of velocities are alike for so long, seconds.
+        path: (N, 6) of time, position (x, y), velocity (x, y) and its variance; see `RelativeTrack.path`.
+        begin: The first position that counts; earlier ones only serve to estimate noise.
+        lasts: Correlation time of velocity errors, seconds.
 
     Returns:
         (2,) velocity and (2, 2) its covariance.
     """
     count = len(path)
-    # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
-    # longer, and is believed to be as large.
+    # Neighbouring positions differ by noise alone, however the bodies move; the correlated part of the
+    # noise is assumed equally large.
     xx = xy = yy = 0.0
     for n in range(count - 1):
         dx, dy = path[n + 1, 1] - path[n, 1], path[n + 1, 2] - path[n, 2]

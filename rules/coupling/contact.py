@@ -1,8 +1,9 @@
-"""Contact that is meant: outlines that meet in the image, of bodies that do not pass each other.
+"""Contact of outlines that meet in the image, as opposed to bodies passing each other.
 
-Touching in the picture is not touching. What happens next tells: of two that meet, one comes to rest at the
-other, takes it along, or is thrown back; what goes on past the other as fast as it came is in front of it, or
-behind.
+Touching in the picture is not touching. The continuation decides: a body in contact comes to rest at the
+other, takes it along, or bounces back; one that goes on as fast as it came passes in front of the other, or
+behind it.
+
 """
 
 from __future__ import annotations
@@ -14,16 +15,16 @@ from visup.agent.model.fast_replace import replace
 
 @dataclass(frozen=True, slots=True)
 class ContactSettings:
-    """When outlines that meet are in contact.
+    """Settings of contact.
 
     Attributes:
-        passing: Relative speed from which on one passes the other, image diagonals per second; and
-        passing_share: the same as a share of the speed at which both move; and
-        slowed_share: as a share of the speed with which they met: what brakes at the other means it.
-        settled_s: For how long they must not pass each other to have settled.
-        unknown_s: Outlines that meet for so long while nothing is known of their motion have settled.
-        doubt_share: One that has passed so far across the other, in sizes of the smaller one, is believed
-            to be in front of it or behind.
+        passing: Relative speed from which one passes the other, image diagonals per second.
+        passing_share: The same as a share of the speed at which both move.
+        slowed_share: The same as a share of the speed at which they met: braking indicates contact.
+        settled_s: How long they must not pass each other to have settled.
+        unknown_s: How long outlines must meet to have settled while their motion is unknown.
+        doubt_share: Distance passed across the other, in sizes of the smaller one, from which one is
+            assumed in front of the other or behind it.
     """
 
     passing: float = 0.0125
@@ -36,15 +37,15 @@ class ContactSettings:
 
 @dataclass(frozen=True, slots=True)
 class OutlineContact:
-    """What is remembered of two whose outlines meet; seconds and pixels.
+    """The memory of two bodies whose outlines meet; seconds and pixels.
 
     Attributes:
         met_at: Since when they meet.
-        settled_since: Since when they rest at each other, or None.
+        settled_since: Since when they are settled, or None.
         path: How far one has passed across the other since it last did not.
-        passing: Whether one was last seen to pass the other, and
-        changed_at: since when that is as it is.
-        known: Whether their relative motion was ever known since they meet.
+        passing: Whether one was last observed passing the other.
+        changed_at: Since when `passing` has its value.
+        known: Whether their relative motion was ever known since they met.
         fastest: Their greatest relative speed since, pixels per second.
     """
 
@@ -66,15 +67,15 @@ def updated_contact(
     *,
     thrown_back: bool = False,
 ) -> OutlineContact:
-    """What is believed of two whose outlines meet after another look.
+    """Update the contact of two bodies whose outlines meet.
 
     Args:
-        before: What was believed; None when they did not meet before.
-        speed: Relative, pixels per second; None when it is not known.
-        limit: From which speed on one passes the other, pixels per second.
-        moment: Seconds now, and since the look before.
-        settings: Patience.
-        thrown_back: Whether they part again on the side on which they met: that is contact made.
+        before: The previous contact; None if they did not meet before.
+        speed: Relative speed, pixels per second; None when unknown.
+        limit: Speed from which one passes the other, pixels per second.
+        moment: Current time, and time since the previous update, seconds.
+        settings: Settings.
+        thrown_back: Whether they separate on the side on which they met, which implies contact.
     """
     now, dt = moment
     contact = before or OutlineContact(now, changed_at=now)

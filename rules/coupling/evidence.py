@@ -1,4 +1,4 @@
-"""What is remembered and seen of two bodies that may be one, and what of it becomes relations."""
+"""Evidence on coupling: memory and observations of pairs, and the relations derived from them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.reasoner import kinematics
 
 CONFIDENCE = 0.9
-"""How sure couplings are: outlines at rest to each other may still be apart in depth."""
+"""Confidence of couplings: outlines at rest relative to each other may still be apart in depth."""
 
 COLUMNS = ColumnLayout(
     (
@@ -36,16 +36,16 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CouplingEvidence:
-    """What is remembered of one pair: seconds since when each holds, or None.
+    """The memory of one pair: seconds since when each has held, or None.
 
     Attributes:
-        converged_at: When they last were converging, not touching yet.
-        rest_odds: Logarithm of the odds, from 0 on, that they touch and are at rest.
-        rest_since: Since when these are above 0.
+        converged_at: When they were last converging without touching.
+        rest_odds: Log odds, at least 0, that they touch and are at rest.
+        rest_since: Since when these have been above 0.
         apart_since: Since when they are apart.
-        relative_track: How they have moved relative to each other since they are near.
-        contact: Whether their outlines meet, and whether that is meant.
-        decoupled_at: Since when they are no longer coupled, if they were.
+        relative_track: Their relative motion since they are near.
+        contact: Contact of their outlines.
+        decoupled_at: When they were decoupled, if they were.
     """
 
     converged_at: float | None = None
@@ -66,15 +66,15 @@ NO_EVIDENCE = CouplingEvidence()
 
 
 class PairObservation(NamedTuple):
-    """Two objects as they are seen now; lives only while the reasoner runs.
+    """The current observation of a pair; lives only while the reasoner runs.
 
     Attributes:
         pair: Their ids.
-        touching: Code of a truth, and
-        converging: the same, and
-        diverging: the same.
-        gap: Of their outlines, pixels; NaN unknown.
-        host: Id of the one in whose region both are merged, or None.
+        touching: Truth code.
+        converging: Truth code.
+        diverging: Truth code.
+        gap: Gap of their outlines, pixels; NaN unknown.
+        host: Id of the object whose region contains both, or None.
     """
 
     pair: Pair
@@ -86,7 +86,7 @@ class PairObservation(NamedTuple):
 
 
 def common_speed(mind: Mind, pair: Pair) -> float:
-    """The speed of the slower of two, pixels per second; that of the one whose speed is known; else 0."""
+    """The speed of the slower of two, pixels per second; of the only known one; else 0."""
     speeds = [own_speed(mind, i) for i in pair]
     return min((s for s in speeds if s is not None), default=0.0)
 
@@ -94,11 +94,11 @@ def common_speed(mind: Mind, pair: Pair) -> float:
 def own_speed(mind: Mind, number: int) -> float | None:
     """Speed of a body itself, pixels per second; None while unknown.
 
-    The outline of what is being covered goes back as fast as what covers it comes on, and that of what
-    comes nearer grows; image motion knows neither. So the slower of both is taken.
+    The outline of a body being covered recedes as fast as its occluder advances, and that of an approaching
+    body grows; image motion is free of both effects. So the slower of both is used.
 
-    An approximation: image motion still has the camera's in it. What a moving camera follows counts as
-    slow, and must rest at the other for longer before the two count as one.
+    An approximation: image motion still contains the camera's. A body followed by a moving camera counts
+    as slow, and must rest at the other for longer before the two count as one.
     """
     body = mind.objects[number]
     told = [kinematics(mind).one("speed", number)]
@@ -108,7 +108,7 @@ def own_speed(mind: Mind, number: int) -> float | None:
 
 
 def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
-    """All pairs of present objects as they are seen now."""
+    """Observations of all pairs of present objects."""
     ids, now = table.ids, kinematics(mind)
     hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
     gaps = now.gap.tolist() if now.ids == ids else None
@@ -135,15 +135,15 @@ def relation_table(mind: Mind) -> RelationTable:
 def coupling_cells(
     observed: Sequence[PairObservation],
     coupled: Mapping[Pair, Coupling],
-    kept: Mapping[Pair, CouplingEvidence],
+    evidence: Mapping[Pair, CouplingEvidence],
     mind: Mind,
 ) -> RelationBlock:
-    """The relations of being coupled and in contact."""
+    """The relations `coupled` and `in_contact`."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
     state = np.zeros((3, len(observed)), dtype=np.int8)
     since = np.full(state.shape, mind.time)
     for k, seen in enumerate(observed):
-        contact = kept[seen.pair].contact
+        contact = evidence[seen.pair].contact
         if contact is not None:
             settled = contact.settled_since
             state[1, k] = UNKNOWN_CODE if settled is None else 1
@@ -151,26 +151,26 @@ def coupling_cells(
             state[2, k] = _in_front(contact, seen.pair, mind)
             since[2, k] = contact.changed_at
         if seen.pair in coupled:
-            doubted = kept[seen.pair].apart_since is not None
+            doubted = evidence[seen.pair].apart_since is not None
             state[:2, k], state[2, k] = UNKNOWN_CODE if doubted else 1, 0
             since[0, k] = coupled[seen.pair].since
         elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
             state[:, k] = UNKNOWN_CODE
-        elif (parted := kept[seen.pair].decoupled_at) is not None:
+        elif (parted := evidence[seen.pair].decoupled_at) is not None:
             since[0, k] = parted
     return RelationBlock(COLUMNS, state, since, np.full((1, len(observed)), CONFIDENCE))
 
 
 def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
-    """Whether one of two whose outlines meet has gone so far across the other that it does not touch it."""
+    """Whether one of two has passed so far across the other that they cannot be in contact."""
     size = min(float(np.sqrt(mind.objects[i].region.area)) for i in pair)
     return contact.passing and contact.path > ContactSettings().doubt_share * size
 
 
 def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
-    """The regions in which the two are seen now, twice the same one when they are merged.
+    """The current regions of the two, twice the same one when they are merged.
 
-    What still shows of a body that another one hides moves as the edge of that one does: it tells nothing.
+    The visible rest of a hidden body moves like its occluder's edge, which carries no information.
     """
     if seen.host is not None:
         host = mind.objects[seen.host]
@@ -184,6 +184,6 @@ def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | N
 
 
 def regions_apart(pair: Pair, mind: Mind) -> tuple[Region, Region]:
-    """The regions of two that are merged: what was last seen of the one, and the merged one."""
+    """The regions of a merged pair: the last one of the hidden body, and the merged one."""
     first, second = (mind.objects[i].region for i in pair)
     return first, second

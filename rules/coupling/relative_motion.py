@@ -1,15 +1,13 @@
-"""How two bodies that meet move relative to each other: by their outlines, and by image motion.
+"""Relative motion of two bodies that meet, from their outlines and from image motion.
 
-The velocities that the segmenter reports are used where there are any; outlines always. Each outline
-is kept as it was when the two came near, and laid upon every later one: points are moved along their
-normals until they lie on it (iterated closest points, Chen and Medioni 1992, translation alone,
-robust). Hundreds of points say more than the few by which a body reaches furthest, errors of single
-stretches hardly count, and what is wrong with the kept outline is wrong in the same way each time, so
-that it does not look like motion. Once both are seen as one region, both kept outlines are laid upon
-that.
-
-Points at the image border, and those beside the other body, where the outline ends because the
-other begins, have no say.
+Velocities reported by the segmenter are used where available; outlines always. Each outline is stored when
+the two come near, and registered to every later one: points are moved along their normals until they are on
+it (iterated closest points, Chen and Medioni 1992, translation only, robust). Hundreds of points carry more
+information than the few extreme ones, errors of short stretches hardly count, and errors of the stored
+outline are the same each time, so that they do not look like motion. Once both are in one region, both stored
+outlines are registered to that.
+ Points at the image border, and those next to the other body, where an outline ends because the other begins,
+are excluded.
 """
 
 from __future__ import annotations
@@ -29,38 +27,38 @@ from visup.rules.geometry.outlines import TEMPLATE_POINTS, prepared_outline
 from visup.rules.geometry.regions import Floats
 
 ICP_REACH = 12.0
-"""How far a point may be from the outline on which it is laid, pixels."""
+"""Greatest distance of a point to the target outline, pixels."""
 
 NEAR_REACH = 1.5
-"""A body that is larger is followed by what of it is no farther from the other one than so many of the
-other's sizes: an arm that bends moves otherwise at its shoulder than at the hand with which it holds."""
+"""Of a larger body only the part within this distance of the other one, in sizes of the other, is tracked: a
+bending arm moves differently at its shoulder than at its hand."""
 
 NEIGHBOUR_MARGIN = 6.0
-"""How near the other body an outline is not trusted, pixels."""
+"""Distance to the other body within which an outline is not trusted, pixels."""
 
 LEAST_SIGMA = 0.3
-"""No velocity in the image is believed to be known better, pixels per second."""
+"""Least standard deviation of an image velocity, pixels per second."""
 
 CORRELATION_S = 0.2
-"""Errors of velocities are alike for so long, seconds."""
+"""Correlation time of velocity errors, seconds."""
 
 PART_VARIANCE = 4.0
-"""By how much less is known of a part of a body from the motion of the whole, where nothing else tells."""
+"""Factor of variance when the motion of a whole body stands in for that of a part."""
 
 LEAST_POINTS = 12
 LEAST_SAMPLES = 5
-_OUTLIER = 1.5  # pixels beyond which a point counts less
+_OUTLIER = 1.5  # distance beyond which a point is down-weighted, pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OutlineTemplate:
-    """Points of an outline that say how a body moves.
+    """Points of an outline for tracking a body.
 
     Attributes:
         points: (N, 2) pixels.
         normals: (N, 2) unit vectors across the outline.
         shift: (x, y) by which the body has moved since, pixels.
-        local: Whether they are only of that part of the body that is near the other one.
+        local: Whether they cover only the part of the body near the other one.
     """
 
     points: Floats
@@ -71,16 +69,15 @@ class OutlineTemplate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelativeTrack:
-    """What is remembered of two bodies that are near each other.
+    """The relative track of two bodies near each other.
 
     Attributes:
-        first: Outline of the one, and
-        second: of the other.
-        since: Seconds when they were kept.
+        first: Outline of the first.
+        second: Outline of the second.
+        since: Seconds when they were stored.
         before: Relative shift up to then, pixels.
-        path: (time, x, y, vx, vy, variance): how far the second had moved relative to the first,
-            pixels, and how fast it did by image motion, pixels per second; NaN where unknown. Oldest
-            first.
+        path: (time, x, y, vx, vy, variance): displacement of the second relative to the first, pixels,
+            and its velocity by image motion, pixels per second; NaN where unknown. Oldest first.
     """
 
     first: OutlineTemplate
@@ -91,7 +88,7 @@ class RelativeTrack:
 
     @property
     def path_end(self) -> float:
-        """Seconds of the last sight of both."""
+        """Seconds of the last sighting of both."""
         return self.path[-1][0] if self.path else self.since
 
 
@@ -101,13 +98,13 @@ def outline_template(
     size: tuple[int, int],
     beside: Region | None = None,
 ) -> OutlineTemplate | None:
-    """The points of a region's outline that can be followed, or None when there are too few.
+    """The trackable points of a region's outline, or None when there are too few.
 
     Args:
         region: The region.
         others: Bodies near it.
         size: (width, height) of the image, pixels.
-        beside: A body relative to which it moves; of a larger one what is near that is followed.
+        beside: A body relative to which it moves; of a larger body only the part near that is used.
     """
     points = resampled(prepared_outline(region).points, TEMPLATE_POINTS)
     tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
@@ -123,7 +120,7 @@ def outline_template(
     if beside is not None and region.area > beside.area:
         reach = max(NEAR_REACH * float(np.hypot(*beside.bbox[2:])), 0.05 * float(np.hypot(*size)))
         close = free & (_from_box(points, beside.bbox) <= reach)
-        # Where too little is left, or hardly anything is left out, the whole body is followed.
+        # If too little remains, or hardly anything is excluded, the whole body is tracked.
         if 2 * LEAST_POINTS <= close.sum() < 0.8 * free.sum():
             return OutlineTemplate(points[close], normals[close], local=True)
     return OutlineTemplate(points[free], normals[free])
@@ -141,8 +138,8 @@ class TargetOutline:
     """An outline with which stored ones are registered.
 
     Attributes:
-        points: (M, 2) pixels; points no further apart than a few pixels.
-        boxes: Of their runs; see `_outlines_jit.py`.
+        points: (M, 2) pixels, densely spaced.
+        boxes: Boxes of their runs; see `_outlines_jit.py`.
     """
 
     points: Floats
@@ -168,7 +165,7 @@ def registered(kept: OutlineTemplate, target: TargetOutline) -> OutlineTemplate 
         target: The later outline.
 
     Returns:
-        The same with the new shift; None when too little of it finds its place, or when it has but one
+        The outline with the new shift; None when too few points match, or when it has only one
         direction.
     """
     limits = ICP_REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _OUTLIER
@@ -187,18 +184,18 @@ def update_relative_track(
     lasts_s: float,
     anew_s: float,
 ) -> RelativeTrack | None:
-    """What is known of two bodies after another sight of them.
+    """Update the relative track of two bodies with a sighting.
 
     Args:
-        track: What was known.
-        regions: Of the first and the second; twice the same when they are one region.
+        track: The track before.
+        regions: Regions of the first and the second; twice the same when merged.
         now: Seconds.
         size: (width, height) of the image, pixels.
-        lasts_s: How far back the path is kept.
-        anew_s: Outlines older than this are kept anew, as bodies turn.
+        lasts_s: Length of the path, seconds.
+        anew_s: Age at which outlines are replaced, since bodies rotate, seconds.
 
     Returns:
-        The same with a further place on its path; None when the two cannot be followed.
+        The track with one more position; None when the two cannot be tracked.
     """
     apart = regions[0] is not regions[1]
     if track is None:
@@ -211,7 +208,7 @@ def update_relative_track(
         )
     x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
     local = first.local or second.local
-    place = (now, x, y, *(UNTOLD if local else _image_motion(regions)))
+    place = (now, x, y, *(UNKNOWN_MOTION if local else _image_motion(regions)))
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
     if apart and now - track.since > anew_s:
         fresh = begin_relative_track(regions, now, size)
@@ -227,15 +224,15 @@ def _begun_again(
     size: tuple[int, int],
     lasts_s: float,
 ) -> RelativeTrack | None:
-    """Two bodies whose outlines have changed too much to be followed: image motion alone leads on."""
+    """Restart two bodies whose outlines changed too much, bridging by image motion."""
     fresh, (vx, vy, variance) = begin_relative_track(regions, now, size), _image_motion(regions)
     if fresh is None or not track.path or np.isnan(variance):
         return fresh
     if fresh.first.local or fresh.second.local:
         variance *= PART_VARIANCE
-    told = vx, vy, variance
+    motion = vx, vy, variance
     then, x, y, *_ = track.path[-1]
-    place = (now, x + told[0] * (now - then), y + told[1] * (now - then), *told)
+    place = (now, x + motion[0] * (now - then), y + motion[1] * (now - then), *motion)
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
     return replace(fresh, before=place[1:3], path=path)
 
@@ -243,21 +240,21 @@ def _begun_again(
 def begin_relative_track(
     regions: tuple[Region, Region], now: float, size: tuple[int, int]
 ) -> RelativeTrack | None:
-    """Two bodies followed from now on; None when too little of them is in the clear."""
+    """Start tracking two bodies; None when too little of them is unobstructed."""
     first = outline_template(regions[0], regions[1:], size, regions[1])
     second = outline_template(regions[1], regions[:1], size, regions[0])
     if first is None or second is None:
         return None
-    told = UNTOLD if first.local or second.local else _image_motion(regions)
-    return RelativeTrack(first, second, now, path=((now, 0.0, 0.0, *told),))
+    motion = UNKNOWN_MOTION if first.local or second.local else _image_motion(regions)
+    return RelativeTrack(first, second, now, path=((now, 0.0, 0.0, *motion),))
 
 
-UNTOLD = (np.nan, np.nan, np.nan)
-"""Image motion is that of a whole region: of one that bends it says little of the part that counts."""
+UNKNOWN_MOTION = (np.nan, np.nan, np.nan)
+"""Unknown image motion: that of a whole region says little about a part of a bending one."""
 
 
 def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
-    """Relative velocity as the segmenter reports it, and the variance of each component."""
+    """Relative velocity as reported by the segmenter, and the variance of each component."""
     a, b = regions
     if a is b or a.velocity_sigma <= 0.0 or b.velocity_sigma <= 0.0:
         return (np.nan, np.nan, np.nan)
@@ -271,8 +268,8 @@ class RelativeVelocity:
 
     Attributes:
         velocity: (2,) pixels per second.
-        covariance: (2, 2) of it.
-        span: Seconds over which it was taken.
+        covariance: (2, 2) its covariance.
+        span: Time over which it was measured, seconds.
     """
 
     velocity: Floats
@@ -284,35 +281,35 @@ class RelativeVelocity:
 
         Args:
             still: Relative speed that still is rest, pixels per second.
-            moving: Usual relative speed of bodies that are not at rest. In a direction in which
-                velocity is hardly known, as that of a long arm along itself, nothing is told.
+            moving: Usual relative speed of bodies that are not at rest. A direction in which velocity is
+                hardly known, such as a long arm along itself, contributes nothing.
 
         Returns:
-            At most what the ratio of both speeds allows; no bound below.
+            Log odds, bounded above by the ratio of both speeds, unbounded below.
         """
         (xx, xy), (_, yy) = self.covariance.tolist()
         vx, vy = self.velocity.tolist()
 
-        def told(variance: float) -> tuple[float, float]:
-            """Determinant of the covariance with more variance, and the velocity's distance by it."""
+        def gaussian_terms(variance: float) -> tuple[float, float]:
+            """Determinant of the inflated covariance, and the Mahalanobis distance of the velocity."""
             a, c = xx + variance, yy + variance
             determinant = a * c - xy * xy
             return determinant, (c * vx * vx - 2.0 * xy * vx * vy + a * vy * vy) / determinant
 
-        (rest, rests), (free, moves) = told(0.5 * still**2), told(moving**2)
+        (rest, rests), (free, moves) = gaussian_terms(0.5 * still**2), motion(moving**2)
         return 0.5 * (log(free / rest) - (rests - moves))
 
 
 def relative_velocity(track: RelativeTrack, now: float, window_s: float) -> RelativeVelocity | None:
-    """How two bodies move relative to each other.
+    """The relative velocity of two bodies.
 
     Args:
-        track: What is known of them.
+        track: Their relative track.
         now: Seconds.
-        window_s: Over how long; longer where gaps leave too few places within.
+        window_s: Length of the window; longer where gaps leave too few positions in it.
 
     Returns:
-        The motion up to now; None while too little is known.
+        The current velocity; None while too little is known.
     """
     if len(track.path) <= LEAST_SAMPLES:
         return None

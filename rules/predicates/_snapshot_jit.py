@@ -1,4 +1,4 @@
-"""Quantities of all pairs as rules compare them, in one compiled pass."""
+"""Compiled loop of `snapshot.py`: quantities of all pairs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from visup.compiled import compiled
 Floats = NDArray[np.float64]
 
 GAP, CLOSING, CONTACT, RELATIVE = range(4)
-"""Places among the quantities."""
+"""Indices of the quantities."""
 
 
 @compiled
@@ -23,18 +23,18 @@ def pair_quantities(
     out: Floats,
     first: NDArray[np.int8],
 ) -> None:
-    """What is known of each pair.
+    """Intervals of the quantities of each pair.
 
     Args:
-        gap: (n, n) pixels; NaN where unknown, as of all.
+        gap: (n, n) pixels; NaN where unknown, as in all.
         rate: (n, n) trend of the distance, pixels per second.
         sigma: (n, n) its standard deviation.
         relative: (n, n) relative speed, pixels per second.
-        sigmas: To how many deviations an interval reaches.
-        out: (4, 2, n, n) intervals of the gap, of the closing speed, of the seconds until outlines meet,
-            and of the relative speed; infinite where unknown. Written.
-        first: (n, n) codes: whether the second is what the first would meet first. Of several that
-            are never met, the first one counts, so that one always does. Written.
+        sigmas: Half width of intervals, standard deviations.
+        out: (4, 2, n, n) output: intervals of the gap, the closing speed, the time to contact in seconds,
+            and the relative speed; infinite where unknown.
+        first: (n, n) output: whether the second is the first contact of the first. If there will be no
+            contact, the first object counts, so that one always does.
     """
     n = len(gap)
     for i in range(n):
@@ -61,7 +61,7 @@ def pair_quantities(
 
 @compiled
 def _until(gap: float, closing: float) -> float:
-    """Seconds until a gap is closed at that speed."""
+    """Seconds until a gap closes at that speed."""
     if gap == 0.0:
         return 0.0
     return gap / closing if closing > 0.0 else np.inf

@@ -1,4 +1,4 @@
-"""Which words fit the arguments of relations, facts and quantities, and where each was meant to stand."""
+"""Matching of words to the arguments of relations, facts and quantities."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EXAMPLES: Mapping[str, str] = MappingProxyType(
         "signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf",
     }
 )  # fmt: skip
-"""Kind of argument -> a word of that kind."""
+"""Kind of argument -> an example."""
 _KNOWN: Mapping[str, Iterable[str]] = MappingProxyType(
     {
         "relation": RELATION_NAMES,
@@ -25,22 +25,22 @@ _KNOWN: Mapping[str, Iterable[str]] = MappingProxyType(
     }
 )
 OTHERS = "bacde"
-"""Names of objects where there are no others."""
+"""Names for objects without one."""
 
 
 def known_of(wanted: str, word: str, scope: Sequence[str]) -> Iterable[str]:
-    """The words that may stand where an argument of a kind is wanted, and a word where any may."""
+    """The words allowed for a kind of argument; `word` itself where any is."""
     if wanted == "object":
         return scope
     return (*PERCEPT_KINDS, word) if wanted == "kind" else _KNOWN.get(wanted, (word,))
 
 
 def fits(wanted: str, word: str, scope: Sequence[str]) -> bool:
-    """Whether a word is surely meant as an argument of a kind.
+    """Whether a word is certainly meant as an argument of a kind.
 
     Args:
         wanted: The kind.
-        word: What was written.
+        word: The written word.
         scope: The names of objects.
     """
     if wanted == "object":
@@ -49,16 +49,16 @@ def fits(wanted: str, word: str, scope: Sequence[str]) -> bool:
 
 
 def arranged(name: str, words: Sequence[str], takes: Sequence[str], scope: Sequence[str]) -> str:
-    """A call with each of its words where it fits, and what is missing by what there is.
+    """A call with its words rearranged to fit, and missing arguments filled in.
 
     >>> arranged("named", ["satellite", "a"], ["object", "name"], ["a", "b"])
     'named(a, satellite)'
 
     Args:
-        name: What is called.
-        words: Its arguments as they were written.
+        name: The called name.
+        words: Its arguments as written.
         takes: The kinds of its arguments.
-        scope: The names of objects; where there are too few, others are bound by `exists`.
+        scope: The names of objects; if there are too few, others are bound by `exists`.
     """
     left = list(words)
     found: list[str | None] = []
@@ -80,7 +80,7 @@ def arranged(name: str, words: Sequence[str], takes: Sequence[str], scope: Seque
 
 
 def distinct(words: Sequence[str], scope: Sequence[str]) -> list[str]:
-    """Words with others in the place of those that stand there a second time."""
+    """Words with repeated ones replaced by others."""
     found: list[str] = []
     for n, word in enumerate(words):
         spare = (v for v in (*scope, *OTHERS) if v not in found and v not in words[n + 1 :])

@@ -1,8 +1,8 @@
-"""Certainty that something is an object in its own right, and that its identity is known.
+"""Certainty that a region is an object of its own, and that its identity is known.
 
-A camera that sees motion cuts machines into pieces and takes shadows along. What is small, hardly seen, or
-close beside something larger may be a part of that; alarms that call for a person, or end a task, ask
-for more.
+Motion segmentation splits machines and includes shadows. A small, hardly visible region, or one close to a
+larger one, may be a part of that; alarms that call for a person, or end a task, require more.
+
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from visup.rules.wording.sentences import is_of_kind
 
 PART = FragmentSettings()
 LEAST_SHARE = 2 * PresenceSettings().least_share
-"""Share of the image that a thing of its own fills, unless it is far away or a speck."""
+"""Least share of the image of an object of its own, unless it is far away."""
 LEAST_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
 CAME_IN = 0.5
-"""How far from the border what came over it may first be seen, in sizes of what was seen."""
+"""Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
 KEEP_OUT = "keep_out"
-"""Zones whose names begin so are forbidden to all."""
+"""Prefix of the names of zones forbidden to all."""
 
 
 def standalone(facts: Snapshot) -> Codes:
-    """Whether something is certainly an object of its own: not a speck, well seen, clear of larger ones.
+    """Whether an object is certainly one of its own: not a speck, well visible, away from larger ones.
 
-    Nor does it move as one with one that is larger.
+    Nor does it move as one with a larger one.
 
-    Of what the image border cuts nobody knows what it hangs on, unless it is known what it is: it may be
-    an arm, of which the hand is known.
+    An object cut by the image border may be attached to something outside, unless it is identified: it
+    may be an arm whose hand is known.
     """
     beliefs = facts.beliefs
     if not beliefs:
@@ -72,10 +72,10 @@ def whole(facts: Snapshot) -> Codes:
 
 
 def came_in(facts: Snapshot) -> Codes:
-    """Whether an object came over the border of the image: where it was first seen lies there.
+    """Whether an object came over the border of the image, by where it was first seen.
 
-    What sets out within the picture was there before, hangs on something that was, or is its shadow. What
-    comes in fast is first seen a little within.
+    An object that starts inside the picture was there before, is attached to something that was, or is its
+    shadow. A fast one is first seen a little inside.
     """
     memory, (width, height) = presence_memory(facts.mind), facts.mind.frame_size
 
@@ -90,7 +90,7 @@ def came_in(facts: Snapshot) -> Codes:
 
 
 def identified(facts: Snapshot) -> Codes:
-    """Whether an object is likelier one of the models known than none of them, or has been named."""
+    """Whether an object is likelier one of the models than none of them, or has been named."""
 
     def look(b: ObjectBelief) -> int:
         likely = bool(b.candidates) and b.candidates[0].confidence > b.unknown
@@ -100,12 +100,12 @@ def identified(facts: Snapshot) -> Codes:
 
 
 def of_kind(facts: Snapshot) -> Codes:
-    """Whether of an object only its kind is known: a detector names it, and no task casts it."""
+    """Whether only the class of an object is known: from a detector, without a role in a task."""
     return facts.each(lambda b: code(is_of_kind(facts.mind, b.id)))
 
 
 def at_home(facts: Snapshot) -> Codes:
-    """Whether an object was in a forbidden zone when the video began: that zone is its own."""
+    """Whether an object was in a forbidden zone when the video began, which is then its own."""
     zones = [z.polygon for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
     memory = presence_memory(facts.mind)
     if not zones or memory.start is None:

@@ -1,6 +1,6 @@
-"""The coarser connection calculi RCC-5 and RCC-2 of boxes, joined from the eight relations of RCC-8.
+"""The coarser connection calculi RCC-5 and RCC-2 of boxes, merged from RCC-8.
 
-Truths are codes, of which the greatest is "or" and the negative "not", also of what is not known.
+On truth codes, the maximum is "or" and the negative "not", including unknown.
 """
 
 from __future__ import annotations
@@ -44,4 +44,4 @@ COARSE_RELATIONS: Mapping[str, tuple[Look, str]] = MappingProxyType(
         ),
     }
 )
-"""Word -> what it looks at, and one clause for people."""
+"""Word -> its evaluation, and its meaning in one clause."""

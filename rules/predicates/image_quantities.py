@@ -1,4 +1,4 @@
-"""Quantities read off the image and the belief about objects: place, size, depth, direction, number."""
+"""Quantities of objects from the image and beliefs: position, size, depth, direction, number."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STILL_SPEED = RelationSettings().still_speed
 
 
 def _seen(facts: Snapshot, values: list[float]) -> Floats:
-    """(2, n) intervals of what is measured of each object; unknown of those out of sight."""
+    """(2, n) intervals of a measured quantity; unknown for objects out of view."""
     shown = [b.presence is Presence.SEEN for b in facts.beliefs]
     return exact(np.array([v if s else np.nan for v, s in zip(values, shown, strict=True)]))
 
@@ -46,7 +46,7 @@ def area_share(facts: Snapshot) -> Floats:
 
 
 def depth(facts: Snapshot) -> Floats:
-    """How far away each object in sight is, in the unit of its model, within its deviation."""
+    """Depth of each visible object, in the unit of its model, with its standard deviation."""
     known = [
         b if b.presence is Presence.SEEN and b.depth is not None else None for b in facts.beliefs
     ]
@@ -56,7 +56,7 @@ def depth(facts: Snapshot) -> Floats:
 
 
 def depth_difference(facts: Snapshot) -> Floats:
-    """Difference of depth as a share of the smaller one; both depths within their deviations."""
+    """Difference of depth as a share of the smaller one, with standard deviations."""
     depth = facts.one("depth")
     if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
         return facts.unknown(2)
@@ -69,12 +69,12 @@ def depth_difference(facts: Snapshot) -> Floats:
 
 
 def confidence(facts: Snapshot) -> Floats:
-    """How sure the identity of each object is, 0 to 1; also of those out of sight."""
+    """Confidence of the identity of each object, 0 to 1; also of those out of view."""
     return exact(np.array([b.confidence for b in facts.beliefs], dtype=float))
 
 
 def heading(facts: Snapshot) -> Floats:
-    """Where each object moves in the image, degrees: 0 to the right, 90 up; unknown at rest."""
+    """Direction of motion of each object in the image, degrees: 0 to the right, 90 up; unknown at rest."""
     slow = STILL_SPEED * image_diagonal(facts.mind.frame_size)
     found = []
     for belief in facts.beliefs:
@@ -85,7 +85,7 @@ def heading(facts: Snapshot) -> Floats:
 
 
 def centre_distance(facts: Snapshot) -> Floats:
-    """Between the centres of all pairs, pixels; unknown with one that is out of sight."""
+    """Distance between the centres of all pairs, pixels; unknown if one is out of view."""
     x, y = horizontal_position(facts), vertical_position(facts)
     known = np.isfinite(x[0])
     apart = np.hypot(
@@ -96,7 +96,7 @@ def centre_distance(facts: Snapshot) -> Floats:
 
 
 def box_overlap(facts: Snapshot) -> Floats:
-    """Intersection over union of the boxes of all pairs, 0 to 1; unknown with one out of sight."""
+    """Intersection over union of the boxes of all pairs, 0 to 1; unknown if one is out of view."""
     boxes = np.array([b.region.bbox for b in facts.beliefs], dtype=float).reshape(-1, 4)
     low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
     sides = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
@@ -115,13 +115,13 @@ def _of_known_pairs(
 
 
 def number_of_objects(facts: Snapshot) -> Floats:
-    """How many objects are in sight."""
+    """Number of visible objects."""
     count = float(sum(b.presence is Presence.SEEN for b in facts.beliefs))
     return np.array((count, count))
 
 
 def number_of_kind(facts: Snapshot, name: str) -> Floats:
-    """How many objects in sight are believed to be of a name; those not identified may be."""
+    """Number of visible objects of a name; an interval, since unidentified ones may be."""
     seen = [b for b in facts.beliefs if b.presence is Presence.SEEN]
     surely = float(sum(name in (b.name, believed_name(facts.mind, b.id)) for b in seen))
     possibly = surely + sum(not b.candidates for b in seen)

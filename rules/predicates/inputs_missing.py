@@ -1,7 +1,7 @@
-"""What each word of the rule language reads: while that is unknown, so is the word.
+"""Inputs of each word of the rule language: while they are unknown, so is the word.
 
-Words about the image now read regions. What an object is (`named`, `actor`, `unexpected`) and what
-a task expects are beliefs that are held while nobody can look, as votes are; they read nothing.
+Words about the current image read regions. What an object is (`named`, `actor`, `unexpected`) and what a task
+expects are beliefs that persist without observations, like votes; they read nothing.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from visup.rules.formula.nodes import SIGNAL_WORDS
 REMEMBERED = frozenset(
     {"expected", "engaged", "unexpected", "actor", "named", "identified", "of_kind"}
 )
-"""Words about beliefs that outlive what they came from."""
+"""Words about beliefs that outlive their evidence."""
 
 _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         **dict.fromkeys(REMEMBERED, frozenset()),
-        "stale": frozenset(),  # it tells of this very thing
+        "stale": frozenset(),  # it is about missing inputs itself
         "healthy": frozenset({"health"}),
         **dict.fromkeys(SIGNAL_WORDS, frozenset({"signal"})),
         **dict.fromkeys(("depth", "depth_difference"), frozenset({"region", "depth"})),
@@ -30,7 +30,7 @@ _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
 
 
 def percepts_read(word: str) -> frozenset[str]:
-    """Kinds of percept that a word reads: regions, unless it is known to read something else."""
+    """Kinds of percept that a word reads; regions by default."""
     return _SPECIAL.get(word, frozenset({"region"}))
 
 

@@ -1,4 +1,4 @@
-"""Quantities read off the outlines of objects: which way they lie, and how open they are."""
+"""Quantities of outlines: orientation and openness."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from visup.rules.formula.truth import MAYBE, NO, YES
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot, exact
 
 LONG = 1.3
-"""How many times as long as wide an outline must be for its long axis to mean anything."""
+"""Least ratio of length to width for a meaningful long axis."""
 
 ALIGNED_DEG = 10.0
-"""Axes that differ by less are in line; by more than `APART_DEG` they are not; between is unknown."""
+"""Axes that differ by less are aligned; by more than `APART_DEG` they are not; in between is unknown."""
 APART_DEG = 15.0
 
 
 def orientation(facts: Snapshot) -> Floats:
-    """Along which line each object lies, degrees from 0 to 180: 0 across, 90 upright; unknown when round."""
+    """Orientation of each long axis, degrees from 0 to 180: 0 horizontal, 90 vertical; unknown when round."""
     return exact(_axes(facts))
 
 
 def axis_angle(facts: Snapshot) -> Floats:
-    """Between the long axes of all pairs, degrees from 0 to 90; unknown with one that is round."""
+    """Angle between the long axes of all pairs, degrees from 0 to 90; unknown if one is round."""
     between = _between(_axes(facts))
     known = np.isfinite(between)
     return np.array((np.where(known, between, -np.inf), np.where(known, between, np.inf)))
 
 
 def aligned(facts: Snapshot) -> Codes:
-    """Whether the long axes of two objects point the same way."""
+    """Whether the long axes of two objects are parallel."""
     between = _between(_axes(facts))
     with np.errstate(invalid="ignore"):
         codes = np.where(between <= ALIGNED_DEG, YES, np.where(between >= APART_DEG, NO, MAYBE))
@@ -44,16 +44,16 @@ def aligned(facts: Snapshot) -> Codes:
 OUTLINE_RELATIONS: Mapping[str, tuple[Callable[[Snapshot], Codes], str]] = MappingProxyType(
     {"aligned": (aligned, "their long axes point the same way in the image")}
 )
-"""Word -> what it looks at, and one clause for people."""
+"""Word -> its evaluation, and its meaning in one clause."""
 
 
 def openness(facts: Snapshot) -> Floats:
-    """The share of its convex hull that each outline leaves free, 0 to 1: of jaws, a door, scissors."""
+    """Free share of each outline's convex hull, 0 to 1: for jaws, a door, scissors."""
     return exact(np.array([_free(b) for b in facts.beliefs], dtype=float))
 
 
 def _axes(facts: Snapshot) -> NDArray[np.float64]:
-    """(n,) degrees of the long axis of each object in sight; NaN where there is none."""
+    """(n,) orientation of the long axis of each visible object, degrees; NaN without one."""
     return np.array([_axis(b) for b in facts.beliefs], dtype=float)
 
 

@@ -1,8 +1,8 @@
-"""Allen's relations along an axis of the image, and TPCC of three objects, asked for by their names.
+"""Allen's relations along an image axis, and TPCC of three objects, by their names.
 
-They look at the boxes and centres of this moment alone, without memory: edges nearer than `LEVEL` are
-level, and what lies within `STRAIGHT_DEG` of straight ahead, back or aside is straight. So they may flicker
-at a limit; `for` and `in 3 of 5 samples` steady them.
+They use the current boxes and centres alone, without hysteresis: edges nearer than `LEVEL` are level, and
+directions within `STRAIGHT_DEG` of straight ahead, back or sideways are straight. They may flicker at a
+limit; `for` and `in 3 of 5 samples` steady them.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot
 
 LEVEL = 0.0025
-"""Image diagonals; the middle of the two limits between which RCC-8 of boxes keeps its state."""
+"""Image diagonals; the mean of the two thresholds of RCC-8 of boxes."""
 STRAIGHT_DEG = 5.0
 ALLEN_RELATIONS = tuple(ALLEN_NAMES.values())
 TPCC_RELATIONS = (
-    *(f"{near}{way}" for near in "cd" for way in (
+    *(f"{near}{sector}" for near in "cd" for sector in (
         "sf", "fl", "lf", "sl", "lb", "bl", "sb", "br", "rb", "sr", "rf", "fr")),
     "sam",
 )  # fmt: skip
-"""Closer than the relatum is to the origin (`c`) or not (`d`), then where: `lf` is left, rather front."""
+"""Closer to the relatum than the origin (`c`) or not (`d`), then the sector: `lf` is left, rather front."""
 
 _SIGNS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
     {
@@ -47,13 +47,13 @@ _SIGNS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
         "after": (1, 1, 1, 1),
     }
 )
-"""Signs of begin - begin, end - end, end of a - begin of b, begin of a - end of b."""
+"""Signs of start - start, end - end, end of a - start of b, start of a - end of b."""
 
 Look = Callable[[Snapshot, str], Codes]
 
 
 def along(axis: int) -> Look:
-    """Whether boxes stand in one of Allen's relations along an axis: 0 to the right, 1 down."""
+    """The evaluation of Allen's relations along an axis: 0 to the right, 1 down."""
 
     def look(facts: Snapshot, relation: str) -> Codes:
         begin, end = _spans(facts, axis)
@@ -73,20 +73,20 @@ def along(axis: int) -> Look:
 
 
 def _spans(facts: Snapshot, axis: int) -> tuple[Floats, Floats]:
-    """Where boxes begin and end along an axis, pixels; NaN of what is out of sight."""
+    """Starts and ends of boxes along an axis, pixels; NaN when out of view."""
     boxes = np.array([b.region.bbox for b in facts.beliefs], dtype=float).reshape(-1, 4)
     boxes[~_seen(facts)] = np.nan
     return boxes[:, axis], boxes[:, axis] + boxes[:, 2 + axis]
 
 
 def _sign(difference: Floats, level: float) -> NDArray[np.int8]:
-    """-1, 0 where it is next to nothing, or 1; also of what is not known, which counts for nothing."""
+    """-1, 0 within the tolerance, or 1; arbitrary where unknown, which is masked later."""
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(difference) <= level, 0, np.sign(difference)).astype(np.int8)
 
 
 def three_points(facts: Snapshot, relation: str) -> Codes:
-    """Whether the third object lies so for one who went from the first to the second."""
+    """The TPCC relation of the third object to the line from the first to the second."""
     centres = np.array([b.region.centroid for b in facts.beliefs], dtype=float).reshape(-1, 2)
     centres[~_seen(facts)] = np.nan
     ahead = centres[None, :] - centres[:, None]  # from a to b
@@ -94,7 +94,7 @@ def three_points(facts: Snapshot, relation: str) -> Codes:
     straight, far = ahead[:, :, None], np.linalg.norm(there, axis=3)
     cross = straight[..., 0] * there[..., 1] - straight[..., 1] * there[..., 0]
     dot = (straight * there).sum(axis=3)
-    # Counted to the left, since y points down in images.
+    # Positive to the left, since y points down in images.
     turn = np.degrees(np.arctan2(-cross, dot))
     level = LEVEL * image_diagonal(facts.mind.frame_size)
     same = far <= level
@@ -118,12 +118,12 @@ _BETWEEN = {
 }
 
 
-def _in_sector(turn: Floats, way: str) -> NDArray[np.bool_]:
-    """Whether directions lie in a sector of TPCC, or on one of its straight lines."""
+def _in_sector(turn: Floats, sector: str) -> NDArray[np.bool_]:
+    """Whether directions are in a sector of TPCC, or on one of its straight lines."""
     straight = np.min([np.abs((turn - a + 180) % 360 - 180) for a in _STRAIGHT.values()], axis=0)
-    if way in _STRAIGHT:
-        return np.asarray(np.abs((turn - _STRAIGHT[way] + 180) % 360 - 180) <= STRAIGHT_DEG)
-    low, high = _BETWEEN[way]
+    if sector in _STRAIGHT:
+        return np.asarray(np.abs((turn - _STRAIGHT[sector] + 180) % 360 - 180) <= STRAIGHT_DEG)
+    low, high = _BETWEEN[sector]
     return np.asarray((straight > STRAIGHT_DEG) & (turn > low) & (turn <= high))
 
 

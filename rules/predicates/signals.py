@@ -1,4 +1,4 @@
-"""Signals that do not come from the image, as words of rules; from percepts of kind `signal`."""
+"""Words of rules for signals from outside the image, from percepts of kind `signal`."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ KIND = "signal"
 
 
 def known_signals(mind: Mind) -> Mapping[str, Any]:
-    """What is known of signals, by name; where several tell one, the last report counts."""
-    told = (p.value for p in mind.percepts.get(KIND, ()) if isinstance(p.value, Mapping))
-    return {name: value for values in told for name, value in values.items()}
+    """Current signals, by name; for the same name the last report counts."""
+    reports = (p.value for p in mind.percepts.get(KIND, ()) if isinstance(p.value, Mapping))
+    return {name: value for values in reports for name, value in values.items()}
 
 
 def number(facts: Snapshot, name: str) -> Floats:
-    """A signal that is a number, as an interval; unknown of any other."""
+    """A numeric signal, as an interval; unknown for any other."""
     value = number_of(known_signals(facts.mind).get(name))
     return np.array([-np.inf, np.inf] if value is None else [value, value])
 
 
 def is_on(facts: Snapshot, name: str) -> Codes:
-    """Whether a signal is true, or a number other than 0; unknown of a word."""
+    """Whether a signal is true, or a nonzero number; unknown for a word."""
     value = known_signals(facts.mind).get(name)
     plain = isinstance(value, bool | np.bool_) or number_of(value) is not None
     return _code(bool(value) if plain else None)
@@ -45,7 +45,7 @@ def is_known(facts: Snapshot, name: str) -> Codes:
 
 
 def number_of(value: Any) -> float | None:
-    """A signal as a number; None of what is none."""
+    """A signal as a number; None if it is not one."""
     plain = isinstance(value, int | float | np.integer | np.floating)
     if not plain or isinstance(value, bool) or not np.isfinite(value):
         return None

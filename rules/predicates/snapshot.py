@@ -1,7 +1,7 @@
-"""One mind as rules see it: truths and quantities of all objects and pairs, as arrays.
+"""A snapshot of a mind for rules: truths and quantities of all objects and pairs, as arrays.
 
-What was not observed is unknown, never false. Truths are codes: `YES`, `NO`, `MAYBE` of not known.
-Quantities are intervals: value +- `SIGMAS` standard deviations where the deviation is measured.
+What was not observed is unknown, never false. Truths are codes: `YES`, `NO`, and `MAYBE` for unknown.
+Quantities are intervals: value +- `SIGMAS` standard deviations where these are known.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ Floats = NDArray[np.float64]
 
 ITSELF = frozenset({"equal", "outlines_equal"})
 SIGMAS = 1.0
-"""How many standard deviations a measured quantity's interval reaches to either side."""
+"""Half width of a measured quantity's interval, standard deviations."""
 
 RELATION_NAMES = (*NAMES, "coupled")
-"""Relations between two objects that rules may name."""
+"""Relations between two objects available in rules."""
 
 
 class Snapshot:
-    """One mind as rules see it; made once for each step.
+    """A mind as seen by rules; made once per step.
 
     Args:
-        mind: The mind after relations were judged.
+        mind: The mind after this step's relations.
 
     Attributes:
         mind: The mind.
-        beliefs: Objects that are believed present, by increasing id.
+        beliefs: Objects believed present, by ascending id.
         ids: Their ids.
-        row: Id -> place in `ids`, and so in all arrays.
+        row: Id -> index in `ids`, and so in all arrays.
         measured: Quantities of all pairs.
     """
 
@@ -61,22 +61,22 @@ class Snapshot:
         return self._names[object_id]
 
     def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
-        """(n,) codes from a look at each object."""
+        """(n,) codes from a function of each object."""
         return np.array([look(b) for b in self.beliefs], dtype=np.int8)
 
     def among(self, ids: Collection[int | None]) -> Codes:
-        """(n,) `YES` of some objects, `NO` of the others."""
+        """(n,) `YES` for some objects, `NO` for the others."""
         codes = [YES if i in ids else NO for i in self.ids] if ids else [NO] * len(self.ids)
         return np.array(codes, dtype=np.int8)
 
     def pairs(self, code: int) -> Codes:
-        """(n, n) codes that are all the same."""
+        """(n, n) codes, all the same."""
         codes = np.empty((len(self.ids), len(self.ids)), dtype=np.int8)
         codes.fill(code)
         return codes
 
     def unknown(self, objects: int) -> Floats:
-        """(2, n) or (2, n, n) intervals of what is known of no object, or of no pair of objects."""
+        """(2, n) or (2, n, n) intervals, all unknown."""
         whole = np.empty((2, *(len(self.ids),) * objects))
         whole[0], whole[1] = -np.inf, np.inf
         return whole
@@ -88,9 +88,9 @@ class Snapshot:
         return self._codes[name]
 
     def relations(self, names: tuple[str, ...]) -> Codes:
-        """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
+        """(k, n, n) codes of several relations, looked up in one pass; without couplings."""
         tables = self.mind.truth_tables(names, self.ids)
-        # An object is equal to itself, and nothing else.
+        # An object is equal to itself, and has no other relation to itself.
         n = len(self.ids)
         tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)
         return tables
@@ -104,7 +104,7 @@ class Snapshot:
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
-        """Where the objects stand in what was measured; -1 for those that were not."""
+        """Indices of the objects in the measurements; -1 if not measured."""
         known = {object_id: i for i, object_id in enumerate(self.measured.ids)}
         return np.array([known.get(i, -1) for i in self.ids], dtype=np.intp)
 
@@ -136,16 +136,16 @@ class Snapshot:
 
     @property
     def first_contact(self) -> Codes:
-        """(n, n) whether the second is what the first would meet first."""
+        """(n, n) whether the second is the first contact of the first."""
         return self._pairs[1]
 
     @property
     def _pairs(self) -> tuple[Floats, Codes]:
-        """All quantities of pairs, and what is met first."""
+        """All quantities of pairs, and first contacts."""
         if self._paired is None:
             n = len(self.ids)
             out, first = np.empty((4, 2, n, n)), np.empty((n, n), np.int8)
-            # Of one layout, so that the loops are compiled once.
+            # In one memory layout, so that the loops are compiled once.
             gap, rate, sigma, relative = (
                 np.ascontiguousarray(self.pair(name))
                 for name in ("gap", "rate", "rate_sigma", "relative_speed")
@@ -157,7 +157,7 @@ class Snapshot:
 
 @lru_cache(maxsize=256)
 def _of_itself(names: tuple[str, ...]) -> Codes:
-    """(k, 1) whether relations hold of an object and itself."""
+    """(k, 1) whether relations hold between an object and itself."""
     codes = np.array([YES if name in ITSELF else NO for name in names], dtype=np.int8)
     return codes.reshape(-1, 1)
 
@@ -178,7 +178,7 @@ def exact(values: Floats) -> Floats:
 def interval_between(low: Floats, high: Floats) -> Floats:
     """(2, ...) intervals; NaN becomes unknown."""
     both = np.empty((2, *low.shape))
-    # Of NaN and a number, these take the number.
+    # These return the number if the other argument is NaN.
     np.fmax(low, -np.inf, out=both[0])
     np.fmin(high, np.inf, out=both[1])
     return both

@@ -1,4 +1,4 @@
-"""The words of the rule language: what each takes, what it looks at, what it means."""
+"""The vocabulary of the rule language: arguments, evaluation and meaning of each word."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ IMPLIED = MappingProxyType(
         "moving_together": frozenset({"moving_together", "coupled"}),
     }
 )
-"""Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
+"""Relation -> expectations that imply it: objects to be coupled must converge and touch."""
 
 PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
-SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
+SURE_POSE = 0.6  # least confidence of a pose for its spin to count
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +64,11 @@ class PredicateDefinition:
     """A predicate of the rule language: true, false or unknown.
 
     Attributes:
-        takes: What its arguments are: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
-            'word', 'allen' or 'tpcc' (relations of these calculi).
-        look: Its meaning: codes of all objects, one dimension for each argument 'object', in their
-            order; the other arguments come as words.
-        meaning: One clause for people.
+        takes: Kinds of its arguments: 'object', 'relation', 'kind', 'name', 'zone', 'signal', 'word',
+            'allen' or 'tpcc' (relations of these calculi).
+        look: Its evaluation: codes of all objects, one dimension per argument 'object', in order; the
+            other arguments are passed as words.
+        meaning: Its meaning in one clause.
     """
 
     takes: tuple[str, ...]
@@ -81,11 +81,11 @@ class QuantityDefinition:
     """A quantity of the rule language.
 
     Attributes:
-        takes: What its arguments are.
-        dimension: What it measures.
-        look: Its intervals in the base unit, (2, ...), of all objects.
-        meaning: One clause for people.
-        plain: Whether it is a number and no share.
+        takes: Kinds of its arguments.
+        dimension: Its dimension.
+        look: Its intervals in the base unit, (2, ...), for all objects.
+        meaning: Its meaning in one clause.
+        plain: Whether it is a plain number instead of a share.
     """
 
     takes: tuple[str, ...]
@@ -96,7 +96,7 @@ class QuantityDefinition:
 
     @property
     def unit(self) -> str:
-        """The unit in which it is told; empty of a plain number."""
+        """The unit in which it is shown; empty for a plain number."""
         if self.plain:
             return ""
         units = {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}
@@ -105,7 +105,7 @@ class QuantityDefinition:
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
-    """What formulas may name.
+    """The names available in formulas.
 
     Attributes:
         words: Relations and facts.
@@ -129,15 +129,15 @@ def expected(facts: Snapshot, name: str) -> Codes:
 
 
 def engaged(facts: Snapshot) -> Codes:
-    """Whether an active task expects something of an object and another one now."""
+    """Whether an active task currently expects a relation of an object to another."""
     wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
     return facts.among(wanted)
 
 
 def unexpected(facts: Snapshot) -> Codes:
-    """Whether no active task explains an object; without a task nothing is unexpected."""
-    told = [task.unexplained for task in facts.mind.tasks]
-    nobody = set(told[0]).intersection(*told[1:]) if told else ()
+    """Whether no active task explains an object; without a task no object is unexpected."""
+    unexplained = [task.unexplained for task in facts.mind.tasks]
+    nobody = set(unexplained[0]).intersection(*unexplained[1:]) if unexplained else ()
     return facts.among(nobody)
 
 
@@ -148,7 +148,7 @@ def is_actor(facts: Snapshot) -> Codes:
 
 
 def is_bystander(facts: Snapshot) -> Codes:
-    """Whether a task lets an object be, and none has it for an actor."""
+    """Whether a task tolerates an object, and none uses it as an actor."""
     tasks = facts.mind.tasks
     acting = {b.object_id for task in tasks for b in task.bindings}
     return facts.among({i for task in tasks for i in task.bystanders} - acting)
@@ -173,12 +173,12 @@ def is_named(facts: Snapshot, name: str) -> Codes:
 
 
 def first_contact(facts: Snapshot) -> Codes:
-    """Whether the second is what the first would meet first."""
+    """Whether the second is the first contact of the first."""
     return facts.first_contact
 
 
 def lost(facts: Snapshot) -> Codes:
-    """Whether an object is out of sight for no known reason."""
+    """Whether an object is out of view for no known reason."""
     known = presence_memory(facts.mind).of
     return facts.among([i for i in facts.ids if i in known and known[i].lost])
 
@@ -194,9 +194,10 @@ def healthy(facts: Snapshot) -> Codes:
 
 
 def spin(facts: Snapshot) -> Floats:
-    """How fast an object turns about itself, degrees per second.
+    """How fast an object rotates, degrees per second.
 
-    Its deviation is that of one course of views; while another is nearly as likely the rate is unknown.
+    The standard deviation is that of one sequence of views; while another is nearly as likely the rate is
+    unknown.
     """
     poses = (b.pose for b in facts.beliefs)
     found = [None if p is None or p.confidence < SURE_POSE else p.spin for p in poses]
@@ -323,7 +324,7 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         ),
     }
 )
-"""Every relation and fact that a rule may name."""
+"""All relations and facts available in rules."""
 
 QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
     {
@@ -378,10 +379,10 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
         ),
     }
 )
-"""Every quantity that a rule may compare."""
+"""All quantities available in rules."""
 
 RULES = Vocabulary(PREDICATES, QUANTITIES)
-"""What rules may name."""
+"""The vocabulary of rules."""
 
 
 def signals(*names: str) -> Vocabulary:

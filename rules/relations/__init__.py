@@ -1,9 +1,9 @@
-"""What holds between objects: qualitative spatial relations of all pairs, and zones.
+"""Relations between objects: qualitative spatial relations of all pairs, and zones.
 
-Read in this order: `reasoner.py` (one step, and how to read relations off a mind), `samples.py` (the
-last seconds as arrays), `kinematics.py` (gaps, trends, velocities), `thresholds.py` (from quantities to
-states), the calculi `rcc8.py`, `qtc.py`, `direction.py`, `distance.py` and `trend.py`, and `zones.py` (parts
-of the scene). Compiled: `_kinematics_jit.py` (quantities of pairs), `_thresholds_jit.py` (states of boxes),
+Read in this order: `reasoner.py` (one step, and how to query relations of a mind), `samples.py` (the last
+seconds as arrays), `kinematics.py` (gaps, trends, velocities), `thresholds.py` (from quantities to states),
+the calculi `rcc8.py`, `qtc.py`, `direction.py`, `distance.py` and `trend.py`, and `zones.py` (parts of the
+scene). Compiled: `_kinematics_jit.py` (quantities of pairs), `_thresholds_jit.py` (states of boxes),
 `_pair_states_jit.py` (trend, touch, moving together, and the rows of the table of relations).
 """
 

@@ -1,4 +1,4 @@
-"""From fits to quantities of all objects and pairs, compiled; see `kinematics.py`."""
+"""Compiled loops of `kinematics.py`: from fits to quantities of all objects and pairs."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Floats = NDArray[np.float64]
 def hull_gaps(
     seen: Floats, separation: Floats, before: Floats, near: float, hold: float
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Gaps of all pairs as far as boxes and hulls tell them, and the pairs whose outlines must be asked.
+    """Gaps of all pairs from boxes and hulls, and the pairs that need their outlines.
 
     Args:
-        seen: (M, 8) of each body: seconds since it was seen; its image motion (x, y), pixels per second,
-            and the deviation of that, NaN where it is not seen or not known; its box, pixels.
+        seen: (M, 8) per body: seconds since it was seen; its image motion (x, y), pixels per second, and
+            its standard deviation, NaN if not seen or unknown; its box, pixels.
         separation: (M, M) signed distances of the hulls, pixels; NaN unknown.
-        before: (M, M) gaps of the step before, pixels.
-        near: Gap beyond which outlines are not looked at, pixels.
-        hold: For how long the last gap stands for what is not seen, seconds.
+        before: (M, M) gaps of the previous step, pixels.
+        near: Gap beyond which outlines are not used, pixels.
+        hold: How long the last gap is kept for bodies out of view, seconds.
 
     Returns:
         (P,) pixels, and numbers of pairs.
@@ -56,9 +56,9 @@ def hull_gaps(
 
 @compiled
 def _separation_speed(support: Floats, seen: Floats, i: int, j: int, directions: Floats) -> float:
-    """How fast body j goes away from body i by their image motion, pixels per second.
+    """Speed at which body j moves away from body i, by their image motion, pixels per second.
 
-    That is along the direction, from i to j, in which the hulls overlap least.
+    It is measured along the direction from i to j in which the hulls overlap least.
     """
     half, least, at = len(directions) // 2, np.inf, 0
     for k in range(len(directions)):
@@ -71,7 +71,7 @@ def _separation_speed(support: Floats, seen: Floats, i: int, j: int, directions:
 
 @compiled
 def separation_speeds(support: Floats, seen: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    """(M, M) speeds at which pairs part by their image motion, and their deviations; see `pair_tables`."""
+    """(M, M) speeds of separation by image motion, and their standard deviations; see `pair_tables`."""
     count = len(seen)
     speed, spread = np.empty((count, count)), np.empty((count, count))
     for i in range(count):
@@ -83,7 +83,7 @@ def separation_speeds(support: Floats, seen: Floats, directions: Floats) -> tupl
 
 @compiled
 def time_to_contact(gap: float, rate: float) -> float:
-    """Seconds until a gap is closed at a rate; see `Kinematics.time_to_contact`."""
+    """Seconds until a gap closes at a rate; see `Kinematics.time_to_contact`."""
     if np.isnan(gap) or np.isnan(rate):
         return np.nan
     if gap <= 0.0:
@@ -104,22 +104,22 @@ def pair_tables(
 ) -> tuple[Floats, Floats]:
     """Quantities of all pairs.
 
-    While one body reaches in front of another, the distance of their hulls says little: its noise is
-    large, and nothing of a gap shows yet. The image motion of each region is known much better. So for
-    bodies near each other, a speed of parting that is far above its noise is taken for the trend of
-    their distance. It is not asked about coming closer, which is seen well before contact.
+    While one body is in front of another, the distance of their hulls carries little information: its
+    noise is large, and no gap is visible yet. The image motion of each region is known much better. So for
+    bodies near each other, a speed of separation far above its noise replaces the trend of their distance.
+    Approach does not need this, since it is visible well before contact.
 
     Args:
         gaps: (P,) pixels.
         slope: (P,) trends of the distances, pixels per second.
-        sigma: (P,) their deviations.
+        sigma: (P,) their standard deviations.
         velocity: (M, 2) pixels per second.
-        support: (M, K) reach of the outlines at the last sample, pixels; no rows when there is none.
-        seen: (M, 8) of each body; see `hull_gaps`.
+        support: (M, K) support of the outlines at the last sample, pixels; no rows if there is none.
+        seen: (M, 8) per body; see `hull_gaps`.
         directions: (K, 2) unit vectors.
-        limits: Gap up to which the motion of two bodies tells that they part, pixels; the least speed
-            that is strong, pixels per second, and in deviations; for how long a trend outlasts the
-            sight of a body, seconds.
+        limits: Gap up to which image motion is used, pixels; the least speed of separation, pixels per
+            second, and in standard deviations; how long a trend outlasts the last sighting of a body,
+            seconds.
 
     Returns:
         (5, M, M) tables and (M,) speeds.

@@ -1,4 +1,4 @@
-"""Relations of two bodies from the states and quantities of one step, compiled."""
+"""Compiled loops: relations of two bodies from the states and quantities of one step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
 from visup.rules.smoothing.hysteresis import UNKNOWN, Codes, Floats
 
 COUPLED, MERGED = 1, 2
-"""Marks of pairs that are one body, or are seen as one region."""
+"""Marks of pairs that are one body, or one region."""
 
 COPIED = (
     (TableRow.TREND, StateRow.TREND),
@@ -27,23 +27,23 @@ COPIED = (
     (TableRow.DISTANCE, StateRow.DISTANCE),
     (TableRow.DIRECTION, StateRow.DIRECTION),
 )
-"""Rows of the table, and the rows of states that they are taken from."""
+"""Rows of the table, and the rows of states they are copied from."""
 
 
 SWAY = 0.12
-"""Two that move as one do so up to this share of their speed."""
+"""Tolerated relative speed of bodies moving as one, as a share of their speed."""
 
 
 class MotionLimits(NamedTuple):
     """Thresholds of trend, touch and moving together.
 
     Attributes:
-        rates: To enter and to leave a trend, pixels per second.
-        sigmas: In deviations, to want a trend and to go on wanting it.
-        touch: Gaps to begin and to keep a touch, pixels; shares of depth by which it ends and begins to
-            be none.
-        rest: Relative speed of rest, pixels per second; the same in halves of the window; by how much
-            more it may be while it goes on; share of the speed that is asked for at which it does.
+        rates: Rates to enter and to leave a trend, pixels per second.
+        sigmas: The same in standard deviations, for a new and for a pending trend.
+        touch: Gaps to start and to keep a touch, pixels; relative depth differences at which it ends and
+            below which it may start.
+        rest: Relative speed of rest, pixels per second; the same in halves of the window; factor while it
+            continues; share of the required speed at which it continues.
     """
 
     rates: tuple[float, float]
@@ -53,7 +53,7 @@ class MotionLimits(NamedTuple):
 
 
 class PairMotion(NamedTuple):
-    """What trend, touch and moving together are judged by.
+    """The quantities that decide trend, touch and moving together.
 
     Attributes:
         tables: (5, M, M); see `PairQuantity`.
@@ -73,12 +73,12 @@ class PairMotion(NamedTuple):
 
 
 class PairBeliefs(NamedTuple):
-    """States of pairs, and since when they hold.
+    """States of pairs, and since when they have held.
 
     Attributes:
         state: (ROWS, P); see `StateRow`.
         since: (ROWS, P) seconds.
-        rcc8: (2, P) of boxes and of outlines.
+        rcc8: (2, P) for boxes and for outlines.
         rcc8_since: (2, P) seconds.
     """
 
@@ -90,7 +90,7 @@ class PairBeliefs(NamedTuple):
 
 @compiled
 def smoothed_value(before: float, now: float, share: float, jump: float) -> float:
-    """One value, smoothed; see `ema.py`."""
+    """A smoothed value; see `ema.py`."""
     step = now - before
     return share * step + before if abs(step) <= jump else now
 
@@ -103,16 +103,16 @@ def smoothed_boxes(
     tables: Floats,
     numbers: tuple[float, float, float, float, float],
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Where bodies are, smoothed.
+    """Smoothed boxes and gaps.
 
     Args:
         boxes: (M, 4) before, pixels.
         gaps: (P,) of the outlines before, pixels.
-        seen: (M, 8) how bodies were seen; see `hull_gaps`.
+        seen: (M, 8) sightings; see `hull_gaps`.
         tables: (5, M, M); see `Kinematics`.
-        numbers: Share of what is new; differences of edges, and of gaps, beyond which a mean begins anew,
-            pixels; for how long a box stands for a body out of sight, seconds; gap up to which outlines
-            may meet, pixels.
+        numbers: Weight of new values; differences of edges, and of gaps, beyond which an average is
+            reset, pixels; how long a box is kept for a body out of view, seconds; gap up to which
+            outlines may meet, pixels.
 
     Returns:
         (M, 4) boxes and (P,) gaps, NaN unknown, and the numbers of the pairs that may meet.
@@ -145,15 +145,15 @@ def smoothed_outlines(
     found: Floats,
     numbers: tuple[float, ...],
 ) -> Floats:
-    """How outlines stand to each other, smoothed.
+    """Smoothed signed distances of outlines.
 
     Args:
         before: (3, P) pixels; see `outline_differences`.
         gaps: (P,) pixels, NaN unknown.
-        asked: (K,) pairs that were looked at.
-        found: (3, K) of these, pixels.
-        numbers: Share of what is new; differences beyond which a mean begins anew; distance that stands for
-            pairs that were not looked at, pixels.
+        asked: (K,) pairs that were measured.
+        found: (3, K) their distances, pixels.
+        numbers: Weight of new values; differences beyond which an average is reset; distance assumed for
+            other pairs, pixels.
 
     Returns:
         (3, P) pixels; NaN unknown.
@@ -183,15 +183,15 @@ def classify_trend(
     Args:
         rate: Pixels per second; NaN unknown.
         sigma: Its standard deviation.
-        before: The trend believed so far.
-        pending: The trend that wanted to be believed so far.
+        before: The current trend.
+        pending: The pending trend.
         limits: Rate that must be exceeded to enter a trend, and below which it ends.
-        sigmas: How many deviations the rate must also exceed to want to enter, and how many to go
-            on wanting it. Deviations are themselves estimates and jump; one wide one in a row does
-            not take back what was seen. A rate below one deviation is none.
+        sigmas: Standard deviations that the rate must also exceed to become pending, and to stay
+            pending. Standard deviations are estimates themselves and jump; a single wide one does not
+            cancel a pending trend. A rate below one standard deviation is none.
 
     Returns:
-        Its code; a rate between the thresholds leaves things as they are.
+        Its code; a rate between the thresholds changes nothing.
     """
     if not np.isfinite(rate):
         return UNKNOWN
@@ -200,18 +200,18 @@ def classify_trend(
     least = (sigmas[1] if pending == towards else sigmas[0]) * sigma
     if abs(rate) > enter and abs(rate) > least:
         return towards
-    # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
+    # Below the entry threshold a new pair keeps its distance; an existing trend ends later.
     goes_on = (before == CONVERGING and rate <= 0.0) or (before == DIVERGING and rate >= 0.0)
     return before if goes_on and abs(rate) >= max(leave, sigma) else KEEPING
 
 
 @compiled
 def combined_trend(image: int, depth: int) -> int:
-    """Judge the trends of an image distance and of a depth difference together.
+    """Combine the trends of an image distance and of a depth difference.
 
     Args:
         image: Code of the trend in the image.
-        depth: Code of the trend of the depth difference, UNKNOWN where depth is not known.
+        depth: Code of the trend of the depth difference, UNKNOWN where depth is unknown.
 
     Returns:
         The image's trend where the depth agrees, keeps or is unknown; the depth's where the image
@@ -228,7 +228,7 @@ def combined_trend(image: int, depth: int) -> int:
 
 @compiled
 def _threshold(before: int, enter: float, leave: float) -> float:
-    """Up to which value a state is begun or kept; by the middle while it is not known yet."""
+    """The threshold to enter or keep a state; their mean while it is unknown."""
     return leave if before == 1 else 0.5 * (enter + leave) if before == UNKNOWN else enter
 
 
@@ -236,7 +236,7 @@ def _threshold(before: int, enter: float, leave: float) -> float:
 def _touching(
     gap: float, depths: tuple[float, float], before: int, limits: tuple[float, ...]
 ) -> int:
-    """By the gap, and not where depth tells the two apart."""
+    """Touch by the gap, unless depth separates the two."""
     near, far, level, apart = limits
     if np.isnan(gap):
         return UNKNOWN
@@ -268,12 +268,12 @@ def _together(
 ) -> int:
     """Whether both move and neither moves relative to the other, over the window and in its halves.
 
-    The halves are looked at so that a body that bounces off, whose mean relative velocity is zero for a
-    moment, is not taken for one that rests.
+    The halves are checked so that a body bouncing off, whose mean relative velocity is momentarily zero,
+    is not taken for one at rest.
     """
     still, half, wide, goes_on = limits
     held = before == 1
-    # What moves fast sways, and what it did before it moved says nothing.
+    # Fast motion sways, and motion before it started is irrelevant.
     if lately > 4.0 * still and halves[1] < max(half, SWAY * (wide if held else 1.0) * lately):
         return 1
     if np.isnan(relative):
@@ -289,21 +289,21 @@ def _together(
 def classify_motion(
     state: Codes, pending: Codes, now: PairMotion, limits: MotionLimits, codes: Codes
 ) -> None:
-    """Trend, touch and moving together of all pairs.
+    """Classify trend, touch and moving together of all pairs.
 
     Args:
-        state: (3, P) of these so far.
-        pending: (3, P) what wanted to be believed so far.
-        now: What they are judged by.
+        state: (3, P) current states of these.
+        pending: (3, P) pending states.
+        now: The quantities.
         limits: Thresholds.
-        codes: (4, P) written but for the last row, the trend of depth, which is read.
+        codes: (4, P) output, except the last row, the trend of depth, which is input.
     """
     rates, tables, depth, k = limits.rates, now.tables, now.depth, -1
     for i in range(len(now.speed)):
         for j in range(i + 1, len(now.speed)):
             k += 1
             rate, sigma = tables[PairQuantity.RATE, i, j], tables[PairQuantity.SIGMA, i, j]
-            # What two that move as one do to their distance is no trend: they sway.
+            # Distance changes of bodies moving as one are sway, not a trend.
             known = np.isfinite(now.speed[i]) and np.isfinite(now.speed[j])
             sway = SWAY * min(now.speed[i], now.speed[j]) if known else 0.0
             least = max(rates[0], sway), max(rates[1], sway)
@@ -319,7 +319,7 @@ def classify_motion(
             codes[2, k] = _together(relative, halves, slower, lately, state[2, k], limits.rest)
             meets = tables[PairQuantity.GAP, i, j] <= limits.touch[0]
             if now.marks[k] & COUPLED and meets and found == DIVERGING:
-                # One body that turns changes its outline; it parts when its parts no longer touch.
+                # A rotating body changes its outline; it separates when its parts no longer touch.
                 found = KEEPING
             if now.marks[k] & MERGED:
                 found, touching = UNKNOWN, 1
@@ -328,7 +328,7 @@ def classify_motion(
 
 @compiled
 def _certainties(rate: float, sigma: float, cap: float, floor: float) -> tuple[float, float]:
-    """Of most relations, and of a trend that is so many deviations from zero."""
+    """Certainty of most relations, and of a trend by its distance from zero in standard deviations."""
     sure = abs(rate / np.hypot(sigma, floor))
     sure = 0.0 if np.isnan(sure) else 1.0 - 0.5 * np.exp(-sure / 3.0)
     return min(cap, 0.9), min(cap, sure)
@@ -342,15 +342,15 @@ def relation_rows(
     converses: tuple[Codes, Codes],
     numbers: tuple[float, float, float],
 ) -> tuple[Codes, Floats, Floats]:
-    """What a table of relations says of all pairs; its rows are those of `TableRow`.
+    """The relation table of all pairs; its rows are those of `TableRow`.
 
     Args:
         beliefs: States of the pairs.
         tables: (5, M, M); see `PairQuantity`.
         depth: (M,); NaN unknown.
         converses: RCC-8 of (a, b) -> that of (b, a); the same of directions.
-        numbers: Seconds now; most that is believed without depth; noise of a trend that is never believed
-            to be less, pixels per second.
+        numbers: Current time, seconds; greatest certainty without depth; floor of a trend's noise, pixels
+            per second.
 
     Returns:
         (16, P) codes and (16, P) seconds since when; (7, P) numbers; see `ValueRow`.

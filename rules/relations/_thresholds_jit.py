@@ -1,8 +1,8 @@
-"""Qualitative states of all pairs from what is measured, compiled: one pair after another.
+"""Compiled loops: qualitative states of all pairs from measurements, pair by pair.
 
-The calculi are explained in `rcc8.py`, `direction.py`, `distance.py`, `qtc.py` and `trend.py`, the
-thresholds in `thresholds.py`. Every question has one function of one pair; NaN is unknown, and every
-comparison with it fails.
+The calculi are explained in `rcc8.py`, `direction.py`, `distance.py`, `qtc.py` and `trend.py`, the thresholds
+in `thresholds.py`. There is one function of one pair per question; NaN is unknown, and every comparison with
+it fails.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ def sign_with_hysteresis(value: float, before: int, enter: float, leave: float) 
 def signs_with_hysteresis(values: Floats, before: Codes, enter: float, leave: float) -> Codes:
     """The signs of quantities, with hysteresis (a Schmitt trigger on either side of zero).
 
-    A sign begins beyond `enter` and ends within `leave`. One that is not known yet is judged by the
-    middle of the two, so that noise must cross half of the band to change it, wherever in the band
-    the quantity may lie. What is in the band but was on the other side of zero has crossed it: no sign.
+    A sign begins beyond `enter` and ends within `leave`. An unknown one is decided at the mean of the
+    two, so that noise must cross half of the band to change it, wherever in the band the quantity is.
+    A quantity inside the band that had the other sign has crossed zero and has no sign.
 
     Args:
         values: (R, P); NaN unknown.
-        before: (R, P) signs so far, `BELOW`, `WITHIN`, `ABOVE` or `UNKNOWN`.
+        before: (R, P) previous signs, `BELOW`, `WITHIN`, `ABOVE` or `UNKNOWN`.
         enter: Magnitude beyond which a quantity has a sign.
         leave: Magnitude within which it has none; at most `enter`.
 
@@ -51,13 +51,13 @@ def signs_with_hysteresis(values: Floats, before: Codes, enter: float, leave: fl
 
 @compiled
 def moving_sign(speed: float, before: int, enter: float, leave: float) -> int:
-    """The same of a speed: what is not known yet is at rest until the speed exceeds `enter`."""
+    """The same for a speed: an unknown one is at rest until it exceeds `enter`."""
     return sign_with_hysteresis(speed, WITHIN if before == UNKNOWN else before, enter, leave)
 
 
 @compiled
 def beyond(value: float, least: float, share: float) -> float:
-    """The greater of a bound and of so many deviations; NaN when these are not known."""
+    """The greater of a bound and a number of standard deviations; NaN when unknown."""
     return least if share * value <= least else share * value
 
 
@@ -77,7 +77,7 @@ def moving_signs(
 
 @compiled
 def difference(boxes: Floats, i: int, j: int, row: int) -> float:
-    """One of the eight of `edge_differences`."""
+    """One of the eight differences of `edge_differences`."""
     axis = row % 2
     a, b = boxes[i, axis], boxes[j, axis]
     if row < 2:
@@ -91,14 +91,14 @@ def difference(boxes: Floats, i: int, j: int, row: int) -> float:
 
 @compiled
 def edge_differences(boxes: Floats) -> Floats:
-    """How the edges of all pairs of boxes stand to each other.
+    """Differences of the edges of all pairs of boxes.
 
     Args:
         boxes: (M, 4) float: x, y, width, height, pixels.
 
     Returns:
-        (8, P) pixels, for each pair (a, b) and each axis x, y: start of a after that of b; end of b
-        after that of a; end of b after the start of a; end of a after the start of b.
+        (8, P) pixels, for each pair (a, b) and each axis x, y: start of a minus start of b; end of b
+        minus end of a; end of b minus start of a; end of a minus start of b.
     """
     count, number = len(boxes), 0
     apart = np.empty((8, count * (count - 1) // 2))
@@ -126,14 +126,14 @@ def box_gap(boxes: Floats, i: int, j: int) -> float:
 
 @compiled
 def box_gaps(boxes: Floats) -> Floats:
-    """Distances between all pairs of boxes, negative the depth of their overlap.
+    """Distances between all pairs of boxes; negative for overlap.
 
     Args:
         boxes: (M, 4) x, y, width, height, pixels.
 
     Returns:
-        (P,) pixels: between the nearest points where boxes are apart; where they overlap, minus
-        how far one must be moved along an axis to part them.
+        (P,) pixels: between the nearest points of separate boxes; for overlapping ones, minus the least
+        translation along an axis that separates them.
     """
     count, number = len(boxes), 0
     gaps = np.empty(count * (count - 1) // 2)
@@ -148,15 +148,15 @@ def box_gaps(boxes: Floats) -> Floats:
 def direction(
     dx: float, dy: float, before: int, place: tuple[float, float], slack: float, noise: float
 ) -> int:
-    """Direction of one place as seen from another, by cones.
+    """Direction of one position from another, by cones.
 
     Args:
-        dx: How far to the right the one lies, pixels; NaN unknown.
-        dy: How far down.
-        before: Code so far.
-        place: Distances within which two come to one place, and beyond which they leave it, pixels.
-        slack: How far beyond the edge of its cone a direction is kept, radians.
-        noise: Standard deviation of a coordinate, pixels; four of them are allowed, too.
+        dx: Offset to the right, pixels; NaN unknown.
+        dy: Offset down, pixels.
+        before: Previous code.
+        place: Distances below which two coincide, and above which they no longer do, pixels.
+        slack: Tolerance beyond the edge of the cone of a direction, radians.
+        noise: Standard deviation of a coordinate, pixels; four of them are tolerated, too.
 
     Returns:
         Code into `DIRECTION_NAMES`.
@@ -179,14 +179,14 @@ def direction(
 
 @compiled
 def distance_class(gap: float, size: float, before: int, slack: float, noise: float) -> int:
-    """Class of one distance.
+    """The class of a distance.
 
     Args:
         gap: Pixels; NaN unknown.
-        size: Of the two, pixels.
-        before: Code so far.
-        slack: How far beyond the end of its class a distance keeps it, share of the limit.
-        noise: Standard deviation of an edge, pixels; four are allowed, too.
+        size: Size of the two, pixels.
+        before: Previous code.
+        slack: Tolerance beyond the end of the current class, as a share of the limit.
+        noise: Standard deviation of an edge, pixels; four are tolerated, too.
 
     Returns:
         Code into `CLASS_NAMES`.
@@ -197,7 +197,7 @@ def distance_class(gap: float, size: float, before: int, slack: float, noise: fl
     for k in range(len(LIMITS)):
         limit = LIMITS[k] * size
         band = 0.0 if before == UNKNOWN else max(slack * limit, 4.0 * noise)
-        # The band lies towards the other class: what is below is held up to limit + band.
+        # The band extends into the other class: the lower one lasts up to limit + band.
         code += gap > limit + (-band if before > k else band)
     return code
 
@@ -213,7 +213,7 @@ def size_of(boxes: Floats, i: int, j: int) -> float:
 def components(
     places: Floats, velocities: Floats, i: int, j: int
 ) -> tuple[float, float, float, float, float]:
-    """How fast each of two moves away from the other's place, and across to its right.
+    """Velocity components of each of two points away from the other, and to its right.
 
     Args:
         places: (M, 2) points, pixels, y down.
@@ -222,9 +222,9 @@ def components(
         j: The second.
 
     Returns:
-        Pixels per second: of the first and of the second away from the other (negative: towards it),
-        then of the first and of the second to the right of the line from itself to the other (negative:
-        to the left); 0 where two points coincide, NaN where unknown. And the length of the line, pixels.
+        Pixels per second: of the first and the second away from the other (negative: towards it), then
+        of the first and the second to the right of the line from itself to the other (negative: to the
+        left); 0 for coinciding points, NaN for unknown. And the length of the line, pixels.
     """
     x, y = places[j, 0] - places[i, 0], places[j, 1] - places[i, 1]
     length = np.sqrt(x * x + y * y)
@@ -232,8 +232,8 @@ def components(
     x, y = x * scale, y * scale
     ux, uy = velocities[i, 0], velocities[i, 1]
     vx, vy = velocities[j, 0], velocities[j, 1]
-    # With y down, a positive cross product turns to the right; seen from the second, the line
-    # runs the other way.
+    # With y down, a positive cross product is to the right; for the second, the line runs the other
+    # way.
     return -(ux * x + uy * y), vx * x + vy * y, x * uy - y * ux, y * vx - x * vy, length
 
 
@@ -246,15 +246,15 @@ def classify_boxes(
     limits: tuple[float, float, float, float, float, float, float, float, float, float, float],
     codes: Codes,
 ) -> None:
-    """Order of edges, direction, class of distance and movements of all pairs of boxes.
+    """Classify order of edges, direction, distance and movements of all pairs of boxes.
 
     Args:
-        before: (R, P) codes so far, of which those of `thresholds.py` come first.
-        boxes: (M, 4) x, y, width, height, pixels; NaN for what is not seen.
+        before: (R, P) previous codes, of which those of `thresholds.py` come first.
+        boxes: (M, 4) x, y, width, height, pixels; NaN for bodies out of view.
         velocities: (M, 2) of their centres, pixels per second; NaN unknown.
         spread: (M,) standard deviation of a component.
         limits: See `thresholds.limits`.
-        codes: (R, P) written: what is wanted now, the rows of `thresholds.py`.
+        codes: (R, P) output: codes of the current measurement, the rows of `thresholds.py`.
     """
     level, level_out, near, far, cone, noise, slack, enter, leave, sure, still = limits
     count, number = len(boxes), -1
@@ -272,7 +272,7 @@ def classify_boxes(
             gap, size = box_gap(boxes, i, j), size_of(boxes, i, j)
             codes[9, number] = distance_class(gap, size, before[9, number], slack, noise)
             speeds = components(places, velocities, i, j)
-            # The line between the places is noisy too, the more so the shorter it is.
+            # The line between the centres is noisy too, the more so the shorter it is.
             turn = 2.0 * noise**2 / max(speeds[4] * speeds[4], 1.0)
             for k in range(4):
                 one = j if k % 2 else i

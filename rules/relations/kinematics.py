@@ -20,36 +20,35 @@ from visup.rules.relations.thresholds import ThresholdSettings
 
 @dataclass(frozen=True, slots=True)
 class RelationSettings:
-    """Thresholds of the relations.
+    """Settings and thresholds of the relations.
 
     Attributes:
         window_s: Length of the window over which lines are fitted.
-        samples: Most samples kept in the window.
-        bins: Most means of neighbouring samples to which lines are fitted.
-        change_sigmas: By how many standard deviations, and by twice `rate_enter`, a line over a shorter
-            window must differ from that over a longer one for the longer one to be out of date.
-        parting_gap: Gap up to which the motion of two bodies tells that they part, image diagonals.
+        samples: Most samples in the window.
+        bins: Most bins of neighbouring samples to which lines are fitted.
+        change_sigmas: Standard deviations, besides twice `rate_enter`, by which a line over a shorter
+            window must differ from that over a longer one for the longer one to be outdated.
+        parting_gap: Gap up to which image motion indicates separation, image diagonals.
         motion_window_s: Length of the window over which velocities are fitted.
         rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
         rate_exit: Trend below which they end, image diagonals per second.
-        sigmas: How many standard deviations of the slope a trend must exceed to enter.
-        pending_sigmas: The same while a trend waits to be believed.
-        trend_minimum_s: Least duration of a trend before it is believed.
-        hold_s: How long the last gap stands for bodies that flicker out of sight.
-        depth_rate: Relative depth change that counts, share of the depth per second.
+        sigmas: Standard deviations of the slope that a trend must exceed to enter.
+        pending_sigmas: The same while a trend is pending.
+        trend_minimum_s: Least duration of a trend before it is accepted.
+        hold_s: How long the last gap is kept for bodies that flicker out of view.
+        depth_rate: Least relative rate of depth, share of the depth per second.
         touch_enter: Outline gap at which bodies touch, image diagonals.
         touch_exit: Outline gap at which they no longer do.
         touch_minimum_s: Least duration of a touch.
-        still_speed: Relative speed over the window below which two bodies are at rest to each
+        still_speed: Relative speed over the window below which two bodies are at rest relative to each
             other, image diagonals per second.
         still_half: The same in each half of the window, where the noise is greater.
-        misfit: How unevenly an outline may move and still have a velocity, image diagonals/s.
-        apart_depth: Share of depth by which touching outlines belong to bodies apart in depth.
-        image_only_confidence: Most that a relation judged without depth is believed.
-        apart_exit: Share of depth below which touching outlines are no longer apart in depth.
-        together_exit: By how much relative motion may exceed its limit before two that move
-            together no longer do.
-        moving_exit: Share of the speed that moving together asks for at which it still goes on.
+        misfit: Tolerated unevenness of an outline's motion, image diagonals per second.
+        apart_depth: Relative depth difference from which touching outlines are apart in depth.
+        image_only_confidence: Greatest confidence of a relation without depth.
+        apart_exit: Relative depth difference below which they are no longer apart in depth.
+        together_exit: Factor of the limits of relative motion before moving together ends.
+        moving_exit: Share of the speed required for moving together at which it still continues.
         judge: Thresholds of RCC-8, QTC, direction and distance class.
     """
 
@@ -84,17 +83,17 @@ class RelationSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kinematics:
-    """Quantities of the last step; what rules compare. NaN is unknown.
+    """Quantities of the last step, as compared by rules. NaN is unknown.
 
     Attributes:
-        ids: (M,) object ids, increasing.
+        ids: (M,) object ids, ascending.
         tables: (5, M, M) `gap`, `rate`, `rate_sigma`, `relative_speed`, `time_to_contact`.
-        motion: (3, M, 2) velocities over the window of motion, in its first and in its second half,
-            pixels per second in the image, less those of the camera where they are perceived.
-        speed: (M,) the same, pixels per second.
+        motion: (3, M, 2) velocities over the motion window, in its first and in its second half, pixels
+            per second in the image, minus the camera's motion where it is perceived.
+        speed: (M,) speeds, pixels per second.
         depth: (M,) in the objects' units.
-        velocity_sigma: (M,) standard deviation of a component of each velocity that noise of the outlines
-            makes, pixels per second.
+        velocity_sigma: (M,) standard deviation of a velocity component due to noise of the outlines,
+            pixels per second.
         noise_px: Standard deviation of an outline, pixels.
     """
 
@@ -130,7 +129,7 @@ class Kinematics:
     def time_to_contact(self) -> Floats:
         """(M, M) seconds until the outlines meet at the present rate.
 
-        0 where they meet, infinite where they do not close in.
+        0 where they meet, infinite where they do not approach.
         """
         return self._table(PairQuantity.TIME_TO_CONTACT)
 
@@ -158,17 +157,17 @@ class Kinematics:
         return float(getattr(self, quantity)[self.ids.index(a)])
 
     def interval(self, quantity: str, a: int, b: int, sigmas: float = 2.0) -> tuple[float, float]:
-        """Where one quantity of one pair lies in view of its noise.
+        """The confidence interval of one quantity of one pair.
 
         Args:
             quantity: 'gap', 'rate', 'relative_speed' or 'time_to_contact'.
             a: An object.
-            b: Another.
-            sigmas: How many standard deviations to either side.
+            b: Another object.
+            sigmas: Standard deviations on either side.
 
         Returns:
-            (low, high) in the quantity's unit; both NaN when unknown. A time to contact lies
-            between those of the highest and the lowest closing speed.
+            (low, high) in the quantity's unit; both NaN when unknown. A time to contact is between those
+            of the highest and the lowest closing speed.
         """
         value = self.pair(quantity, a, b)
         if quantity == "time_to_contact":
@@ -191,7 +190,7 @@ class Kinematics:
 
 @dataclass(frozen=True, slots=True)
 class KinematicsEstimator:
-    """Turns samples into quantities."""
+    """Computes quantities from samples."""
 
     settings: RelationSettings
 
@@ -208,9 +207,9 @@ class KinematicsEstimator:
         Args:
             h: Samples up to now.
             objects: The objects of the samples.
-            seen: (M, 8) how they were seen; see `sightings`.
+            seen: (M, 8) their sightings; see `sightings`.
             mind: The mind.
-            before: What was measured in the step before.
+            before: The quantities of the previous step.
 
         Returns:
             All quantities; NaN where unknown.
@@ -249,7 +248,7 @@ class KinematicsEstimator:
         mind: Mind,
         before: Kinematics,
     ) -> Floats:
-        """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
+        """Outline gaps: exact when near, else the hulls' distance; NaN when out of view."""
         m, near = len(objects), NEAR_SHARE * image_diagonal(mind.frame_size)
         apart = h.separation[-1] if len(h.times) else np.full((m, m), np.nan)
         last = before.gap if before.ids == h.ids else _moved(before.gap, before.ids, h.ids)
@@ -265,21 +264,21 @@ NOWHERE = np.empty((0, FAN))
 
 
 def _moved(table: Floats, old: tuple[int, ...], new: tuple[int, ...]) -> Floats:
-    """A table of all pairs of other objects; NaN for pairs with a new one."""
+    """A table re-indexed for other objects; NaN for pairs with a new one."""
     rows, _ = reindexing(old, new)
     wide = np.pad(table, (0, 1), constant_values=np.nan)
     return np.ascontiguousarray(wide[np.ix_(rows, rows)])
 
 
 def sightings(objects: tuple[ObjectBelief, ...], now: float) -> Floats:
-    """(M, 8) how bodies were seen; see `hull_gaps`."""
+    """(M, 8) sightings of bodies; see `hull_gaps`."""
     rows = []
     for b in objects:
         r = b.region
-        told = b.last_seen == now and r.velocity_sigma > 0.0
-        x, y, sigma = (*r.velocity, r.velocity_sigma) if told else UNTOLD
+        measured = b.last_seen == now and r.velocity_sigma > 0.0
+        x, y, sigma = (*r.velocity, r.velocity_sigma) if measured else UNMEASURED
         rows.append((now - b.last_seen, x, y, sigma, *r.bbox))
     return np.array(rows, dtype=float).reshape(-1, 8)
 
 
-UNTOLD = (float("nan"),) * 3
+UNMEASURED = (float("nan"),) * 3

@@ -1,14 +1,12 @@
 """RCC-8, the region connection calculus (Randell, Cui and Cohn 1992), on boxes and on outlines.
 
-Two boxes relate along each axis by the order of their edges (Allen 1983); RCC-8 follows from the
-signs of four differences on each axis. These signs are what carries noise thresholds, so that the
-relation of boxes whose edges are level in truth does not flicker.
-
-Two outlines relate by how far the points of each lie outside the other (negative: within it):
-nearest point and farthest point. Where boxes are apart by more than the threshold, or the gap of
-the outlines is, no such distance is looked up: the two are disconnected. Else it costs a nearest
-neighbour search of at most 200 points of each outline among the other's, about 15 us for a pair.
-Holes within an outline count as outside.
+Two boxes relate along each axis by the order of their edges (Allen 1983); RCC-8 follows from the signs of
+four differences on each axis. These signs have the noise thresholds, so that the relation of boxes with truly
+level edges does not flicker.
+ Two outlines relate by how far the points of each are outside the other (negative: inside it): nearest and
+farthest point. Where boxes, or outlines, are apart by more than the threshold, no such distance is computed:
+the two are disconnected. Otherwise it costs a nearest-neighbour search of at most 200 points of each outline
+among the other's, about 15 us per pair. Holes inside an outline count as outside.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ DC, EC, PO, EQ, TPP, NTPP, TPPI, NTPPI = range(8)
 CONVERSE: Codes = np.array(
     [RCC8.index(n) for n in RCC8[:4]] + [TPPI, NTPPI, TPP, NTPP, UNKNOWN], dtype=np.int8
 )
-"""Code of (a, b) -> code of (b, a); the last one stands for `UNKNOWN` = -1."""
+"""Code of (a, b) -> code of (b, a); the last one is for `UNKNOWN` = -1."""
 
 
 @compiled
@@ -41,7 +39,7 @@ def from_signs(signs: Codes) -> Codes:
         signs: (8, P) codes `BELOW`, `WITHIN` (edges level), `ABOVE`, `UNKNOWN`.
 
     Returns:
-        (P,) codes into `RCC8`: what a is to b.
+        (P,) codes into `RCC8`: relation of a to b.
     """
     codes = np.empty(signs.shape[1], np.int8)
     for k in range(len(codes)):
@@ -68,14 +66,14 @@ def from_signs(signs: Codes) -> Codes:
 
 
 def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:
-    """RCC-8 relation of all pairs of boxes, without memory.
+    """RCC-8 relation of all pairs of boxes, without hysteresis.
 
     Args:
         boxes: (M, 4) float, x, y, width, height, pixels; boxes are closed regions of the plane.
-        tolerance: Edges closer than this count as level, pixels.
+        tolerance: Edges closer than this are level, pixels.
 
     Returns:
-        (M, M) int8 codes into `RCC8`; [a, b] says what a is to b.
+        (M, M) int8 codes into `RCC8`; [a, b] is the relation of a to b.
     """
     apart = edge_differences(boxes)
     signs = (np.sign(apart) * (np.abs(apart) > tolerance)).astype(np.int8) + np.int8(WITHIN)
@@ -87,7 +85,7 @@ def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:
 
 
 def outline_differences(regions: Sequence[Region], asked: Sequence[int]) -> Floats:
-    """How the outlines of some pairs of regions stand to each other.
+    """Signed distances of the outlines of some pairs of regions.
 
     Args:
         regions: (M) regions.
@@ -95,7 +93,7 @@ def outline_differences(regions: Sequence[Region], asked: Sequence[int]) -> Floa
 
     Returns:
         (3, K) pixels: nearest point of either outside the other; farthest point of a outside b;
-        farthest of b outside a. Negative is within.
+        farthest of b outside a. Negative is inside.
     """
     found = np.empty((3, len(asked)))
     i, j = pairs(len(regions))
@@ -103,7 +101,7 @@ def outline_differences(regions: Sequence[Region], asked: Sequence[int]) -> Floa
         a, b = regions[i[k]], regions[j[k]]
         least_a, most_a = signed_distances(a, b)
         least_b, most_b = signed_distances(b, a)
-        # Outlines run through the centres of pixels: neighbours meet, though they are 1 px apart.
+        # Outlines run through pixel centres: adjacent ones meet although they are 1 px apart.
         found[0, n], found[1, n], found[2, n] = min(least_a, least_b) - 1.0, most_a, most_b
     return found
 
@@ -116,7 +114,7 @@ def from_outline_signs(signs: Codes) -> Codes:
         signs: (3, P) codes.
 
     Returns:
-        (P,) codes into `RCC8`: what a is to b.
+        (P,) codes into `RCC8`: relation of a to b.
     """
     codes = np.empty(signs.shape[1], np.int8)
     for k in range(len(codes)):

@@ -1,21 +1,20 @@
-"""What holds between objects: relations of all pairs, in one vectorised pass per step.
+"""The relation reasoner: relations of all pairs of objects, in one vectorised pass per step.
 
-The distance whose trend is judged is the signed distance of the outlines' convex hulls: it goes
-on smoothly through zero into penetration depth when one body reaches in front of another, and it
-does not depend on the centroid of a body that the image border cuts (paper, section 7.4, fits the
-trend of the tracking data by a line). Each relation has a threshold to enter and another to leave
-it, both relative to the noise of the fit, and a least duration. Names and numbers of pixels are
-for an image diagonal of 800 px (640 x 480) and scale with the diagonal.
+The distance whose trend is classified is the signed distance of the outlines' convex hulls: it continues
+smoothly through zero into penetration depth when one body moves in front of another, and does not depend on
+the centroid of a body cut by the image border (paper, section 7.4, fits the trend of the tracking data by a
+line). Each relation has a threshold to enter and another to leave, both relative to the noise of the fit, and
+a least duration. Thresholds in pixels are stated for an image diagonal of 800 px (640 x 480) and scale with
+the diagonal.
+ A shrinking image distance does not mean that bodies approach in space. Where the depth of both is known, its
+trend counts too, and a relation on which the two disagree is unknown; where it is unknown the image alone
+decides and the confidence is capped at `image_only_confidence`. Relations about depth itself
+(`nearing_in_depth`, ...) are unknown without depth.
 
-An image distance that shrinks does not mean that bodies come closer in space. Where the depth of
-both is known, its trend is judged too, and a relation that the two contradict is unknown; where it
-is not known the image alone is judged and the confidence is capped at `image_only_confidence`.
-What is said of depth itself (`nearing_in_depth`, ...) is unknown without depth.
-
-How to read them off a mind:
+How to query them:
 
 - `related(mind, name, a, b) -> Truth`: any relation of two objects, those of `NAMES` among them;
-- `relation_of(mind, name, a, b) -> Relation | None`: the same with confidence, value, since;
+- `relation_of(mind, name, a, b) -> Relation | None`: the same with confidence, value, start;
 - `qtc(mind, a, b) -> str | None`: QTC-C such as '-0+0'; its first two signs are QTC-B;
 - `measured(mind).pair(quantity, a, b) -> float`: 'gap', 'rate', 'relative_speed', 'rate_sigma',
   'time_to_contact'; NaN unknown; `measured(mind).interval(quantity, a, b) -> (low, high)`;
@@ -120,7 +119,7 @@ NAMES = tuple(
     for name in names
     if name
 )
-"""Every relation of two objects that is judged here; `coupled` is judged by `coupling/reasoner.py`."""
+"""Every relation of two objects decided here; `coupled` is decided by `coupling/reasoner.py`."""
 
 COLUMNS = ColumnLayout(
     (
@@ -137,12 +136,12 @@ COLUMNS = ColumnLayout(
         Column(DIRECTION_NAMES, (T.DIRECTION, T.DIRECTION_CONVERSE), V.CERTAIN),
     )
 )
-"""What the rows of `relation_rows` stand for."""
+"""The meaning of the rows of `relation_rows`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothedGeometry:
-    """Places of objects, smoothed a little; see `ema.py`.
+    """Smoothed positions of objects; see `ema.py`.
 
     Attributes:
         time: Seconds of the last step.
@@ -163,15 +162,15 @@ def _no_smooth() -> SmoothedGeometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelationMemory:
-    """What the relations remember from step to step.
+    """The memory of the relations.
 
     Attributes:
-        history: Samples that lines are fitted to.
+        history: Samples for fits.
         measured: Quantities of the last step.
         states: (ROWS, P) states of the pairs of the history's objects.
-        rcc8: (2, P) RCC-8 of boxes and of outlines, which follow from some of these states.
-        smooth: What states of place are judged by.
-        drift: (M, 2) pixels by which the camera's motion has moved each of the history's objects.
+        rcc8: (2, P) RCC-8 of boxes and of outlines, derived from some of these states.
+        smooth: The geometry from which position states are decided.
+        drift: (M, 2) accumulated image motion of each object due to the camera, pixels.
     """
 
     history: SampleWindow = field(default_factory=SampleWindow)
@@ -186,28 +185,28 @@ RELATIONS = MemoryKey("rules.relations", RelationMemory())
 
 
 def kinematics(mind: Mind) -> Kinematics:
-    """The quantities of the last step, as `RelationReasoner` left them in the mind."""
+    """The quantities of the last step, as stored by `RelationReasoner`."""
     return mind.recall(RELATIONS).measured
 
 
 def sample_window(mind: Mind) -> SampleWindow:
-    """The last samples of all bodies, as `RelationReasoner` left them in the mind."""
+    """The last samples of all bodies, as stored by `RelationReasoner`."""
     return mind.recall(RELATIONS).history
 
 
 def relation_of(mind: Mind, name: str, a: int, b: int) -> Relation | None:
-    """A relation of two objects as the mind holds it, in this order, or None if it is not judged."""
+    """A relation of two objects in this order, or None if it is not decided."""
     return mind.relation(name, a, b)
 
 
 def related(mind: Mind, name: str, a: int, b: int) -> Truth:
-    """Whether a relation holds from a to b; unknown when it is not judged.
+    """Whether a relation holds from a to b; unknown if it is not decided.
 
     Args:
         mind: The mind after this step's relations.
         name: One of `NAMES`, `coupled`, or a plug-in's own.
         a: An object.
-        b: Another; the order matters for RCC-8's proper parts, movements and directions.
+        b: Another object; the order matters for RCC-8's proper parts, movements and directions.
     """
     found = mind.relation(name, a, b)
     return Truth.UNKNOWN if found is None else found.truth
@@ -215,18 +214,18 @@ def related(mind: Mind, name: str, a: int, b: int) -> Truth:
 
 def qtc(mind: Mind, a: int, b: int) -> str | None:
     """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
-    kept = mind.recall(RELATIONS)
-    k, turned = RelationTable(kept.history.ids).pair(a, b)
+    memory = mind.recall(RELATIONS)
+    k, turned = RelationTable(memory.history.ids).pair(a, b)
     if k < 0:
         return None
     order = slice(None, None, -1) if turned else slice(None)
-    state = kept.states.state
+    state = memory.states.state
     return text(*(int(c) for rows in (AWAY, SIDE) for c in state[rows, k][order]))
 
 
 @dataclass(frozen=True, slots=True)
 class RelationReasoner:
-    """Reasoner of the cogitate phase: judges all relations of all pairs of present objects."""
+    """Reasoner of the cogitate phase: decides all relations of all pairs of present objects."""
 
     settings: RelationSettings = field(default_factory=RelationSettings)
     _lasts: Floats = field(init=False, repr=False, compare=False)
@@ -235,27 +234,27 @@ class RelationReasoner:
         object.__setattr__(self, "_lasts", self._durations())
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Reason about one step; see `Reasoner`."""
         s = self.settings
-        kept = mind.recall(RELATIONS)
+        memory = mind.recall(RELATIONS)
         objects = mind.present()
-        before = _reindexed_memory(kept, tuple(b.id for b in objects), mind.time)
+        before = _reindexed_memory(memory, tuple(b.id for b in objects), mind.time)
         drift = drifted(before.drift, objects, observation)
         reach = s.window_s, s.samples
-        history = sampled(kept.history, objects, mind, observation, drift, reach)
+        history = sampled(memory.history, objects, mind, observation, drift, reach)
         seen = sightings(objects, mind.time)
-        now = KinematicsEstimator(s)(history, objects, seen, mind, kept.measured)
+        now = KinematicsEstimator(s)(history, objects, seen, mind, memory.measured)
         smooth = self._smooth(before.smooth, now, objects, seen, mind)
         wants = self._wanted(before.states, history, now, smooth, mind)
         states = advance(before.states, wants, mind.time, self._lasts)
         rcc8 = before.rcc8
-        if states is not before.states:  # else these follow from what is as it was
+        if states is not before.states:  # otherwise the derived relations are unchanged
             state = states.state
             held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
             rcc8 = advance(rcc8, held, mind.time, 0.0)
-        kept = RelationMemory(history, now, states, rcc8, smooth, drift)
-        table = RelationTable(now.ids, (self._cells(kept, mind),))
-        return Outcome(mind.remember(RELATIONS, kept, relations=table))
+        memory = RelationMemory(history, now, states, rcc8, smooth, drift)
+        table = RelationTable(now.ids, (self._cells(memory, mind),))
+        return Outcome(mind.remember(RELATIONS, memory, relations=table))
 
     def _durations(self) -> Floats:
         s = self.settings
@@ -308,7 +307,7 @@ class RelationReasoner:
         seen: Floats,
         mind: Mind,
     ) -> SmoothedGeometry:
-        """Boxes as they are, or were until a moment ago; gaps; outlines that may meet."""
+        """Smoothed boxes, including those last seen a moment ago; gaps; outlines that may meet."""
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
         share, jump = new_share(mind.time - before.time), 6.0 * s.judge.noise_px
         wide, near = jump * sqrt(2.0), 2.0 * s.judge.level_enter * diagonal
@@ -322,7 +321,7 @@ class RelationReasoner:
         return SmoothedGeometry(mind.time, boxes, gap, level)
 
     def _depth_trend(self, h: SampleWindow) -> Codes:
-        """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
+        """Trend of the difference in depth: a code per pair, UNKNOWN where depth is unknown."""
         i, j = pairs(len(h.ids))
         codes = np.full(len(i), UNKNOWN, dtype=np.int8)
         found_at = h.depth == h.depth  # NaN is not equal to itself
@@ -342,11 +341,11 @@ class RelationReasoner:
         codes[at] = found
         return codes
 
-    def _cells(self, kept: RelationMemory, mind: Mind) -> RelationBlock:
-        s, now = self.settings, kept.measured
+    def _cells(self, memory: RelationMemory, mind: Mind) -> RelationBlock:
+        s, now = self.settings, memory.measured
         floor = s.rate_enter * image_diagonal(mind.frame_size) / 3.0
         beliefs = PairBeliefs(
-            kept.states.state, kept.states.since, kept.rcc8.state, kept.rcc8.since
+            memory.states.state, memory.states.since, memory.rcc8.state, memory.rcc8.since
         )
         found = relation_rows(
             beliefs,
@@ -358,20 +357,20 @@ class RelationReasoner:
         return RelationBlock(COLUMNS, *found)
 
 
-def _reindexed_memory(kept: RelationMemory, ids: tuple[int, ...], now: float) -> RelationMemory:
-    """What was kept, of other objects."""
-    if kept.history.ids == ids:
-        return kept
-    rows, numbers = reindexing(kept.history.ids, ids)
-    drift = np.append(kept.drift, np.zeros((1, 2)), axis=0)[rows]
+def _reindexed_memory(memory: RelationMemory, ids: tuple[int, ...], now: float) -> RelationMemory:
+    """The memory re-indexed for other objects."""
+    if memory.history.ids == ids:
+        return memory
+    rows, numbers = reindexing(memory.history.ids, ids)
+    drift = np.append(memory.drift, np.zeros((1, 2)), axis=0)[rows]
     smooth = SmoothedGeometry(
-        kept.smooth.time,
-        np.append(kept.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
-        np.append(kept.smooth.gap, np.nan)[numbers],
-        np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1).take(numbers, axis=1),
+        memory.smooth.time,
+        np.append(memory.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
+        np.append(memory.smooth.gap, np.nan)[numbers],
+        np.append(memory.smooth.outlines, np.full((3, 1), np.nan), axis=1).take(numbers, axis=1),
     )
-    states, rcc8 = kept.states.select(numbers, now), kept.rcc8.select(numbers, now)
-    return replace(kept, states=states, rcc8=rcc8, smooth=smooth, drift=drift)
+    states, rcc8 = memory.states.select(numbers, now), memory.rcc8.select(numbers, now)
+    return replace(memory, states=states, rcc8=rcc8, smooth=smooth, drift=drift)
 
 
 def _marks(ids: tuple[int, ...], mind: Mind) -> Codes:

@@ -1,7 +1,8 @@
-"""The rows of the arrays in which states and relations of all pairs stand.
+"""Rows of the arrays of states and relations of all pairs.
 
-The compiled loops read these enumerations too. Where a state is of an ordered pair, one row is that of
-(a, b) and another that of (b, a).
+The compiled loops use these enumerations too. A state of an ordered pair has one row for (a, b) and another
+for (b, a).
+
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from enum import IntEnum
 
 
 class StateRow(IntEnum):
-    """Rows of the states that are judged with hysteresis.
+    """Rows of the states with hysteresis.
 
-    The first `BOX_ROWS` are those of plain boxes, judged by `classify_boxes`.
+    The first `BOX_ROWS` are those of plain boxes, from `classify_boxes`.
     """
 
     EDGES = 0  # order of the edges, eight rows; see `edge_differences`
@@ -42,7 +43,7 @@ OUTLINE = slice(StateRow.OUTLINES, ROWS)
 
 
 class TableRow(IntEnum):
-    """Rows of codes, and of the times since when they hold, in the table of relations."""
+    """Rows of codes, and of their start times, in the relation table."""
 
     TREND = 0
     TOUCH = 1
@@ -63,7 +64,7 @@ class TableRow(IntEnum):
 
 
 class ValueRow(IntEnum):
-    """Rows of numbers in the table of relations: certainties first, then quantities."""
+    """Rows of numbers in the relation table: certainties first, then quantities."""
 
     CERTAIN = 0
     MOST = 1

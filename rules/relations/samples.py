@@ -1,4 +1,4 @@
-"""The last second or two of all objects, as arrays: what lines are fitted to."""
+"""Samples of all objects over the last second or two, as arrays for fits."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, hull_separatio
 from visup.rules.presence.object_tracks import merged_pairs, presence_memory
 
 ROOM = 64
-"""For how many further samples memory is made ready."""
+"""Number of further samples for which memory is allocated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampleWindow:
-    """The last samples of all objects that relations are judged of.
+    """The last samples of all objects for relations.
 
-    Those of one moment are rows of the same memory as those of the moments before and after, which
-    is written to only where no history reaches yet: many minds are kept for little more than one.
+    Consecutive windows share memory, which is written only beyond the end of all existing windows, so that
+    many minds cost little more memory than one.
 
     Attributes:
-        ids: (M,) object ids, increasing.
-        times: (T,) seconds, increasing, all within the window.
+        ids: (M,) object ids, ascending.
+        times: (T,) seconds, ascending, all within the window.
         support: (T, M, 16) pixels; NaN where an object was not seen.
-        free: (T, M, 16) bool.
+        free: (T, M, 16) bool: clear of the image border.
         separation: (T, M, M) signed hull distances, pixels.
         depth: (T, M) in the objects' units; NaN where unknown.
-        drift: (T, M, 2) pixels by which the camera's motion has moved what rests where each object is,
-            since it is sampled.
-        start: Row of their memory in which the arrays begin.
+        drift: (T, M, 2) accumulated image motion of the static scene at each object due to the camera,
+            pixels, since the first sample.
+        start: Row of the shared memory at which the arrays start.
     """
 
     ids: tuple[int, ...] = ()
@@ -49,12 +49,12 @@ class SampleWindow:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """Times, and what was sampled at these."""
+        """Times and samples."""
         return self.times, self.support, self.free, self.separation, self.depth, self.drift
 
     @property
     def steady_support(self) -> Floats:
-        """(T, M, 16) pixels: the reach of the outlines in the resting scene, not in the picture."""
+        """(T, M, 16) pixels: support of the outlines relative to the static scene, not the picture."""
         if not self.drift.any():
             return self.support
         steady: Floats = self.support - self.drift @ DIRECTIONS.T
@@ -69,19 +69,19 @@ def sampled(
     drift: Floats,
     limits: tuple[float, int],
 ) -> SampleWindow:
-    """A history with this step's sample, and without those that are too old.
+    """Add this step's sample, and drop those that are too old.
 
     Args:
         history: The samples before.
         objects: The objects that are present now, by id.
         mind: The mind.
-        observation: Whether anybody looked for regions in this step.
+        observation: The observation, which says whether regions were looked for.
         drift: (M, 2) pixels; see `SampleWindow`.
-        limits: How far back samples are kept, seconds; most samples in that time: one that comes sooner
-            is left out.
+        limits: Length of the window, seconds; most samples in it: a sample that comes too soon is
+            skipped.
 
     Returns:
-        The samples of these objects; NaN for those that are not seen now.
+        The samples of these objects; NaN for those not seen now.
     """
     ids, (window_s, most) = tuple(b.id for b in objects), limits
     history = reindexed(history, ids)
@@ -103,24 +103,24 @@ def sampled(
 
 
 def drifted(before: Floats, objects: Sequence[ObjectBelief], observation: Observation) -> Floats:
-    """How far the camera's own motion has moved the picture where each object is, after one more frame.
+    """Accumulate the image motion due to the camera at each object by one frame.
 
-    What rests in the scene moves through the picture of a camera that pans, shakes or zooms. The motion
-    is taken at the middle of an object, so that of a zoom or a turn only the shift is taken off, not
-    the growth. Where nobody tells of the camera it is taken to rest.
+    The static scene moves in the picture of a camera that pans, shakes or zooms. The motion is taken at
+    the centre of an object, so that for a zoom or a rotation only the shift is compensated, not the growth.
+    Without an estimate the camera is assumed at rest.
 
     Args:
-        before: (M, 2) pixels, up to the frame before.
-        objects: M of them.
-        observation: What was perceived; of several motions of the camera the last counts.
+        before: (M, 2) pixels, up to the previous frame.
+        objects: The M objects.
+        observation: The observation; of several camera motions the last counts.
 
     Returns:
-        (M, 2) pixels; the same array where the camera rests.
+        (M, 2) pixels; the same array if the camera rests.
     """
-    told: Sequence[CameraMotion] = observation.of("camera")
-    if not told or np.array_equal(told[-1].motion, np.eye(2, 3)):
+    motions: Sequence[CameraMotion] = observation.of("camera")
+    if not motions or np.array_equal(motions[-1].motion, np.eye(2, 3)):
         return before
-    moved = [told[-1].displacement(b.region.centroid) for b in objects]
+    moved = [motions[-1].displacement(b.region.centroid) for b in objects]
     drift: Floats = before + np.array(moved).reshape(-1, 2)
     return drift
 
@@ -132,7 +132,7 @@ def covers_window(history: SampleWindow, window_s: float) -> bool:
 
 
 def reindexed(history: SampleWindow, ids: tuple[int, ...]) -> SampleWindow:
-    """A history of other objects: those that are new have no samples, others keep theirs."""
+    """A history re-indexed for other objects; new ones have no samples."""
     if ids == history.ids:
         return history
     t, m = len(history.times), len(ids)
@@ -148,13 +148,13 @@ def reindexed(history: SampleWindow, ids: tuple[int, ...]) -> SampleWindow:
 
 
 def without_reassigned(history: SampleWindow, mind: Mind) -> SampleWindow:
-    """A history without the samples of objects whose regions have changed their nature since."""
+    """A history without the samples of objects from before they were given another region."""
     of = presence_memory(mind).of
     changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
     if not len(history.times) or not (changed > history.times[0] + 1e-9).any():
         return history
     old = history.times[:, None] < changed[None, :] - 1e-9
-    # Samples that are rid of them already stay the arrays that they are.
+    # Unchanged if they were removed before.
     if not (old[:, :, None] & (history.support == history.support)).any():
         return history
     either = old[:, :, None] | old[:, None, :]
@@ -174,11 +174,11 @@ def without_oldest(history: SampleWindow, old: int) -> SampleWindow:
 
 
 def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> SampleWindow:
-    """A history with one more sample, a row of each of its arrays, and without old ones."""
+    """A history with one more sample, a row of each array, and without old ones."""
     count = len(history.times)
     end = history.start + count
     memory: list[Any] = [a.base for a in history.arrays]
-    # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
+    # A row without a time is unused; foreign arrays have no room at all.
     if any(m is None or len(m) <= end for m in memory) or memory[0][end] == memory[0][end]:
         history = _with_room(without_oldest(history, old), max(ROOM, count))
         count, old = count - old, 0
@@ -191,7 +191,7 @@ def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> Sampl
 
 
 def _with_room(history: SampleWindow, more: int) -> SampleWindow:
-    """The same history in memory of its own, with room for more samples."""
+    """Copy the history to new memory with room for more samples."""
     count = len(history.times)
 
     def roomy(values: NDArray[Any]) -> NDArray[Any]:

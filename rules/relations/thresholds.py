@@ -1,8 +1,8 @@
 """From quantities of pairs to qualitative states: thresholds above the noise, with hysteresis.
 
 Shared by the relations of an agent's objects (`reasoner.py`) and those of plain boxes
-(`visup/evaluation/reasoning/boxes.py`). All states of all pairs stand in one array of codes, a row for
-each question; see `rows.py`.
+(`visup/evaluation/reasoning/boxes.py`). All states of all pairs are in one array of codes, one row per
+question; see `rows.py`.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from visup.rules.smoothing.hysteresis import Floats
 
 @dataclass(frozen=True, slots=True)
 class ThresholdSettings:
-    """Thresholds of what is judged here. Lengths are shares of the image diagonal but for the noise.
+    """Thresholds of the states. Lengths are shares of the image diagonal, except the noise.
 
     Attributes:
         noise_px: Standard deviation of an edge of a box from frame to frame, pixels.
         level_enter: Edges farther apart than this are no longer level.
         level_exit: Edges nearer than this are level again.
-        place_enter: Centres nearer than this come to one place.
-        place_exit: Centres farther apart than this are at two places.
-        cone_slack_deg: How far beyond the edge of its cone a direction is kept, degrees.
-        class_slack: How far beyond the end of its class a distance keeps it, share of the limit.
-        speed_enter: Speed towards, away, to a side that must be exceeded, diagonals per second.
+        place_enter: Centres nearer than this coincide.
+        place_exit: Centres farther apart than this no longer do.
+        cone_slack_deg: Tolerance beyond the edge of a direction's cone, degrees.
+        class_slack: Tolerance beyond the end of a distance class, as a share of the limit.
+        speed_enter: Speed towards, away or sideways that must be exceeded, diagonals per second.
         speed_exit: Speed below which it ends.
-        sigmas_enter: How many of its standard deviations it must exceed, too.
-        sigmas_exit: Below how many it ends, too.
+        sigmas_enter: The same in its standard deviations, which must also be exceeded.
+        sigmas_exit: Standard deviations below which it also ends.
         state_minimum_s: Least duration of orders of edges, directions and distance classes.
         motion_minimum_s: Least duration of movements.
     """
@@ -55,15 +55,16 @@ Limits = tuple[float, float, float, float, float, float, float, float, float, fl
 
 
 def limits(s: ThresholdSettings, diagonal: float) -> Limits:
-    """Thresholds as `classify_boxes` takes them.
+    """Thresholds in the form of `classify_boxes`.
 
     Args:
         s: Settings.
-        diagonal: Of the image, pixels.
+        diagonal: Image diagonal, pixels.
 
     Returns:
-        Level edges, to leave and to be; one place, to come to and to leave; slack of a direction, radians;
-        noise; slack of a class; speeds to move and to rest, in pixels per second and in deviations.
+        Level edges, to leave and to enter; coincidence, to enter and to leave; tolerance of a direction,
+        radians; noise; tolerance of a class; speeds to move and to rest, pixels per second and in
+        standard deviations.
     """
     return (
         s.level_enter * diagonal,
@@ -81,7 +82,7 @@ def limits(s: ThresholdSettings, diagonal: float) -> Limits:
 
 
 def least_durations(s: ThresholdSettings) -> Floats:
-    """(JUDGED, 1) seconds that each row must last before it is believed."""
+    """(BOX_ROWS, 1) least duration of each row before it is accepted, seconds."""
     lasts = np.full((BOX_ROWS, 1), s.state_minimum_s)
     lasts[MOVEMENT] = s.motion_minimum_s
     return lasts

@@ -1,13 +1,12 @@
-"""Zones: parts of the scene drawn by the user, and which objects are inside them.
+"""Zones: parts of the scene drawn by the user, and the objects inside them.
 
-A zone is a polygon in the image, with or without a range of depth. Three questions are asked of
-each object and zone: is its centre inside, does any part of it reach into the zone, is all of it
-within. Of a zone on the floor they are asked of where the object stands. The polygon is judged with
-noise thresholds, hysteresis and a least duration; with a range of depth, an object that the image
-places inside but whose depth is unknown is not known to be inside, while one that the image places
-outside is outside whatever its depth.
+A zone is a polygon in the image, with or without a range of depth. There are three questions about each
+object and zone: whether its centre is inside, whether any part of it is, and whether all of it is. For a zone
+on the floor they concern where the object stands. The polygon has noise thresholds, hysteresis and a least
+duration; with a range of depth, an object inside by the image but of unknown depth is not known to be inside,
+while one outside by the image is outside whatever its depth.
 
-How to read them off a mind:
+How to query them:
 
 - `inside(mind, object_id, zone_name) -> Truth`: the centre is inside;
 - `reaching(mind, object_id, zone_name) -> Truth`: some part is;
@@ -48,11 +47,11 @@ class ZoneSettings:
     """Thresholds of zones.
 
     Attributes:
-        enter: Half width of the band about a zone's edge in which nothing changes, image diagonals.
+        enter: Half width of the hysteresis band about a zone's edge, image diagonals.
         depth_sigmas: The same for depth, in standard deviations of the object's depth.
-        minimum_s: Least duration before a change is believed.
-        hold_s: How long the last sighting stands for a body that flickers out of sight.
-        points: Most points of an outline that are looked at.
+        minimum_s: Least duration before a change is accepted.
+        hold_s: How long the last sighting is kept for a body that flickers out of view.
+        points: Most points of an outline that are tested.
     """
 
     enter: float = 0.0025
@@ -64,15 +63,15 @@ class ZoneSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ZoneMemory:
-    """What is remembered.
+    """The memory of zones.
 
     Attributes:
         ids: (M,) object ids.
         names: (Z,) zones.
-        states: (4, Z * M) states, zone by zone: the signs of how far centre, nearest and farthest
+        states: (4, Z * M) states, zone by zone: signs of how far the centre, the nearest and the farthest
             part are outside the polygon, and of how far the depth is outside its range.
-        outside: (Z, M) pixels of the centre, negative inside.
-        smooth: (4, Z * M) how far outside, smoothed; what states are judged by.
+        outside: (Z, M) distance of the centre, pixels, negative inside.
+        smooth: (4, Z * M) smoothed distances outside, from which states are decided.
         time: Seconds of the last step.
     """
 
@@ -94,7 +93,7 @@ class ZoneReasoner:
     settings: ZoneSettings = field(default_factory=ZoneSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Reason about one step; see `Reasoner`."""
         if not mind.zones:
             return Outcome(mind)
         s, objects = self.settings, mind.present()
@@ -108,7 +107,7 @@ class ZoneReasoner:
         spread = [s.depth_sigmas * (b.depth_sigma or 0.0) for b in objects]
         band[3] = np.tile(spread, len(names))
         jump = 2.0 * s.enter * image_diagonal(mind.frame_size)
-        # Depth was smoothed before, and is -inf where a zone has no range.
+        # Depth is already smoothed, and -inf where a zone has no range.
         flat = np.append(
             exponential_mean(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
         )
@@ -135,7 +134,7 @@ class ZoneReasoner:
         return old.states.select(places, now), smooth
 
     def _apart(self, zone: Zone, belief: ObjectBelief, mind: Mind) -> tuple[float, ...]:
-        """Outside the zone: centre, nearest part, farthest part, depth; NaN unknown."""
+        """Distances outside the zone: centre, nearest part, farthest part, depth; NaN unknown."""
         if mind.time - belief.last_seen > self.settings.hold_s:
             return (np.nan,) * 4
         region, polygon = belief.region, np.asarray(zone.polygon, dtype=float)
@@ -150,7 +149,7 @@ class ZoneReasoner:
         return float(distance[0]), least, float(distance[1:].max()), _beyond(zone, belief)
 
     def _feet_apart(self, region: Region, polygon: Floats, mind: Mind) -> tuple[float, ...]:
-        """Outside the zone: the middle of a body's feet, the nearest, the farthest; NaN unknown."""
+        """Distances outside the zone: centre of a body's feet, nearest, farthest; NaN unknown."""
         feet = foot_points(region, mind.frame_size)
         if not len(feet):
             return (np.nan,) * 3
@@ -160,12 +159,12 @@ class ZoneReasoner:
 
 
 def edge_sign(apart: Floats, before: Codes, band: Floats) -> Codes:
-    """On which side of an edge quantities are, with hysteresis about the edge itself.
+    """The side of an edge on which quantities are, with hysteresis about the edge.
 
     Args:
         apart: Any shape; how far outside; NaN unknown.
-        before: Same shape, what was believed so far: `BELOW` inside, `ABOVE` outside.
-        band: Same shape; beyond how much a change is seen.
+        before: Same shape, previous states: `BELOW` inside, `ABOVE` outside.
+        band: Same shape; distance beyond which a change is detected.
 
     Returns:
         `BELOW`, `ABOVE` or `UNKNOWN`.
@@ -195,7 +194,7 @@ def outside(points: Floats, polygon: Floats) -> Floats:
 
 
 def contains(points: Floats, polygon: Floats) -> NDArray[np.bool_]:
-    """Whether points (N, 2) lie in a polygon (K, 2), by the even-odd rule."""
+    """Whether points (N, 2) are inside a polygon (K, 2), by the even-odd rule."""
     x, y = points[:, 0, None], points[:, 1, None]
     (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
     crosses = (y0 > y) != (y1 > y)
@@ -205,7 +204,7 @@ def contains(points: Floats, polygon: Floats) -> NDArray[np.bool_]:
 
 
 def inside(mind: Mind, object_id: int, zone: str) -> Truth:
-    """Whether an object's centre is inside a zone; unknown for what is not judged."""
+    """Whether an object's centre is inside a zone; unknown if not decided."""
     return zone_truth(mind, "inside", object_id, zone)
 
 
@@ -228,7 +227,7 @@ def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
 
 
 def zone_truth(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
-    """One of `QUESTIONS` about an object and a zone; unknown for what is not judged."""
+    """One of `QUESTIONS` about an object and a zone; unknown if not decided."""
     kept = mind.recall(ZONES)
     if zone not in kept.names or object_id not in kept.ids:
         return Truth.UNKNOWN
@@ -236,13 +235,13 @@ def zone_truth(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
 
 
 def _relation(kept: ZoneMemory, question: str, object_id: int, zone: str) -> Relation:
-    """In the image and in depth: what is outside in either is outside, whatever is unknown."""
+    """Combine image and depth: outside in either is outside, even if the other is unknown."""
     k = kept.names.index(zone) * len(kept.ids) + kept.ids.index(object_id)
     rows = [QUESTIONS.index(question), 3]
     codes = [int(c) for c in kept.states.state[rows, k]]
     since = float(kept.states.since[rows, k].max())
     if ABOVE in codes:
-        # Outside since the first of the two says so.
+        # Outside since the earlier of the two.
         told = [t for c, t in zip(codes, kept.states.since[rows, k], strict=True) if c == ABOVE]
         return Relation(f"{question} {zone}", (object_id,), Truth.FALSE, float(min(told)))
     if UNKNOWN in codes:
@@ -251,7 +250,7 @@ def _relation(kept: ZoneMemory, question: str, object_id: int, zone: str) -> Rel
 
 
 def _beyond(zone: Zone, belief: ObjectBelief) -> float:
-    """How far the depth is outside the zone's range; -inf where the zone has none."""
+    """How far the depth is outside the zone's range; -inf if the zone has none."""
     if zone.depth is None:
         return -np.inf
     if belief.depth is None:
@@ -260,7 +259,7 @@ def _beyond(zone: Zone, belief: ObjectBelief) -> float:
 
 
 def _covers(belief: ObjectBelief, polygon: Floats) -> bool:
-    """Whether a corner of the polygon lies in the object, so that it reaches in from all round."""
+    """Whether a corner of the polygon is inside the object, which then surrounds it."""
     x, y, w, h = belief.region.bbox
     at = np.rint(polygon).astype(int) - (x, y)
     at = at[(at >= 0).all(axis=1) & (at[:, 0] < w) & (at[:, 1] < h)]

@@ -1,7 +1,7 @@
-"""Safety rules at work: verdicts for all choices of objects, alarm conditions, explanations.
+"""Safety rules: verdicts for all bindings of objects, alarm conditions, explanations.
 
-Read in this order: `safety.rules` (the rules that ship), `compiled_rules.py` (rules made ready to
-run), `verdicts.py` (their values in one step), `alarm_condition.py` (conditions raised, updated,
-resolved), `reasoner.py` (the reasoner that joins these); then `explain.py` and `queries.py` (why a
-rule is true or not) and `expression.py` (expressions watched from outside).
+Read in this order: `safety.rules` (the rules that ship), `compiled_rules.py` (compiled rules), `verdicts.py`
+(their values in one step), `alarm_condition.py` (conditions raised, updated, resolved), `reasoner.py` (the
+reasoner that combines these); then `explain.py` and `queries.py` (why a rule is true or not) and
+`expression.py` (watch expressions).
 """

@@ -1,4 +1,4 @@
-"""Alarm conditions: raised when a rule becomes true for some objects, and renewed from time to time."""
+"""Alarm conditions: raised when a rule becomes true for some objects, and updated periodically."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from visup.rules.safety.verdicts import Evaluation
 from visup.rules.wording.sentences import sentence, with_names
 
 MAX_UPDATED = 3
-"""How many concerns that stand are told anew in one step; words cost more than judging."""
+"""Most active conditions whose evidence is updated in one step: wording costs more than evaluation."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActiveCondition:
-    """A concern that stays for a while after its rule was last true.
+    """An active condition, which persists for a while after its rule was last true.
 
     Attributes:
-        concern: The concern.
-        until: Seconds up to which it stays though its rule is true no more; without end while it is.
-        told: Seconds when its evidence was told.
+        concern: The condition.
+        until: Time, seconds, until which it persists after its rule ceased to be true; infinite before.
+        told: Time of its evidence, seconds.
     """
 
     concern: AlertCondition
@@ -39,13 +39,13 @@ def update(
     cooling: Mapping[AlarmKey, float],
     before: float,
 ) -> tuple[MappingProxyType[AlarmKey, ActiveCondition], Mapping[AlarmKey, float]]:
-    """What holds now and what still stands of before, and what must not be raised again yet.
+    """Update the active conditions, and those in cooldown.
 
     Args:
-        values: Of all rules now.
-        held: Concerns that stood, those whose evidence is oldest first.
-        cooling: Until when, in seconds, objects raise no concern again.
-        before: Seconds of the step before.
+        values: Values of all rules now.
+        held: Active conditions before, oldest evidence first.
+        cooling: End of cooldown, seconds, by condition.
+        before: Time of the previous step, seconds.
 
     Returns:
         The same two after this step.
@@ -57,10 +57,12 @@ def update(
         if key in found:
             after[key] = ActiveCondition(held[key].concern, inf, held[key].told)
     if held.keys() - found.keys():
-        _gone(after, rest, found, values, before)
+        _expired(after, rest, found, values, before)
     for key in _oldest(held, found):
-        old = after.pop(key)  # what is told anew comes last
-        after[key] = ActiveCondition(_retold(old.concern, found[key], values), inf, now)
+        old = after.pop(key)  # updated ones are moved to the end
+        after[key] = ActiveCondition(
+            _with_current_evidence(old.concern, found[key], values), inf, now
+        )
     if found.keys() - after.keys():
         for key, hit in found.items():
             if key not in after and key not in rest:
@@ -68,14 +70,14 @@ def update(
     return MappingProxyType(after), MappingProxyType(rest)
 
 
-def _gone(
+def _expired(
     held: dict[AlarmKey, ActiveCondition],
     cooling: dict[AlarmKey, float],
     found: Mapping[AlarmKey, int],
     values: Evaluation,
     before: float,
 ) -> None:
-    """Note of concerns whose rule is true no more how long they stay, or take them out."""
+    """Set the expiry of conditions whose rule is no longer true, and remove expired ones."""
     now, rules = values.facts.mind.time, values.prepared.rules_by_name
     for key in [key for key in held if key not in found]:
         rule, until = rules[key[0]], held[key].until
@@ -91,7 +93,7 @@ def _gone(
 def _oldest(
     held: Mapping[AlarmKey, ActiveCondition], found: Mapping[AlarmKey, int]
 ) -> list[AlarmKey]:
-    """Concerns whose evidence is oldest, of those whose rule is true; of several alike the first."""
+    """The conditions of oldest evidence whose rule is true; the first ones among equals."""
     oldest: list[AlarmKey] = []
     for key, old in held.items():
         if len(oldest) >= MAX_UPDATED and old.told != held[oldest[-1]].told:
@@ -105,24 +107,24 @@ def _oldest(
 
 
 def _raised(hit: int, values: Evaluation) -> AlertCondition:
-    """One concern for each set of objects, in the order in which it is true of them."""
+    """The condition for a set of objects, in the order of the first binding that is true."""
     rule, ids = values.prepared.choice(hit, values.facts.ids)
     words = with_names(rule.say, rule.variables)
     cause = sentence(values.facts.mind, words, *ids, confidence=confidence(rule, ids, values))
     return AlertCondition(rule.name, ids, rule.severity, cause, evidence(rule, ids, values))
 
 
-def _retold(concern: AlertCondition, hit: int, values: Evaluation) -> AlertCondition:
-    """The same with evidence of now; the cause keeps its first wording, as that of its alert does."""
+def _with_current_evidence(concern: AlertCondition, hit: int, values: Evaluation) -> AlertCondition:
+    """The condition with current evidence; its cause keeps the first wording, as in its alert."""
     rule, ids = values.prepared.choice(hit, values.facts.ids)
-    told = evidence(rule, ids, values)
-    if told == concern.evidence:
+    current = evidence(rule, ids, values)
+    if current == concern.evidence:
         return concern
-    return AlertCondition(concern.kind, concern.objects, concern.severity, concern.cause, told)
+    return AlertCondition(concern.kind, concern.objects, concern.severity, concern.cause, current)
 
 
 def confidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> float:
-    """The least confidence of the relations that `when` names of these objects and that are true."""
+    """The least confidence of the true relations of these objects in `when`."""
     objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
     found = []
     for call in values.prepared.related(rule):

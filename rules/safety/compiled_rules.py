@@ -1,4 +1,4 @@
-"""Rules made ready to run, and what is read off them once: places, facts, texts."""
+"""Compiled rules, with everything derived from them once: value references, lookups, texts."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from visup.rules.relations.reasoner import NAMES
 AlarmKey = tuple[str, frozenset[int]]
 """Name of a rule, and objects."""
 MAX_KEYS = 16
-"""Of so many sets of objects it is remembered what may be found of them."""
+"""Most sets of objects with cached keys."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lookup:
-    """A fact or quantity that rules look up.
+    """A fact or quantity looked up by rules.
 
     Attributes:
-        step: The step that does.
+        step: The step of the lookup.
         name: Its word.
-        ask: What it is of all objects.
-        turned: Whether its objects stand along the axes in the other order.
-        axes: How many objects it is about.
+        ask: Its values for all objects.
+        turned: Whether its objects are in the opposite order of the axes.
+        axes: Number of its objects.
     """
 
     step: int
@@ -57,7 +57,7 @@ class Lookup:
 
 
 def evaluator(node: Predicate | Measure) -> Callable[[Snapshot], Any]:
-    """What a fact or quantity looks at, with those of its arguments that are no objects."""
+    """The evaluator of a fact or quantity, with its non-object arguments bound."""
     fact = isinstance(node, Predicate)
     word: PredicateDefinition | QuantityDefinition = (RULES.words if fact else RULES.quantities)[
         node.name
@@ -71,7 +71,7 @@ def _look(look: Callable[..., Any], others: list[str], facts: Snapshot) -> Any:
 
 
 class AlarmKeys:
-    """What stands for whatever rules may be true of, for some objects; found once for each.
+    """Cached alarm keys for a set of objects.
 
     Args:
         prepared: The rules.
@@ -81,11 +81,11 @@ class AlarmKeys:
     def __init__(self, prepared: CompiledRules, ids: tuple[int, ...]) -> None:
         self._prepared, self._ids = prepared, ids
         self._known: dict[int, AlarmKey] = {}
-        # What was found is nearly always what was found a step ago, in whichever mind.
+        # The result is nearly always the same as in the previous step.
         self._latest: tuple[list[int], Mapping[AlarmKey, int]] = ([], {})
 
     def of(self, hits: list[int]) -> Mapping[AlarmKey, int]:
-        """Each key of what `vm.find_true` found, with the first choice that it stands for."""
+        """The keys of the results of `vm.find_true`, each with its first binding."""
         latest, found = self._latest
         if latest != hits:
             found = self._of(hits)
@@ -105,15 +105,15 @@ class AlarmKeys:
 
 @dataclass(frozen=True, eq=False)
 class CompiledRules:
-    """Rules made ready to run.
+    """Compiled rules.
 
     Attributes:
         rules: The rules.
-        compiler: Knows where the value of every formula is found.
-        places: Of each rule: `when`, and `unless` if there is one.
-        early: Of each rule: where it is found that it is decided to be true before its verdict comes;
-            None where verdicts are not late, or are not asked for early.
-        lines: What `explain` remembers of the texts of evidence, by rule and names of objects.
+        compiler: Knows the value reference of every formula.
+        places: Per rule: `when`, and `unless` if present.
+        early: Per rule: reference to its early verdict; None if its verdict is not late, or early
+            verdicts are off.
+        lines: Cache of `explain` for the texts of evidence, by rule and names of objects.
     """
 
     rules: tuple[Rule, ...]
@@ -122,7 +122,7 @@ class CompiledRules:
     early: tuple[ValueRef | None, ...] = ()
     _placed: dict[Scope, dict[int, ValueRef]] = field(default_factory=dict, repr=False)
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
-    _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
+    _evidence: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
     _layouts: dict[int, LinkedProgram] = field(default_factory=dict, repr=False)
     _verdicts: dict[int, tuple[Ints, int]] = field(default_factory=dict, repr=False)
@@ -137,7 +137,7 @@ class CompiledRules:
         return self.compiler.program
 
     def place(self, node: Formula | Term, scope: Scope) -> ValueRef:
-        """Where the value of a part of these rules is found."""
+        """The value reference of a part of these rules."""
         known = self._placed.setdefault(scope, {})
         if id(node) not in known:
             known[id(node)] = (
@@ -148,7 +148,7 @@ class CompiledRules:
         return known[id(node)]
 
     def related(self, rule: Rule) -> tuple[Predicate, ...]:
-        """The relations between its objects that the `when` of one of these rules names."""
+        """The relations between its objects in a rule's `when`."""
         if id(rule) not in self._related:
             self._related[id(rule)] = tuple(
                 call
@@ -158,17 +158,17 @@ class CompiledRules:
             )
         return self._related[id(rule)]
 
-    def told(self, rule: Rule) -> tuple[Formula, ...]:
-        """The facts, comparisons and quantifiers that the `when` of one of these rules is made of.
+    def evidence_parts(self, rule: Rule) -> tuple[Formula, ...]:
+        """The facts, comparisons and quantifiers in a rule's `when`, which make up its evidence.
 
-        Those under a quantifier are told by the quantifier.
+        Those inside a quantifier are covered by the quantifier.
         """
-        if id(rule) not in self._told:
-            self._told[id(rule)] = tuple(_told(rule.when))
-        return self._told[id(rule)]
+        if id(rule) not in self._evidence:
+            self._evidence[id(rule)] = tuple(_evidence(rule.when))
+        return self._evidence[id(rule)]
 
     def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
-        """The source of a part of these rules, with marks where its variables stand."""
+        """The source of a part of these rules, with placeholders for its variables."""
         known = self._texts.setdefault(variables, {})
         if id(node) not in known:
             known[id(node)] = str(substituted(node, {v: placeholder(v) for v in variables}))
@@ -176,19 +176,19 @@ class CompiledRules:
 
     @cached_property
     def relations(self) -> Mapping[str, int]:
-        """Relations that the rules name, with their places among each other."""
-        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
+        """The relations used by the rules, with their positions."""
+        # Couplings have a separate lookup: there are few, but a `coupled` relation for every pair.
         named = {n.name for _, n in self.program.looks() if n.name in NAMES}
         return {name: k for k, name in enumerate(sorted(named))}
 
     @cached_property
     def facts(self) -> tuple[Lookup, ...]:
-        """What the rules look up that is true, false or unknown; without these relations."""
+        """Lookups of facts, without these relations."""
         return tuple(self._looks(Predicate))
 
     @cached_property
     def quantities(self) -> tuple[Lookup, ...]:
-        """What the rules look up that is a number."""
+        """Lookups of quantities."""
         return tuple(self._looks(Measure))
 
     def _looks(self, kind: type) -> Iterator[Lookup]:
@@ -199,7 +199,7 @@ class CompiledRules:
                 yield Lookup(number, node.name, evaluator(node), turned, len(order))
 
     def layout(self, n: int) -> LinkedProgram:
-        """The program laid out for a number of objects; relations stand before all other facts."""
+        """The program laid out for a number of objects; relations come before all other facts."""
         if n not in self._layouts:
             begin, places = len(self.relations) * n * n, {}
             for look in self.facts:
@@ -217,14 +217,14 @@ class CompiledRules:
         return {rule.name: rule for rule in self.rules}
 
     @cached_property
-    def _judged(self) -> tuple[tuple[Rule, tuple[ValueRef, ...]], ...]:
-        """What may be found to be true: each rule in the end, then those that may be told early."""
+    def _searched(self) -> tuple[tuple[Rule, tuple[ValueRef, ...]], ...]:
+        """Rules to search for true bindings: first all final verdicts, then the early ones."""
         early = ((r, (at,)) for r, at in zip(self.rules, self.early, strict=True) if at is not None)
         return (*zip(self.rules, self.places, strict=True), *early)
 
     def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
-        """The rule and the objects of something that `vm.find_true` found of some objects."""
-        rule, rows = self._judged[hit >> CHOICE_BITS][0], hit & (1 << CHOICE_BITS) - 1
+        """Decode a result of `vm.find_true`: its rule and objects."""
+        rule, rows = self._searched[hit >> CHOICE_BITS][0], hit & (1 << CHOICE_BITS) - 1
         chosen = []
         for _ in rule.variables:
             rows, row = divmod(rows, len(ids))
@@ -232,7 +232,7 @@ class CompiledRules:
         return rule, tuple(chosen[::-1])
 
     def keys(self, ids: tuple[int, ...]) -> AlarmKeys:
-        """What stands for whatever rules may be true of, for some objects."""
+        """The cached alarm keys for some objects."""
         known = self._keys.get(ids)
         if known is None:
             if len(self._keys) >= MAX_KEYS:
@@ -241,33 +241,33 @@ class CompiledRules:
         return known
 
     def fresh(self, n: int) -> States:
-        """What is remembered before the first sample."""
+        """The states before the first sample."""
         return self.layout(n).fresh
 
     def verdicts(self, n: int) -> tuple[Ints, int]:
-        """Of each rule where its values stand for a number of objects, and how many may be found.
+        """The table of `vm.find_true` for a number of objects, and the most results.
 
         See `vm.find_true`.
         """
         if n not in self._verdicts:
             layout, rows = self.layout(n), []
-            for rule, places in self._judged:
+            for rule, places in self._searched:
                 at = [(layout.places[p.step], bits(p.axes)) for p in places]
                 when, unless = (*at, (-1, 0))[:2]
                 apart = sum(1 << i + j - 1 for i, j in _apart(rule))
                 rows.append((*when, *unless, len(rule.variables), apart))
-            most = sum(n ** len(rule.variables) for rule, _ in self._judged)
+            most = sum(n ** len(rule.variables) for rule, _ in self._searched)
             self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6), most
         return self._verdicts[n]
 
 
-def _told(formula: Formula) -> Iterator[Formula]:
+def _evidence(formula: Formula) -> Iterator[Formula]:
     if isinstance(formula, Predicate | Quantified | Comparison):
         yield formula
         return
     for part in children(formula):
         if not isinstance(part, Term):
-            yield from _told(part)
+            yield from _evidence(part)
 
 
 def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
@@ -277,11 +277,11 @@ def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
 
 @lru_cache(maxsize=16)
 def compile_rules(rules: tuple[Rule, ...], early: bool = False) -> CompiledRules:
-    """Rules made ready to run; the same object for the same rules.
+    """Compile rules; the same object for the same rules.
 
     Args:
         rules: The rules.
-        early: Whether what they say of the future is told as soon as it is decided.
+        early: Whether verdicts about the future are reported as soon as they are decided.
     """
     compiler = Compiler()
     places = tuple(compiler.rule(rule) for rule in rules)

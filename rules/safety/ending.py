@@ -1,4 +1,4 @@
-"""What rules about the future come to when a recording ends before they are decided."""
+"""Verdicts of future rules that are undecided when a recording ends."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from visup.rules.safety.reasoner import RuleMemory, rule_memory
 from visup.rules.wording.sentences import sentence, with_names
 
 PACE = ticks(0.1)
-"""How far apart the moments are at which verdicts that are still due are looked for, microseconds."""
+"""Spacing of the moments at which pending verdicts are evaluated, microseconds."""
 MOST_MOMENTS = 20_000
-"""So many are looked at; 33 minutes."""
+"""Most such moments: 33 minutes."""
 DOUBTFUL = 0.4
-"""Confidence of a sentence about what may be."""
+"""Confidence of a sentence about a possibility."""
 
 
 @dataclass(frozen=True, slots=True)
 class OpenRule:
-    """A rule that counts as true of some objects though its verdict has not come.
+    """A rule that counts as true of some objects although its verdict is pending.
 
     Attributes:
         rule: The rule.
-        objects: In the order of its variables.
+        objects: Ids, in the order of its variables.
         text: Its sentence.
-        decided: Whether nothing that could still come would change it.
+        decided: Whether no continuation could change it.
     """
 
     rule: Rule
@@ -48,15 +48,15 @@ class OpenRule:
 
 
 def open_rules(mind: Mind, at_end: AtEnd | str) -> tuple[OpenRule, ...]:
-    """The rules that are true of the last moments of a recording, after which nothing is seen.
+    """The rules that are true about the last moments of a recording.
 
     Args:
         mind: The mind after the last step.
-        at_end: 'strong': those that are decided already. 'weak': also those that may still become true
-            and are not suspended. 'unknown': none.
+        at_end: 'strong': those already decided. 'weak': also those that may still become true and are
+            not suspended. 'unknown': none.
 
     Returns:
-        One for each rule and set of objects of which no alert stands; in the order of the rules.
+        One for each rule and set of objects without an active alert; in the order of the rules.
     """
     memory = rule_memory(mind)
     if at_end == "unknown" or memory.now is None or memory.after is None:
@@ -66,26 +66,26 @@ def open_rules(mind: Mind, at_end: AtEnd | str) -> tuple[OpenRule, ...]:
     weak = {} if at_end == "strong" else dict.fromkeys(_found(prepared, memory, 1))
     found = {**strong, **weak}
     standing = {key for key, held in memory.held.items() if held.until == inf}
-    told: dict[tuple[str, frozenset[int]], OpenRule] = {}
+    open_now: dict[tuple[str, frozenset[int]], OpenRule] = {}
     for rule, ids in found:
         key = (rule.name, frozenset(ids))
-        if key not in standing and key not in told:
+        if key not in standing and key not in open_now:
             decided = (rule, ids) in strong
             words = with_names(rule.say, rule.variables)
             text = sentence(mind, words, *ids, confidence=1.0 if decided else DOUBTFUL)
-            told[key] = OpenRule(rule, ids, text, decided)
-    return tuple(told.values())
+            open_now[key] = OpenRule(rule, ids, text, decided)
+    return tuple(open_now.values())
 
 
 def _found(
     prepared: CompiledRules, memory: RuleMemory, bound: int
 ) -> Iterator[tuple[Rule, tuple[int, ...]]]:
-    """What is true of the moments of which verdicts are due.
+    """Rules that are true at moments with pending verdicts.
 
     Args:
         prepared: The rules.
-        memory: What they remember.
-        bound: Whether the lower bounds count (0) or the upper ones (1).
+        memory: Their memory.
+        bound: Whether lower bounds (0) or upper bounds (1) count.
     """
     n, delays = len(memory.ids), [places[0].delay for places in prepared.places]
     layout, rows = prepared.layout(n), prepared.verdicts(n)[0]
@@ -106,7 +106,7 @@ def _found(
 
 
 def _bounds(row: Ints, prepared: CompiledRules, number: int, n: int, bound: int) -> Ints:
-    """Where one bound of `when` and of `unless` stands."""
+    """The position of one bound of `when` and of `unless`."""
     shifted = row.copy().reshape(1, -1)
     for column, place in zip((0, 2), prepared.places[number], strict=False):
         shifted[0, column] += bound * n ** len(place.axes)
@@ -114,7 +114,7 @@ def _bounds(row: Ints, prepared: CompiledRules, number: int, n: int, bound: int)
 
 
 def _unseen(prepared: CompiledRules, n: int, size: int) -> Floats:
-    """All intervals before a sample in which nothing is known of any quantity."""
+    """The arena for a sample in which all quantities are unknown."""
     arena, begin = np.empty(size), 0
     for look in prepared.quantities:
         cells = n**look.axes

@@ -1,4 +1,4 @@
-"""Why a rule is true, false or unknown of some objects: the values of all that it is made of."""
+"""Explanations of rule verdicts: the values of all subformulas for some objects."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from visup.rules.wording.sentences import short
 
 @dataclass(frozen=True, slots=True)
 class RuleExplanation:
-    """What a formula or quantity came to, and what it was made of.
+    """The value of a formula or quantity, with those of its parts.
 
     Attributes:
         text: Its source, with objects by name.
         interval: Robustness of a formula, value of a quantity in its base unit.
-        verdict: Of a formula; None of a quantity.
-        parts: What it is made of.
-        late_s: How many seconds ago the moment is that is spoken of.
-        unit: Of a quantity.
+        verdict: Verdict of a formula; None for a quantity.
+        parts: Explanations of its parts.
+        late_s: Age of the moment it is about, seconds.
+        unit: Unit of a quantity.
     """
 
     text: str
@@ -75,7 +75,7 @@ def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleEx
         values: The values of all formulas.
 
     Returns:
-        The rule with `when` and `unless`; it is false where `unless` is true.
+        The rule with `when` and `unless`; it is false if `unless` is true.
     """
     reader = _ExplanationBuilder(values, rule, ids)
     parts = [reader.node(f) for f in rule.formulas]
@@ -94,7 +94,7 @@ def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleEx
 
 
 def _with_early(late: RuleExplanation, interval: Interval) -> RuleExplanation:
-    """A rule with what is decided of it before its verdict comes, which may make it true already."""
+    """A rule with its early verdict, which may make it true already."""
     early = RuleExplanation("what is decided by now", interval, verdict(interval))
     told = replace(late, parts=(*late.parts, early))
     if late.verdict is Truth.TRUE or early.verdict is not Truth.TRUE:
@@ -103,28 +103,28 @@ def _with_early(late: RuleExplanation, interval: Interval) -> RuleExplanation:
 
 
 MAX_LINES = 4096
-"""Of so many rules and names of objects the texts of their evidence are remembered."""
+"""Most cached evidence texts, by rule and names of objects."""
 
 
 @dataclass(frozen=True, slots=True)
 class EvidenceLine:
-    """One line of evidence but for its values.
+    """A template of a line of evidence.
 
     Attributes:
-        place: Of the fact or comparison.
-        text: Its source, with objects by name; of a comparison its sign.
-        sides: Of a comparison what is compared: text, place and unit; only a text of a number.
+        place: Value reference of the fact or comparison.
+        text: Its source, with objects by name; for a comparison its sign.
+        sides: Compared quantities: text, value reference and unit; only a text for a number.
     """
 
     place: ValueRef
     text: str
     sides: tuple[tuple[str, ValueRef | None, str], ...] = ()
 
-    def told(self, values: Evaluation, rows: tuple[int, ...]) -> str:
+    def text_for(self, values: Evaluation, rows: tuple[int, ...]) -> str:
         """The line for some objects.
 
-        It says of a comparison what its quantities are: `gap(the arm, the probe) = 3 px < 20 px is true`;
-        by how much is told by these.
+        For a comparison it has the values of its quantities, `gap(the arm, the probe) = 3 px < 20 px is
+        true`, which also show the margin.
         """
         interval, text = values.interval(self.place, rows), self.text
         if not self.sides:
@@ -142,7 +142,7 @@ class EvidenceLine:
 
 
 def evidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> tuple[str, ...]:
-    """One sentence for each fact and comparison of `when`: what it says of these objects."""
+    """One sentence for each fact and comparison of `when`, for these objects."""
     facts, prepared = values.facts, values.prepared
     names = tuple([facts.short(i) for i in ids])
     lines = prepared.lines.get((rule.name, names))
@@ -151,11 +151,11 @@ def evidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> tuple[str,
             prepared.lines.clear()
         lines = prepared.lines.setdefault((rule.name, names), _lines(rule, names, prepared))
     rows = tuple([facts.row[i] for i in ids])
-    return tuple([line.told(values, rows) for line in lines])
+    return tuple([line.text_for(values, rows) for line in lines])
 
 
 def _lines(rule: Rule, names: tuple[str, ...], prepared: CompiledRules) -> tuple[EvidenceLine, ...]:
-    """The evidence of a rule, for objects of these names."""
+    """The evidence templates of a rule, for objects of these names."""
     scope, named = scope_of(rule), dict(zip(rule.variables, names, strict=True))
 
     def side(term: Term) -> tuple[str, ValueRef | None, str]:
@@ -167,12 +167,12 @@ def _lines(rule: Rule, names: tuple[str, ...], prepared: CompiledRules) -> tuple
         EvidenceLine(prepared.place(f, scope), f.operator, (side(f.left), side(f.right)))
         if isinstance(f, Comparison)
         else EvidenceLine(prepared.place(f, scope), _text(f, named, prepared))
-        for f in prepared.told(rule)
+        for f in prepared.evidence_parts(rule)
     )
 
 
 class _ExplanationBuilder:
-    """Reads the values of a rule's formulas for one choice of objects."""
+    """Reads the values of a rule's formulas for one binding of objects."""
 
     def __init__(self, values: Evaluation, rule: Rule, ids: tuple[int, ...]) -> None:
         self.values = values
@@ -182,7 +182,7 @@ class _ExplanationBuilder:
         self.names = {v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)}
 
     def node(self, node: Node) -> RuleExplanation:
-        """What a node came to, with what it is made of."""
+        """Explain a node, with its parts."""
         place, interval = self._value(node)
         term = isinstance(node, Term)
         whole = not isinstance(node, Predicate | Measure | Number | Variable)
@@ -196,7 +196,7 @@ class _ExplanationBuilder:
         )
 
     def _value(self, node: Node) -> tuple[ValueRef, Interval]:
-        """Where a node stands, and what it came to for these objects."""
+        """The value reference of a node, and its value for these objects."""
         place = self.values.prepared.place(node, self.scope)
         return place, self.values.interval(place, self.rows)
 
@@ -206,7 +206,7 @@ class _ExplanationBuilder:
         return tuple(self.node(p) for p in children(node) if not isinstance(p, Number))
 
     def _witness(self, node: Quantified) -> tuple[RuleExplanation, ...]:
-        """The part for the object that decides: the truest one of `exists`, the least of `forall`."""
+        """The part for the deciding object: the greatest for `exists`, the least for `forall`."""
         outer = self.scope, self.rows, self.names
         found = []
         for object_id, row in self.values.facts.row.items():

@@ -1,12 +1,12 @@
-"""Expressions to watch: a formula or a quantity of the rule language, judged on minds from outside.
+"""Watch expressions: formulas or quantities of the rule language, evaluated on minds from outside.
 
 >>> expression("gap(arm, satellite)").quantity
 True
 >>> expression("touching(1, 2) for 0.5 s").rule.variables
 ('object_1', 'object_2')
 
-Names of one letter stand for any object; longer ones for whoever plays the actor of that name or is
-believed to be that model; a number is an object's id.
+Names of one letter stand for any object; longer names refer to the object with that actor role or identified
+as that model; a number is an object's id.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from visup.rules.safety.explain import RuleExplanation, explain_rule
 from visup.rules.safety.verdicts import Evaluation, remapped
 
 _CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)(?:\)|$)")
-"""A word with its arguments, also where the parenthesis behind them is missing."""
+"""A word with its arguments, even if the closing parenthesis is missing."""
 _NAME = re.compile(r"\b[A-Za-z_]\w*")
 _BOUND = re.compile(r"\b(?:exists|forall)\s+([A-Za-z_]\w*)")
 _BY_ID = re.compile(r"object_(\d+)")
 _SAY = 'say "."'
 _WRITTEN = "condition"
-"""What is said in place of a file."""
+"""Used in messages in place of a file."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExpressionValue:
-    """What an expression came to for one choice of objects.
+    """The value of an expression for one binding of objects.
 
     Attributes:
         objects: Ids, in the order of the expression's names.
         interval: Robustness of a formula; value of a quantity in its unit.
-        truth: Of a formula; None of a quantity.
-        unit: Of a quantity.
+        truth: Verdict of a formula; None for a quantity.
+        unit: Unit of a quantity.
     """
 
     objects: tuple[int, ...]
@@ -73,14 +73,14 @@ class ExpressionValue:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpressionResult:
-    """What an expression came to at one mind.
+    """The values of an expression on one mind.
 
     Attributes:
         now: Microseconds of the mind.
         ids: Its objects.
-        before: States of the operators before, for these objects.
-        after: States after.
-        readings: One for each choice of objects.
+        before: States of the operators before the step, for these objects.
+        after: States after the step.
+        readings: One for each binding of objects.
     """
 
     now: int
@@ -91,17 +91,17 @@ class ExpressionResult:
 
     @property
     def truths(self) -> Mapping[tuple[int, ...], Truth | Interval]:
-        """Choice of objects -> verdict of a formula, interval of a quantity."""
+        """Binding of objects -> verdict of a formula, interval of a quantity."""
         return {r.objects: r.interval if r.truth is None else r.truth for r in self.readings}
 
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """An expression made ready.
+    """A compiled expression.
 
     Attributes:
-        text: As it was written.
-        rule: Holds it as `when`; of a quantity, as its left side.
+        text: Its source.
+        rule: Rule with it as `when`; for a quantity, as the left side of a comparison.
         quantity: Whether it is a quantity.
     """
 
@@ -110,11 +110,11 @@ class Expression:
     quantity: bool
 
     def judge(self, mind: Mind, before: ExpressionResult | None = None) -> ExpressionResult:
-        """What it comes to in a mind.
+        """Evaluate it on a mind.
 
         Args:
             mind: The mind after a step.
-            before: What it came to a step before; without it, windows begin here.
+            before: The result of the previous step; without it, windows start here.
         """
         prepared, now, facts = compile_rules((self.rule,)), ticks(mind.time), Snapshot(mind)
         if before is not None and not now > before.now:
@@ -131,7 +131,7 @@ class Expression:
     def explain(
         self, mind: Mind, judged: ExpressionResult, ids: tuple[int, ...]
     ) -> RuleExplanation:
-        """Why it is what it is for some objects, in the mind in which it was judged."""
+        """Explain its value for some objects, on the mind on which it was evaluated."""
         values = Evaluation(compile_rules((self.rule,)), Snapshot(mind), judged.now, judged.before)
         whole = explain_rule(self.rule, ids, values).parts[0]
         return whole.parts[0] if self.quantity else whole
@@ -147,7 +147,7 @@ class Expression:
         return ExpressionValue(ids, (low, high), truth, unit)
 
     def _choices(self, mind: Mind, present: Sequence[int]) -> Iterator[tuple[int, ...]]:
-        """Every choice of distinct objects that the names allow."""
+        """All bindings of distinct objects that the names allow."""
         meant = [objects_named(mind, v, present) for v in self.rule.variables]
         for ids in product(*meant):
             if len(set(ids)) == len(ids):
@@ -155,11 +155,11 @@ class Expression:
 
 
 def expression(text: str) -> Expression:
-    """Read a formula or a quantity.
+    """Parse a formula or a quantity.
 
     Raises:
-        RuleError: It is neither, or names what there is not.
-        ManyErrors: It has several faults.
+        RuleError: It is neither, or uses unknown names.
+        ManyErrors: It has several errors.
     """
     written, variables = _with_variables(text)
     try:
@@ -173,7 +173,7 @@ def expression(text: str) -> Expression:
 
 
 def objects_named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, ...]:
-    """The objects that a name of an expression may stand for.
+    """The objects that a name in an expression may refer to.
 
     Args:
         mind: The mind.
@@ -194,7 +194,7 @@ def objects_named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, .
 
 
 UNFINISHED = re.compile(r"(?:[(,<>=+*/\[-]|\b(?:and|or|not|unless|until|within|for))\s*$")
-"""Signs and words with which nothing ends."""
+"""Signs and words that cannot end an expression."""
 
 
 def _rule(text: str, variables: tuple[str, ...]) -> Rule:
@@ -212,7 +212,7 @@ def _rule(text: str, variables: tuple[str, ...]) -> Rule:
 
 
 def _of_text(text: str, fault: RuleError | ErrorGroup) -> RuleError | ErrorGroup:
-    """What is wrong with a rule around a text, as what is wrong with the text: at its own lines."""
+    """Translate errors of the wrapping rule to errors of the text, at its own lines."""
     found = list(fault.errors) if isinstance(fault, ErrorGroup) else [fault]
     own = [e for e in found if isinstance(e.where, SourceLocation) and e.where.line > 1]
     told = [_unwrapped(text, e) for e in own or found]
@@ -224,21 +224,21 @@ def _unwrapped(text: str, fault: VisupError) -> RuleError:
     if not isinstance(place, SourceLocation) or place.line == 1:
         return RuleError(f"'{text}' is no condition ({fault.what})", expected=fault.expected)
     if place.line > text.count("\n") + 2:
-        # It was the wrapping that did not fit: the user wrote too little.
+        # The error is in the wrapping: the text is incomplete.
         return RuleError(f"'{text}' ends too early", expected=fault.expected)
     where = replace(place, line=place.line - 1)
     return RuleError(fault.what, where=where, expected=fault.expected, hint=fault.hint)
 
 
 def _with_variables(text: str) -> tuple[str, tuple[str, ...]]:
-    """The text with ids written as names, and its free names in order."""
+    """The text with ids replaced by names, and its free names in order."""
     found: dict[str, None] = {}
     bound = set(_BOUND.findall(text))
 
     def rewritten(call: re.Match[str]) -> str:
         word: Any = RULES.words.get(call[1]) or RULES.quantities.get(call[1])
         names = [a.strip() for a in call[2].split(",")]
-        if word is None or len(names) != len(word.takes):  # told later, and its names are known
+        if word is None or len(names) != len(word.takes):  # reported later, and its names are known
             found.update(dict.fromkeys(n for n in _NAME.findall(call[2]) if n not in bound))
             return call[0]
         for n, takes in enumerate(word.takes):

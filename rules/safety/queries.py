@@ -1,4 +1,4 @@
-"""Questions to a mind about its rules: their values as they were when it was made."""
+"""Queries to a mind about its rules: their values at that step."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ def explain(mind: Mind, rule: str, *ids: int) -> RuleExplanation:
     """Why a rule is true, false or unknown of some objects in a mind.
 
     Args:
-        mind: A mind, now or kept, that rules have judged.
+        mind: A current or stored mind on which rules were evaluated.
         rule: Name of the rule.
         ids: Objects, in the order of its variables.
 
     Returns:
-        The rule with `when` and `unless`; the rule is false where `unless` is true.
+        The rule with `when` and `unless`; the rule is false if `unless` is true.
 
     Raises:
-        RuleError: No such rule was judged, or the objects are not those of a choice for it.
+        RuleError: No such rule was evaluated, or the objects are not a binding of it.
     """
     values = evaluation_of(mind)
     return explain_rule(_choice(values, rule, ids), ids, values)
 
 
 def evaluation_of(mind: Mind) -> Evaluation:
-    """The values of all formulas of all rules in a mind, computed again from what it remembers.
+    """The values of all formulas of all rules in a mind, recomputed from its memory.
 
     Raises:
-        RuleError: No rules have judged it.
+        RuleError: No rules were evaluated on it.
     """
     memory = rule_memory(mind)
     if memory.now is None or memory.before is None:
         raise RuleError(
             "no rules have been evaluated in this mind", hint="let the agent make a step"
         )
-    # Rules saw the tasks as they stood a step before.
+    # Rules saw the tasks as of the previous step.
     facts = Snapshot(replace(mind, tasks=memory.tasks))
     return Evaluation(compile_rules(memory.rules, memory.early), facts, memory.now, memory.before)
 
@@ -56,7 +56,7 @@ def rule_named(values: Evaluation, name: str) -> Rule:
     """The rule of that name.
 
     Raises:
-        RuleError: None was judged.
+        RuleError: There is none.
     """
     rules = {rule.name: rule for rule in values.prepared.rules}
     if name not in rules:
@@ -67,7 +67,7 @@ def rule_named(values: Evaluation, name: str) -> Rule:
 
 
 def object_choices(values: Evaluation, rule: Rule) -> Iterator[tuple[int, ...]]:
-    """Every choice of objects for a rule."""
+    """All bindings of objects of a rule."""
     for ids in product(values.facts.ids, repeat=len(rule.variables)):
         once = [i for i, v in zip(ids, rule.variables, strict=True) if v not in rule.may_repeat]
         if len(set(once)) == len(once):
@@ -75,10 +75,10 @@ def object_choices(values: Evaluation, rule: Rule) -> Iterator[tuple[int, ...]]:
 
 
 def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
-    """What a rule says of every choice of objects; false where it is suspended.
+    """The verdict of a rule on every binding of objects; false where it is suspended.
 
     Raises:
-        RuleError: No rules have judged the mind, or none of that name.
+        RuleError: No rules were evaluated on the mind, or none of that name.
     """
     values = evaluation_of(mind)
     rule = rule_named(values, name)
@@ -95,7 +95,7 @@ def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
 
 
 def _choice(values: Evaluation, name: str, ids: tuple[int, ...]) -> Rule:
-    """The rule of that name, when the objects are a choice for it."""
+    """The rule of that name, if the objects are a binding of it."""
     rule = rule_named(values, name)
     if len(ids) != len(rule.variables):
         what = f"'{name}' is about {len(rule.variables)} object(s), not {len(ids)}"

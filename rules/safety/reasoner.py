@@ -1,4 +1,4 @@
-"""Rules at work: every choice of objects for which a rule is true gives a concern."""
+"""The rule reasoner: an alarm condition for every binding of objects for which a rule is true."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from visup.rules.safety.verdicts import Evaluation, remapped
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RuleMemory:
-    """What rules remember. States of operators share all but their newest cells with older ones.
+    """The memory of rules. States of operators share all but their newest cells with older ones.
 
     Attributes:
         rules: The rules.
         now: Microseconds of the last sample, or None before the first.
-        time: The same, seconds.
+        time: The same in seconds.
         ids: Its objects.
         before: States of the operators before it, for these objects.
         after: States after it.
-        tasks: What tasks had come to when rules looked; they are matched later in a step.
-        held: Concerns that stand, those whose sentences are oldest first.
-        cooling: Until when, in seconds, objects raise no concern again.
-        early: Whether what rules say of the future was told as soon as it was decided.
+        tasks: Tasks as seen by the rules; they are matched later in a step.
+        held: Active conditions, oldest sentences first.
+        cooling: End of cooldown, seconds, by condition.
+        early: Whether verdicts about the future were reported as soon as they were decided.
         since: Microseconds of the first sample of each of its objects.
     """
 
@@ -58,13 +58,13 @@ SAFETY = MemoryKey("rules.safety", RuleMemory())
 class RuleReasoner:
     """Reasoner of the cogitate phase, after relations and couplings.
 
-    It sees the tasks as they stood after the step before, since tasks are matched later.
+    It sees the tasks as of the previous step, since tasks are matched later.
 
     Attributes:
-        rules: What is watched.
-        memory: Its key; another reasoner of rules in the same agent needs one of its own.
-        early: Whether what rules say of the future is told as soon as it is decided, and not when all of
-            their windows are over.
+        rules: The rules to monitor.
+        memory: Its key; a second rule reasoner in the same agent needs its own.
+        early: Whether verdicts about the future are reported as soon as they are decided, not only when
+            all their windows are over.
     """
 
     rules: tuple[Rule, ...]
@@ -73,19 +73,19 @@ class RuleReasoner:
     _prepared: CompiledRules = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        # Rules are long trees: to look up by them what was prepared costs as much as a rule.
+        # Kept, since hashing the rules' trees for a cache lookup costs as much as a rule.
         object.__setattr__(self, "_prepared", compile_rules(self.rules, self.early))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
+        """Reason about one step; see `Reasoner`."""
         old, now = mind.recall(self.memory), ticks(mind.time)
-        # To compare the trees costs more than all that is done with them.
+        # Comparing the trees would cost more than evaluating them.
         same = (old.rules is self.rules or old.rules == self.rules) and old.early == self.early
         if not same or (old.now is not None and now < old.now):
             old = RuleMemory(self.rules, early=self.early)
         if old.now is not None and now - old.now < MIN_SPACING:
-            told = tuple(h.concern for h in old.held.values())
-            return Outcome(mind, conditions=once_per_machine(told, mind))
+            conditions = tuple(h.concern for h in old.held.values())
+            return Outcome(mind, conditions=once_per_machine(conditions, mind))
         prepared, facts = self._prepared, Snapshot(mind)
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
@@ -111,16 +111,16 @@ class RuleReasoner:
                 since,
             ),
         )
-        told = tuple(h.concern for h in held.values())
-        return Outcome(mind, conditions=once_per_machine(told, mind))
+        conditions = tuple(h.concern for h in held.values())
+        return Outcome(mind, conditions=once_per_machine(conditions, mind))
 
 
 def once_per_machine(
     conditions: tuple[AlertCondition, ...], mind: Mind
 ) -> tuple[AlertCondition, ...]:
-    """Conditions without those that say of another part of a machine what is said of one already.
+    """Drop conditions that repeat for another part of a machine what one already says.
 
-    What an open alert tells stays; else the gravest stays, of several the first.
+    Those of an open alert stay; else the most severe stays, the first among equals.
     """
     machine_of = {i: m[0] for task in mind.tasks for m in task.machines for i in m}
     if not machine_of:
@@ -134,10 +134,10 @@ def once_per_machine(
     for c in ranked:
         about = tuple(sorted({machine_of.get(i, i) for i in c.objects}))
         first.setdefault((c.kind, about), c)
-    kept = {id(c) for c in first.values()}
-    return tuple(c for c in conditions if id(c) in kept)
+    retained = {id(c) for c in first.values()}
+    return tuple(c for c in conditions if id(c) in retained)
 
 
 def rule_memory(mind: Mind) -> RuleMemory:
-    """What rules remember in a mind."""
+    """The memory of rules in a mind."""
     return mind.recall(SAFETY)

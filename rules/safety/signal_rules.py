@@ -1,7 +1,7 @@
-"""Rules about signals alone, exact between samples, with ends as one chooses.
+"""Rules over signals only, evaluated in dense time.
 
-Frames are samples, and rules are evaluated at frames. Signals that come from a table have values between
-its rows, too, so that a rule which speaks of signals alone has an exact value at every moment.
+Frames are samples, and rules are evaluated at frames. Signals from a table also have values between its rows,
+so a rule that uses only signals has an exact value at every moment.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from visup.rules.monitoring.signals import SignalValue
 from visup.rules.predicates.signals import number_of
 
 Values = Mapping[str, Any]
-"""What is known of signals at a moment, by name: numbers, truth values, words."""
+"""Values of signals at a moment, by name: numbers, truth values, words."""
 Look = Callable[[Values], SignalValue]
-"""What a plain signal is by what is known."""
+"""A plain signal computed from these values."""
 NONE = Number(0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class RuleSpan:
-    """A stretch of time in which a rule is true, or in which it is not decided.
+    """An interval of time in which a rule is true, or undecided.
 
     Attributes:
         rule: Its name.
         begin_s: Seconds.
-        end_s: Seconds, without.
+        end_s: Seconds, exclusive.
         truth: True or unknown.
     """
 
@@ -59,18 +59,18 @@ def judge_rule(
     ends: Ends = UNKNOWN_ENDS,
     end_s: float | None = None,
 ) -> list[RuleSpan]:
-    """When a rule is true of a recording of signals; `hold` and `cooldown` are of alerts, and left out.
+    """When a rule is true in a recording of signals; `hold` and `cooldown` concern alerts and are ignored.
 
     Args:
-        rule: It must be about signals alone.
-        samples: Times in seconds and what is known then, in order.
-        reading: What signals are between samples, as of `DenseTimeMonitor`.
-        ends: What is outside the recording.
-        end_s: When the recording ends, seconds; with the last sample when left out.
+        rule: A rule over signals only.
+        samples: Times in seconds and values, in order.
+        reading: Signals between samples, as for `DenseTimeMonitor`.
+        ends: Semantics outside the recording.
+        end_s: When the recording ends, seconds; with the last sample by default.
 
     Raises:
-        RuleError: The rule is about objects, or has no exact value as signals are read.
-        SettingsError: A time does not come after the one before.
+        RuleError: The rule uses objects, or has no exact value for this reading of signals.
+        SettingsError: A time is not later than the previous one.
     """
     rows = list(samples)
     when, *others = (
@@ -94,20 +94,20 @@ def judge_rule(
 def _plain(
     rule: Rule, formula: Formula, rows: list[tuple[float, Values]], reading: Reading
 ) -> tuple[Formula, list[tuple[float, dict[str, SignalValue]]]]:
-    """A formula over plain signals, and the samples of these."""
+    """Convert a formula to plain signals, with their samples."""
     looks: dict[str, Look] = {}
     plain: Any = rebuilt(formula, lambda node: _signal(rule, node, looks, reading))
     return plain, [(t, {key: look(row) for key, look in looks.items()}) for t, row in rows]
 
 
 def _at(verdicts: list[TimedVerdict], time: float) -> Truth:
-    """What holds from a moment on; false where nothing is told of it."""
-    told = (v.robustness for v in verdicts if v.begin_s <= time < v.end_s)
-    return verdict(next(told, (-inf, -inf)))
+    """The truth from a moment on; false where there is no verdict."""
+    robustness = (v.robustness for v in verdicts if v.begin_s <= time < v.end_s)
+    return verdict(next(robustness, (-inf, -inf)))
 
 
 def _signal(rule: Rule, node: Node, looks: dict[str, Look], reading: str) -> Node | None:
-    """What a word of signals is in plain signals, each under a name that it is noted by."""
+    """Convert a signal word to a plain signal, recorded under a name."""
     if not isinstance(node, Predicate | Measure):
         return None
     key, words = str(node), node.words
@@ -119,7 +119,7 @@ def _signal(rule: Rule, node: Node, looks: dict[str, Look], reading: str) -> Nod
         raise _refused(rule, node.span, f"'{node}' is not about signals", "signals alone")
     if reading == "linear":
         raise _refused(rule, node.span, f"'{node}' has no line between samples", "numbers alone")
-    looks[key] = lambda values: _TOLD[fact(values, *words)]
+    looks[key] = lambda values: _SIGNAL_OF[fact(values, *words)]
     return Comparison(Measure(key, (), node.span), ">", NONE, None, node.span)
 
 
@@ -147,4 +147,4 @@ _FACTS: Mapping[str, Callable[..., bool | None]] = {
     "signal_is": _is,
     "signal_known": lambda values, name: values.get(name) is not None,
 }
-_TOLD: Mapping[bool | None, SignalValue] = {True: TRUE, False: FALSE, None: None}
+_SIGNAL_OF: Mapping[bool | None, SignalValue] = {True: TRUE, False: FALSE, None: None}

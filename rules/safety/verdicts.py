@@ -1,4 +1,4 @@
-"""Rules over a mind: all of them, for all choices of objects, in one run of one program."""
+"""Evaluation of all rules on a mind, for all bindings of objects, in one run of one program."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Evaluation:
         prepared: The rules.
         facts: The mind.
         now: Microseconds.
-        before: States of the operators before, for the objects of `facts`.
+        before: States of the operators before the step, for the objects of `facts`.
 
     Attributes:
-        after: States after.
+        after: States after the step.
     """
 
     def __init__(self, prepared: CompiledRules, facts: Snapshot, now: int, before: States) -> None:
@@ -56,49 +56,49 @@ class Evaluation:
     def _measured(self) -> list[Floats]:
         """The intervals of all quantities, in their order."""
         facts = self.facts
-        told = [look.ask(facts) for look in self.prepared.quantities]
+        looked_up = [look.ask(facts) for look in self.prepared.quantities]
         if facts.mind.unknown:
-            told = [
+            looked_up = [
                 facts.unknown(look.axes) if inputs_missing(facts.mind, look.name) else value
-                for look, value in zip(self.prepared.quantities, told, strict=True)
+                for look, value in zip(self.prepared.quantities, looked_up, strict=True)
             ]
         return [
             (value.swapaxes(1, 2) if look.turned else value).ravel()
-            for look, value in zip(self.prepared.quantities, told, strict=True)
+            for look, value in zip(self.prepared.quantities, looked_up, strict=True)
         ]
 
     def interval(self, place: ValueRef, rows: tuple[int, ...]) -> Interval:
-        """The interval of a formula for one choice of objects, by the rows of these."""
+        """The interval of a formula for one binding of objects, given by their rows."""
         return self._layout.interval(place.step, rows, self._arena)
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
-        """Every rule with every choice of objects for which it is true and not suspended."""
+        """Every rule with every binding of objects for which it is true and not suspended."""
         return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
 
     def true_of(self) -> Mapping[AlarmKey, int]:
-        """For each rule and set of objects of which it is true the first choice, as `found` tells it."""
+        """For each rule and set of objects for which it is true, the first binding, encoded as in `found`."""
         return self.prepared.keys(self.facts.ids).of(self.found())
 
     def found(self) -> list[int]:
-        """What is true as numbers, by rule and choice; `CompiledRules.choice` decodes them."""
+        """True bindings as numbers, by rule and binding; `CompiledRules.choice` decodes them."""
         rules, most = self.prepared.verdicts(self._layout.n)
         found: Ints = np.empty(most, dtype=np.int64)
         count = find_true(rules, self._layout.n, self._arena, found)
-        told: list[int] = found[:count].tolist()
-        return told
+        looked_up: list[int] = found[:count].tolist()
+        return looked_up
 
 
 def remapped(
     prepared: CompiledRules, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
 ) -> States:
-    """The states of the operators for other objects.
+    """Re-index the states of the operators for other objects.
 
     Args:
         prepared: The rules.
         states: States for the old objects.
         now: Microseconds of the sample at which they change.
         old: Their ids.
-        new: Ids of the new ones; of those that are not among the old nothing is known yet.
+        new: Ids of the new ones; those not among the old have no past.
 
     Returns:
         The states for the new objects.

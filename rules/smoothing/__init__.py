@@ -1,5 +1,5 @@
-"""States and quantities that do not flicker: changes must last, first glances do not decide.
+"""Smoothing of states and quantities: hysteresis in time, and exponential moving averages.
 
-Read in this order: `hysteresis.py` (a qualitative state changes only when the change has lasted),
-`ema.py` (exponential means of what states are read off).
+Read in this order: `hysteresis.py` (a qualitative state changes only when the change has lasted), `ema.py`
+(exponential moving averages of the underlying quantities).
 """

@@ -1,7 +1,7 @@
-"""A little smoothing before states are judged, so that the first glance does not decide them.
+"""Exponential moving averages of quantities before states are derived from them.
 
-A state that is judged for the first time is judged by the middle of its band; if a single noisy
-sample did that, it could settle on the wrong side and change later though nothing moved.
+The first state of a quantity is decided at the middle of its band; if a single noisy sample did that, the
+state could start on the wrong side and change later although nothing moved.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from visup.compiled import compiled
 from visup.rules.smoothing.hysteresis import Floats
 
 TAU_S = 0.15
-"""Time constant, seconds; less than the least duration of the states that are judged."""
+"""Time constant, seconds; shorter than the least duration of the derived states."""
 
 
 def exponential_mean(before: Floats, now: Floats, seconds: float, jump: float) -> Floats:
-    """An exponential mean that follows at once what is no noise.
+    """An exponential moving average that follows jumps beyond the noise at once.
 
     Args:
         before: The means so far, any shape; NaN where there is none.
         now: The new values, of the same shape; NaN where unknown.
-        seconds: Since the step before.
-        jump: Differences greater than this are motion: the mean begins anew.
+        seconds: Time since the previous step.
+        jump: Differences greater than this are motion, and reset the average.
 
     Returns:
         The means now; NaN where unknown now.
@@ -34,7 +34,7 @@ def exponential_mean(before: Floats, now: Floats, seconds: float, jump: float) -
 
 
 def new_share(seconds: float) -> float:
-    """Share of a new value in the mean, so many seconds after the value before."""
+    """Weight of a new value, by the time since the previous one."""
     return 1.0 - exp(-seconds / TAU_S)
 
 

@@ -1,8 +1,8 @@
-"""Qualitative states that do not flicker: a change must last before it is believed.
+"""Qualitative states with hysteresis in time: a change must last before it is accepted.
 
-Many states are held at once (such as the trend of every pair of objects), as arrays. The noise
-thresholds of entering and leaving a state are the caller's, who knows the quantity behind it
-(`signs_with_hysteresis` serves for quantities that are compared with zero); the least duration is added here.
+Many states are processed at once (such as the trend of every pair of objects), as arrays. Noise thresholds
+for entering and leaving a state are the caller's, who knows the underlying quantity (`signs_with_hysteresis`
+serves for quantities compared with zero); the least duration is added here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from visup.compiled import compiled
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
 UNKNOWN = -1
-"""The code of a state of which nothing is known; every state starts there."""
+"""The code of an unknown state; every state starts there."""
 BELOW, WITHIN, ABOVE = 0, 1, 2
 """Codes of a sign."""
 
@@ -27,10 +27,10 @@ class HysteresisState:
     """Qualitative states with their age.
 
     Attributes:
-        state: int8 codes, any shape; `UNKNOWN` where nothing is known.
-        since: Same shape, float: seconds since when each state is believed.
-        pending: Same shape, int8: the state that wants to be believed.
-        pending_since: Same shape, float: seconds since when it wants that.
+        state: int8 codes, any shape; `UNKNOWN` where unknown.
+        since: Same shape, float: seconds since when each state has held.
+        pending: Same shape, int8: the candidate for the next state.
+        pending_since: Same shape, float: seconds since when it has been the candidate.
     """
 
     state: Codes
@@ -39,10 +39,10 @@ class HysteresisState:
     pending_since: Floats
 
     def select(self, places: NDArray[np.intp], now: float) -> HysteresisState:
-        """The states of other pairs.
+        """Re-index the states for other pairs.
 
         Args:
-            places: (N,) where each of the new pairs stood before along the last axis, -1 for new
+            places: (N,) former position of each new pair along the last axis, -1 for new
                 ones.
             now: Seconds.
 
@@ -62,7 +62,7 @@ class HysteresisState:
 
 
 def unknown_states(shape: tuple[int, ...], now: float) -> HysteresisState:
-    """States of which nothing is known yet."""
+    """Unknown states."""
     codes = np.full(shape, UNKNOWN, dtype=np.int8)
     return HysteresisState(codes, np.full(shape, now), codes, np.full(shape, now))
 
@@ -70,23 +70,23 @@ def unknown_states(shape: tuple[int, ...], now: float) -> HysteresisState:
 def advance(
     states: HysteresisState, wanted: Codes, now: float, minimum_s: float | Floats
 ) -> HysteresisState:
-    """Move every state towards what the latest measurement wants.
+    """Move every state towards the latest measurement.
 
-    A known state is left once nothing has spoken for it for `minimum_s` without a break, for what is
-    wanted then; from an unknown one the same must have been wanted for so long. To become unknown takes
-    no time, since nothing is claimed by it.
+    A known state is left once nothing has supported it for `minimum_s` without a break, for the one
+    measured then; an unknown one once the same has been measured for that long. Becoming unknown takes
+    no time, since it claims nothing.
 
     Args:
         states: The states before.
-        wanted: Codes of the same shape, what the measurement says now.
+        wanted: Codes of the same shape, as measured now.
         now: Seconds.
         minimum_s: Least duration, seconds; one for all, or one for each row.
 
     Returns:
-        The states after; `since` is when the believed state began to show.
+        The states after; `since` is when the new state was first measured.
     """
     if _alike(wanted, states.pending) and _alike(wanted, states.state):
-        return states  # Nothing wants to change, as nearly always.
+        return states  # fast path: no change
     lasts = np.atleast_1d(np.asarray(minimum_s, dtype=float)).reshape(-1)
     rows, shape = (len(lasts), -1), wanted.shape
     state, since, pending, waiting = _advanced(
@@ -116,7 +116,7 @@ def _advanced(
     after, moments, waiting = state.copy(), since.copy(), pending_since.copy()
     for row in range(len(state)):
         for k in range(state.shape[1]):
-            # What is left for one thing now, for another next, is left all the same.
+            # A state keeps being left even if its candidate successor changes.
             was, to, wish = state[row, k], pending[row, k], wanted[row, k]
             left = was != UNKNOWN and to != UNKNOWN and to != was and wish != was
             if wish != to and not left:

@@ -1,9 +1,8 @@
-"""What words for colours mean: how well a colour of the image fits a word.
+"""Colour terms: how well a colour fits a word.
 
-Each word is a box of hue, chroma and lightness in CIE L*a*b* with soft edges. Hues are the angles of
-that space: red lies about 35 degrees, yellow 100, green 140, cyan 200, blue 285, magenta 330. The
-edges follow where the names of basic colours change places; boxes of neighbours overlap, since
-people do not agree on borders either.
+Each term is a box of hue, chroma and lightness in CIE L*a*b* with soft edges. Hues are angles in that space:
+red is at about 35 degrees, yellow 100, green 140, cyan 200, blue 285, magenta 330. The edges follow the
+boundaries of basic colour names; neighbouring boxes overlap, since people do not agree on boundaries either.
 """
 
 from __future__ import annotations
@@ -14,18 +13,18 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 HUE_SOFT, CHROMA_SOFT, LIGHTNESS_SOFT = 12.0, 8.0, 10.0
-"""Widths of the edges: over so many degrees, and units, a fit falls from 1 to 0."""
+"""Widths of the edges, degrees and units, over which a fit falls from 1 to 0."""
 
 DARKEST = 12.0
-"""Hue cannot be told of what is darker than this: it is black."""
+"""Colours darker than this have no discernible hue: they are black."""
 
 
 @dataclass(frozen=True, slots=True)
 class ColourTerm:
-    """A word for a colour.
+    """A colour term.
 
     Attributes:
-        hue: (from, to) degrees, counted upwards, over 360 where it passes it; None for any hue.
+        hue: (from, to) degrees, ascending, beyond 360 on wrap-around; None for any hue.
         chroma: (least, most).
         lightness: (least, most), 0 to 100.
     """
@@ -84,12 +83,12 @@ TERMS: Mapping[str, ColourTerm] = MappingProxyType(
         "black": ColourTerm(None, (0.0, 16.0), (0.0, 24.0)),
     }
 )
-"""Every word for a colour that a task may use."""
+"""All colour words that a task may use."""
 
 SHADES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"light": (60.0, 100.0), "dark": (0.0, 42.0)}
 )
-"""What may stand before such a word, and the lightness that it asks for."""
+"""Modifier of a colour word -> required lightness."""
 
 
 def colour_fit(words: str, lightness: float, a: float, b: float) -> float:
@@ -111,7 +110,7 @@ def colour_fit(words: str, lightness: float, a: float, b: float) -> float:
     *shade, word = words.split()
     term = TERMS[word]
     least, most = term.lightness
-    if shade:  # it narrows what the word means; what is dark of a light colour goes by its hue
+    if shade:  # it narrows the term; dark shades of a light colour go by their hue
         low, high = SHADES[shade[0]]
         least, most = (max(least, low), 100.0) if shade[0] == "light" else (0.0, min(most, high))
     chroma = math.hypot(a, b)
@@ -120,12 +119,12 @@ def colour_fit(words: str, lightness: float, a: float, b: float) -> float:
 
 
 def colour_share(words: str, palette: Iterable[tuple[float, float, float, float]]) -> float:
-    """How much of a palette fits words for a colour: the sum of shares, each by how well it fits."""
+    """Share of a palette that fits a colour word: the sum of shares weighted by fit."""
     return sum(share * colour_fit(words, lightness, a, b) for lightness, a, b, share in palette)
 
 
 def _soft(value: float, least: float, most: float, soft: float) -> float:
-    """1 between two bounds, 0 from `soft` outside them on, straight in between."""
+    """1 between two bounds, 0 from `soft` outside them, linear in between."""
     outside = max(least - value, value - most, 0.0)
     return max(0.0, 1.0 - outside / soft)
 

@@ -1,6 +1,6 @@
 """Memory of the traits of each object: colours, size, first position, first motion.
 
-The reasoner works only where somebody asks: an agent whose tasks tell no actor so has none.
+The reasoner is only present if some task describes an actor by traits.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ SIDES = ("left", "top", "right", "bottom")
 
 @dataclass(frozen=True, slots=True)
 class TraitSettings:
-    """How traits are remembered.
+    """Settings of traits.
 
     Attributes:
         tau_s: Time constant over which colours and sizes are averaged.
-        border: Within so much of the image's side an outline first seen may have come over it.
-        inwards: How far it must have come since, image diagonals, to have entered over that side.
-        start_s: What is in view so soon did not enter.
-        in_view_s: What had been in view so long before it was seen to move did not enter either.
+        border: An outline first seen within this share of the image's side may have come over it.
+        inwards: Distance it must have moved inwards to have entered over that side, image diagonals.
+        start_s: An object first seen this early did not enter.
+        in_view_s: An object in view for this long before it moved did not enter either.
         moving_s: How long it must move to have moved.
-        entries: Colours that are remembered of an object.
+        entries: Most colours stored per object.
     """
 
     tau_s: float = 2.0
@@ -49,18 +49,18 @@ class TraitSettings:
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """What is remembered of one object.
+    """The traits of one object.
 
     Attributes:
-        palette: Its colours; empty while nobody has seen them.
-        extent: Its largest extent, pixels; NaN before it was seen whole.
+        palette: Its colours; empty until observed.
+        extent: Its largest extent, pixels; NaN until seen whole.
         first_box: Its box when first seen, pixels.
         first_at: (x, y) of its centroid then, pixels.
-        came: Whether it may have entered; what was there before did not.
+        came: Whether it may have entered; an object present before did not.
         side: The side of the image over which it entered, or empty.
-        moving_since: Since when it moves, seconds; None while it does not.
-        moved: When it was first seen to move, seconds; None while it was not.
-        resting_since: Since when it rests, seconds; None while it moves.
+        moving_since: Since when it has been moving, seconds; None while it is not.
+        moved: When it first moved, seconds; None until then.
+        resting_since: Since when it has been at rest, seconds; None while it moves.
     """
 
     palette: Palette = ()
@@ -76,13 +76,13 @@ class Traits:
 
 @dataclass(frozen=True, slots=True)
 class TraitMemory:
-    """What is remembered of all objects.
+    """The traits of all objects.
 
     Attributes:
         start: Seconds of the first step.
         time: Seconds of the last step.
         of: Object id -> its traits.
-        seen_at: Seconds of the newest colours that were taken in.
+        seen_at: Seconds of the newest colours used.
     """
 
     start: float = 0.0
@@ -96,19 +96,19 @@ NOTHING = Traits()
 
 
 def traits_of(mind: Mind, object_id: int) -> Traits | None:
-    """What is remembered of an object, or None when nothing is."""
+    """The traits of an object, or None."""
     memory = mind.recall(TRAITS)
     return memory.of.get(object_id) if memory is not None else None
 
 
 @dataclass(frozen=True, slots=True)
 class TraitReasoner:
-    """Reasoner of the cogitate phase, after the relations: keeps the traits of all objects."""
+    """Reasoner of the cogitate phase, after the relations: maintains the traits of all objects."""
 
     settings: TraitSettings = field(default_factory=TraitSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one step; see `Reasoner`."""
+        """Update from one step; see `Reasoner`."""
         old = mind.recall(TRAITS) or TraitMemory(mind.time, mind.time)
         keep = exp(-max(0.0, mind.time - old.time) / self.settings.tau_s)
         palettes = _palettes(mind, observation)
@@ -128,7 +128,7 @@ class TraitReasoner:
         return Outcome(mind.remember(TRAITS, memory))
 
     def _share(self, old: TraitMemory, mind: Mind) -> float:
-        """Weight of new colours against what is remembered."""
+        """Weight of new colours relative to the stored ones."""
         return 1.0 - exp(-min(1e3, mind.time - old.seen_at) / self.settings.tau_s)
 
     def _first(self, belief: ObjectBelief, start: float) -> Traits:
@@ -150,7 +150,7 @@ class TraitReasoner:
         return replace(known, extent=extent, side=side)
 
     def _side(self, known: Traits, region: Region, size: tuple[int, int]) -> str:
-        """The side over which an object has come, once it has come on from there."""
+        """The side over which an object entered, once it has moved inwards."""
         (width, height), (x, y, w, h) = size, known.first_box
         dx, dy = (region.centroid[k] - known.first_at[k] for k in (0, 1))
         least = self.settings.inwards * image_diagonal(size)
@@ -174,7 +174,7 @@ class TraitReasoner:
 
 
 def blended(before: Palette, new: Palette, weight: float) -> Palette:
-    """Two palettes of the same bins as one, the new one with that weight; of nothing and one, that one.
+    """Blend two palettes of the same bins with a weight for the new one; an empty one is ignored.
 
     Example:
         >>> blended(((50.0, 0.0, 0.0, 1.0),), ((50.0, 0.0, 0.0, 0.5), (20.0, 0.0, 0.0, 0.5)), 0.5)
@@ -202,7 +202,7 @@ def largest_extent(region: Region) -> float:
 
 
 def _palettes(mind: Mind, observation: Observation) -> dict[int, Palette]:
-    """The colours that were perceived in this step, by object."""
+    """The colours perceived in this step, by object."""
     regions = {b.region.id: i for i, b in mind.objects.items() if b.last_seen == mind.time}
     found = {}
     for value in observation.of("colour"):
@@ -215,7 +215,7 @@ def _palettes(mind: Mind, observation: Observation) -> dict[int, Palette]:
 
 
 def _moving(mind: Mind) -> dict[int, bool]:
-    """Object -> whether it moves in the image, where that is known."""
+    """Object -> whether it moves in the image, where known."""
     still = RelationSettings().still_speed * image_diagonal(mind.frame_size)
     measured = kinematics(mind)
     speeds = zip(measured.ids, measured.speed.tolist(), strict=True)

@@ -1,7 +1,7 @@
 """Beliefs in words: sentences about objects, events of relations, conditions of decisions.
 
-Read in this order: `sentences.py` (how objects are called and how sure a verb is), `conditions.py` (what a
-decision hangs on, with amounts), `relation_events.py` (which changes of relations are reported).
+Read in this order: `sentences.py` (names of objects and graded verbs), `conditions.py` (conditions of
+decisions, with amounts), `relation_events.py` (reported changes of relations).
 """
 
 from visup.rules.wording.conditions import Condition, DecisionLog

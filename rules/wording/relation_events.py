@@ -1,4 +1,4 @@
-"""Events about changes of relations, sparingly: one when two objects begin to converge or diverge."""
+"""Events about changes of relations, used sparingly: when two objects start to converge or diverge."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ TEMPLATES = {
     "diverging": "{0} and {1} {are} diverging.",
     "keeping_distance": "{0} and {1} {are} keeping their distance.",
 }
-Told = tuple[str, float]
-RELATION_EVENTS: MemoryKey[Mapping[tuple[int, ...], Told]] = MemoryKey(
+ReportedRelation = tuple[str, float]
+RELATION_EVENTS: MemoryKey[Mapping[tuple[int, ...], ReportedRelation]] = MemoryKey(
     "rules.narrative", MappingProxyType({})
 )
 
 
 @dataclass(frozen=True, slots=True)
 class RelationEventSettings:
-    """How sparingly relations are reported.
+    """Settings of relation events.
 
     Attributes:
-        lasting_s: How long a relation must hold before it is told.
+        lasting_s: How long a relation must hold before it is reported.
         quiet_s: Least time between two sentences about the same pair.
-        least_confidence: Relations believed less are not told.
+        least_confidence: Relations of lower confidence are not reported.
     """
 
     lasting_s: float = 0.6
@@ -40,37 +40,37 @@ class RelationEventSettings:
 class RelationEventReasoner:
     """Reasoner of the cogitate phase: 'relation' events for trends that are new and last.
 
-    A pair that keeps its distance is told of only when it converged or diverged before; coupled
-    pairs, and parts of one machine, are left alone.
+    A steady distance is reported only after the pair converged or diverged; coupled pairs, and parts of
+    one machine, are ignored.
     """
 
     settings: RelationEventSettings = field(default_factory=RelationEventSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Reasoner`."""
-        told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
+        """Reason about one step; see `Reasoner`."""
+        reported: dict[tuple[int, ...], ReportedRelation] = dict(self._memory(mind))
         events = []
         for objects, name in mind.holding_objects(*TEMPLATES):
-            if not self._new(name, told.get(objects), mind):
+            if not self._new(name, reported.get(objects), mind):
                 continue
             relation = mind.relation(name, *objects)
-            if relation is None or not self._worth_telling(relation, mind):
+            if relation is None or not self._is_reportable(relation, mind):
                 continue
-            told[relation.objects] = (relation.name, mind.time)
+            reported[relation.objects] = (relation.name, mind.time)
             events.append(_event(relation, mind, observation))
-        return Outcome(mind.remember(RELATION_EVENTS, MappingProxyType(told)), tuple(events))
+        return Outcome(mind.remember(RELATION_EVENTS, MappingProxyType(reported)), tuple(events))
 
-    def _memory(self, mind: Mind) -> Mapping[tuple[int, ...], Told]:
+    def _memory(self, mind: Mind) -> Mapping[tuple[int, ...], ReportedRelation]:
         old = mind.recall(RELATION_EVENTS)
         return {pair: t for pair, t in old.items() if all(i in mind.objects for i in pair)}
 
-    def _new(self, name: str, last: Told | None, mind: Mind) -> bool:
-        """Whether it differs from the last event about these objects, and does not come too soon after it."""
+    def _new(self, name: str, last: ReportedRelation | None, mind: Mind) -> bool:
+        """Whether it differs from the last event about these objects, and is not too soon after it."""
         if last is None:
             return name != "keeping_distance"
         return last[0] != name and mind.time - last[1] >= self.settings.quiet_s
 
-    def _worth_telling(self, relation: Relation, mind: Mind) -> bool:
+    def _is_reportable(self, relation: Relation, mind: Mind) -> bool:
         s = self.settings
         if relation.confidence < s.least_confidence or mind.time - relation.since < s.lasting_s:
             return False

@@ -121,14 +121,14 @@ def describe(mind: Mind, object_id: int) -> str:
 
 
 def _looks_like(mind: Mind, object_id: int, name: str) -> bool:
-    """Whether an object may be what it is called; a task may cast one that clearly is something else."""
+    """Whether an object may be what it is called; a task may cast one that is clearly something else."""
     belief = mind.objects.get(object_id)
     if belief is None or belief.name == UNKNOWN_OBJECT:
         return False
     bindings = (b for task in mind.tasks for b in task.bindings if b.object_id == object_id)
     first = next(bindings, None)
     if first is None:
-        return True  # it is called as it was told
+        return True  # called by its reported name
     models = first.models if first else ()
     same = belief.name in models or called(mind, belief.name) == name
     return same or belief.confidence < TOLD
@@ -194,7 +194,7 @@ def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> s
 
 @lru_cache(maxsize=256)
 def with_names(template: str, names: tuple[str, ...]) -> str:
-    """The same template with its named objects numbered: '{a}' becomes '{0}' for names ('a', ...)."""
+    """A template with its named objects numbered: '{a}' becomes '{0}' for names ('a', ...)."""
 
     def number(match: re.Match[str]) -> str:
         word = match.group(1)
@@ -209,13 +209,13 @@ def mentions(template: str) -> tuple[str, ...]:
 
 
 def tidy(text: str) -> str:
-    """Close the commas round 'believed to be', and begin with a capital."""
+    """Fix the commas around 'believed to be', and start with a capital."""
     text = _DOUBLED.sub("", text)
     return text[:1].upper() + text[1:]
 
 
 def spaced(name: str) -> str:
-    """A name as people write it: underscores become blanks."""
+    """A name as written by people: underscores become blanks."""
     return name.replace("_", " ")
 
 
