@@ -296,7 +296,7 @@ class RelativeVelocity:
             determinant = a * c - xy * xy
             return determinant, (c * vx * vx - 2.0 * xy * vx * vy + a * vy * vy) / determinant
 
-        (rest, rests), (free, moves) = gaussian_terms(0.5 * still**2), motion(moving**2)
+        (rest, rests), (free, moves) = gaussian_terms(0.5 * still**2), gaussian_terms(moving**2)
         return 0.5 * (log(free / rest) - (rests - moves))
 
 

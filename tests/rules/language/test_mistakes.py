@@ -206,9 +206,9 @@ def test_once_nothing_may_be_tried_any_more_no_further_hint_is_looked_for(
     monkeypatch.setattr(reading, "fix_of", counted)
     slips = " and ".join(f"standalon{n}(b)" for n in range(60))
     rule = f'rule r(a, b): info\n    when {slips}\n    say "x"\n'
-    told = reading.read_repaired(rule, "start", "r.rules", VOCABULARY, reading.Patience()).diagnostics(
-        rule
-    )
+    told = reading.read_repaired(
+        rule, "start", "r.rules", VOCABULARY, reading.Patience()
+    ).diagnostics(rule)
     assert len(told) == 60
     left = reading.Patience(left=4 * len(rule))
     assert len(reading.with_tried_edits(rule, told, partial(reading.weight, patience=left))) == 60
