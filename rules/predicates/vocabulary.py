@@ -196,8 +196,7 @@ def healthy(facts: Snapshot) -> Codes:
 def spin(facts: Snapshot) -> Floats:
     """How fast an object rotates, degrees per second.
 
-    The standard deviation is that of one sequence of views; while another is nearly as likely the rate is
-    unknown.
+    Its deviation is that of one sequence of views; while another is nearly as likely it is unknown.
     """
     poses = (b.pose for b in facts.beliefs)
     found = [None if p is None or p.confidence < SURE_POSE else p.spin for p in poses]
