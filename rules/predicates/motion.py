@@ -1,4 +1,4 @@
-"""Whether something moves: by more than its noise, and so that its velocity is well known."""
+"""Predicates of motion: by more than noise, and with a well-known velocity."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from visup.rules.relations.kinematics import RelationSettings
 STILL_SPEED = RelationSettings().still_speed
 MOVING_SIGMAS = 3.0
 CLEAR = 0.005
-"""How well a velocity must be known of what clearly moves, image diagonals a second (one deviation). By masks
-that of chargers that are rammed is known to .0047, that of bodies that others pass before to .005 to .05."""
+"""Largest velocity sigma of clear motion, image diagonals per second. Measured from masks: up to 0.0047 for
+chargers that are rammed, 0.005 to 0.05 for bodies that others pass in front of."""
 
 
 def moving(facts: Snapshot) -> Codes:
-    """Whether an object moves in the image, by more than the noise of its outline makes."""
+    """Whether an object moves in the image by more than the noise of its outline."""
     still = STILL_SPEED * image_diagonal(facts.mind.frame_size)
     speeds, noise = facts.one("speed"), MOVING_SIGMAS * facts.one("velocity_sigma")
     seen = zip(speeds.tolist(), np.maximum(still, noise).tolist(), strict=True)
@@ -26,9 +26,9 @@ def moving(facts: Snapshot) -> Codes:
 
 
 def moving_clearly(facts: Snapshot) -> Codes:
-    """Whether an object moves, and so much of its outline is free that its velocity is well known.
+    """Whether an object moves and enough of its outline is visible for its velocity to be well known.
 
-    Where another body passes before it, what is left of its outline seems to move.
+    While another body passes in front of it, the rest of its outline appears to move.
     """
     clear = facts.one("velocity_sigma") <= CLEAR * image_diagonal(facts.mind.frame_size)
     codes = moving(facts)
