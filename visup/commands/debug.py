@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True)
 
 MOST_WIDTH = 1284
-"""Pixels: two panels and what stands between them."""
+"""Pixels: two panels and the gap between them."""
 
 
 @app.callback()
@@ -73,12 +73,12 @@ def _write(video: VideoSource, target: Path, limit: int | None, advance: RunProg
 
 
 def _given(video: VideoSource) -> int | None:
-    """The number of frames that a source will give, if known."""
+    """The number of frames of a source, if known."""
     return None if video.frame_count is None else -(-video.frame_count // video.every)
 
 
 def video_of(source: str) -> str:
-    """What to open: the video of a mission folder, else the source itself."""
+    """The video of a mission folder, else the source itself."""
     folder = Path(source)
     if (folder / "truth.json").is_file() or (folder / "mission.json").is_file():
         videos = sorted(folder.glob("video.*"))
@@ -87,10 +87,10 @@ def video_of(source: str) -> str:
 
 
 def checked_target(path: Path) -> Path:
-    """Refuse a file that cannot be written, before minutes of work are wasted on it.
+    """Refuse a file that cannot be written, before minutes of work are wasted.
 
     Raises:
-        SettingsError: It is not WebM.
+        SettingsError: The file is not WebM.
         OutputError: Its folder does not exist.
     """
     from visup.agent.model.errors import OutputError, SettingsError

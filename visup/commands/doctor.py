@@ -25,7 +25,7 @@ LIBRARIES = {
     "prompt_toolkit": "the prompt of visup step",
     "urllib3": "alerts to a webhook",
 }
-"""What visup depends on, and what for; the same as `dependencies` in pyproject.toml."""
+"""The libraries that visup depends on, and their purpose; as `dependencies` in pyproject.toml."""
 
 EXTRAS = {
     "report": ("the report of a run", ("plotly",)),
@@ -55,7 +55,7 @@ EXTRAS = {
     ),
     "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),
 }
-"""What each extra is for, and its libraries; the same as `optional-dependencies` in pyproject.toml."""
+"""Purpose and libraries of each extra; as `optional-dependencies` in pyproject.toml."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +63,10 @@ class CheckedPart:
     """One line of the report.
 
     Attributes:
-        what: What was looked at.
+        what: The part.
         state: 'ok', 'missing' (of an extra: no fault) or 'broken'.
         detail: A version, or what to do.
-        purpose: What it is for, where that is not plain.
+        purpose: What it is for, unless that is obvious.
     """
 
     what: str
@@ -100,7 +100,7 @@ def doctor(
 
 
 def examine() -> Iterator[CheckedPart]:
-    """Look at Python, the libraries, the extras, the codecs and the shipped files."""
+    """Check Python, the libraries, the extras, the codecs and the shipped files."""
     import platform
 
     from visup.version import __version__
@@ -118,14 +118,14 @@ def examine() -> Iterator[CheckedPart]:
 
 
 SPEED_FRAMES = 60
-"""Frames measured for each figure, not counting the first ones, during which loops are compiled."""
+"""Frames measured for each figure, without the first ones, during which loops are compiled."""
 
 
 def speeds(frames: int = SPEED_FRAMES) -> Iterator[str]:
     """Frames per second on the shipped clip: motion only, with models and a task, and by preset.
 
     Args:
-        frames: How many are looked at.
+        frames: How many are measured.
     """
     from dataclasses import replace
 

@@ -55,7 +55,7 @@ def build(
             jobs=jobs or os.cpu_count() or 1,
             progress=lambda done, _, name: bar.update(task, completed=done, description=name),
         )
-    _tell_size(built)
+    _print_size(built)
 
 
 @app.command("add")
@@ -103,7 +103,7 @@ def add(
             "either --silhouettes or --masks is needed, not both",
             expected="--silhouettes DIR or --masks DIR",
         )
-    _tell_size(ModelDatabase.open_or_new(db).add(new))
+    _print_size(ModelDatabase.open_or_new(db).add(new))
 
 
 @app.command("learn")
@@ -159,7 +159,7 @@ def list_models(db: Db) -> None:
         counts = (len(own), directions, sum(v.cut for v in own), taught[name])
         table.add_row(name, *map(str, counts))
     make_console().print(table)
-    _tell_size(database)
+    _print_size(database)
 
 
 @app.command("match")
@@ -234,7 +234,7 @@ def write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) ->
         echo(f"{out}: {picture.shape[1]} x {picture.shape[0]} pixels")
 
 
-def _tell_size(database: ModelDatabase) -> None:
+def _print_size(database: ModelDatabase) -> None:
     parts = [f"{len(database.names())} models, {len(database.views)} views"]
     if database.taught:
         parts.append(f"{len(database.taught)} taught outlines")

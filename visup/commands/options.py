@@ -18,7 +18,7 @@ import typer
 from visup.runs.settings import Option
 
 Given = dict[str, Any]
-"""Settings that the user gave, by the names of their fields."""
+"""Settings given by the user, by field name."""
 
 SettingsFile = Annotated[
     Path | None,
@@ -30,7 +30,7 @@ SettingsFile = Annotated[
 ]
 
 REPLAYED = ("tasks", "rules", "early", "at_end", "actors", "zones")
-"""What a recorded run can be reasoned about again with."""
+"""The settings that a replay of a recorded run may change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,10 @@ class Setting:
     """A field of a settings record that has an option.
 
     Attributes:
-        name: Of the field.
+        name: Name of the field.
         kind: Its type.
-        default: Its value when nothing is given.
-        option: How it is given.
+        default: Its value if the option is not given.
+        option: Its option.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Setting:
 
     @property
     def flag(self) -> str:
-        """As it is typed."""
+        """The option as typed."""
         return self.option.flag or f"--{self.name.replace('_', '-')}"
 
     @property
@@ -60,25 +60,25 @@ class Setting:
         return get_origin(self.kind) in (tuple, Mapping)
 
     def parameter(self) -> Parameter:
-        """The parameter that typer makes an option of."""
+        """The parameter from which typer makes an option."""
         kind, default = self.kind, self.default
         if self.repeated:
             kind = list[Path] | None if Path in get_args(kind) else list[str] | None
             default = None
         flags = (self.option.flag,) if self.option.flag else ()
         number = next((k for k in (int, float) if k in (kind, *get_args(kind))), None)
-        told = typer.Option(
+        option = typer.Option(
             *flags,
             metavar=self.option.metavar or (number and _METAVARS[number]),
             help=self.option.help,
             parser=number and number_parser(number, self.option.at_least),
             autocompletion=self.option.complete,
         )
-        annotation = Annotated[kind, told]  # type: ignore[valid-type]
+        annotation = Annotated[kind, option]  # type: ignore[valid-type]
         return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
     def read(self, value: Any) -> Any:
-        """The setting from what was given; None or the default where nothing was."""
+        """The setting from the given value; None or the default if none was given."""
         if not self.repeated:
             return value
         return self.option.parse(value) if self.option.parse and value else tuple(value or ())
@@ -88,7 +88,7 @@ _METAVARS = {int: "N", float: "NUMBER"}
 
 
 def number_parser(kind: type[int] | type[float], at_least: float | None) -> Callable[[Any], Any]:
-    """What reads a number as it is typed, and says in words what is wrong with it.
+    """A parser of typed numbers, with readable messages for invalid ones.
 
     Args:
         kind: `int` or `float`.
@@ -111,7 +111,7 @@ def number_parser(kind: type[int] | type[float], at_least: float | None) -> Call
 
 
 def settings_of(record: type) -> Iterator[Setting]:
-    """The settings of a record that have an option, in their order."""
+    """The settings of a record that have an option, in order."""
     hints = get_type_hints(record, include_extras=True)
     for each in fields(record):
         kind, *notes = get_args(hints[each.name]) if _annotated(hints[each.name]) else (None,)
@@ -120,19 +120,19 @@ def settings_of(record: type) -> Iterator[Setting]:
 
 
 def flags_of(record: type, names: Collection[str]) -> list[str]:
-    """The options of some settings, as they are typed."""
+    """The options of some settings, as typed."""
     return [s.flag for s in settings_of(record) if s.name in names]
 
 
 def takes(
     *records: type, only: Collection[str] = (), **defaults: Any
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """A command that is given settings of some records, besides its own parameters.
+    """Decorate a command with options for the settings of some records.
 
     Args:
-        records: The command is handed what was given of each, as its first arguments.
-        only: Names of the fields that it takes; all when empty.
-        defaults: Values of fields when nothing is given, where they differ from the record's.
+        records: The command receives the settings given for each, as its first arguments.
+        only: Names of the fields that it takes; empty for all.
+        defaults: Default values of fields, where they differ from the record's.
     """
     taken = [[s for s in settings_of(record) if not only or s.name in only] for record in records]
 
@@ -157,7 +157,7 @@ def takes(
 
 
 def _given(settings: list[Setting], values: dict[str, Any]) -> Given:
-    """Takes from all values those of some settings that differ from their defaults."""
+    """The values of some settings that differ from their defaults."""
     read = {s.name: s.read(values.pop(s.name)) for s in settings}
     return {s.name: read[s.name] for s in settings if read[s.name] not in (s.default, ())}
 

@@ -70,8 +70,8 @@ def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: s
     with Progress(transient=True) as bar:
         task = bar.add_task("frames", total=world.frames)
         truth = write_world(world, out, lambda done, _: bar.update(task, completed=done))
-    told = f"{world.frames} frames of {kind}, which goes {truth['outcome']!r}, in {out}"
-    make_console().print(told, highlight=False)
+    summary = f"{world.frames} frames of {kind}, which goes {truth['outcome']!r}, in {out}"
+    make_console().print(summary, highlight=False)
 
 
 def _render_orbit(seed: int, outcome: str | None, out: Path, size: str | None) -> None:
@@ -105,7 +105,7 @@ def _write(found: Scenario, out: Path, container: str) -> None:
 
 
 def needs_renderer() -> None:
-    """Check that what renders is installed.
+    """Check that the renderer is installed.
 
     Raises:
         ExtraMissingError: It is not.
@@ -123,7 +123,7 @@ def parse_size(text: str) -> tuple[int, int]:
     """(width, height) from a text such as ``320x240``.
 
     Raises:
-        SettingsError: It is something else, or a side is not within 16 and 8192 pixels.
+        SettingsError: The text is not a size, or a side is not within 16 and 8192 pixels.
     """
     from visup.agent.model.errors import SettingsError
 

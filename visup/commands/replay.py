@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ReplayComparison:
-    """What the replay is compared with, and what is shown of it."""
+    """The run that the replay is compared with, and how the result is shown."""
 
     diff: Annotated[bool, Option("Show what changes compared with the recorded run.", "--diff")] = (
         False
@@ -80,53 +80,57 @@ def replay(
             if report:
                 report(step)
 
-        told = reason_again(recording, settings, folder, tell)
+        transcript = reason_again(recording, settings, folder, tell)
         if not silent:
             narrator.finish()
-        console.print(_speed(told), style="dim")
+        console.print(_speed(transcript), style="dim")
         if report and folder:
-            _write_report(console, report, folder, told)
+            _write_report(console, report, folder, transcript)
     if other is None:
-        raise typer.Exit(_print_verdict(console, told, has_task=bool(settings.tasks)))
-    raise typer.Exit(_print_changes(console, other, told, comparison.quiet))
+        raise typer.Exit(_print_verdict(console, transcript, has_task=bool(settings.tasks)))
+    raise typer.Exit(_print_changes(console, other, transcript, comparison.quiet))
 
 
-def _write_report(console: Console, report: ReplayReport, folder: Path, told: Transcript) -> None:
+def _write_report(
+    console: Console, report: ReplayReport, folder: Path, transcript: Transcript
+) -> None:
     from visup.agent import Verdict
 
-    path = report.write(folder, Verdict(told.verdict) if told.verdict else None)
+    path = report.write(folder, Verdict(transcript.verdict) if transcript.verdict else None)
     for note in report.notes:
         console.print(note, soft_wrap=True, markup=False, style="yellow")
     if path:
         console.print(f"Report:  {path}", soft_wrap=True, markup=False)
 
 
-def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int:
+def _print_verdict(console: Console, transcript: Transcript, *, has_task: bool) -> int:
     """Print how the replay ended; returns the exit code."""
     from visup.agent import Verdict
     from visup.runs.result import RunResult
     from visup.terminal.narrator import verdict_line
 
-    verdict = Verdict(told.verdict) if told.verdict else None
-    for text in told.at_end:
+    verdict = Verdict(transcript.verdict) if transcript.verdict else None
+    for text in transcript.at_end:
         console.print(text, soft_wrap=True, markup=False, style="yellow")
     console.print(verdict_line(verdict, has_task=has_task))
-    return RunResult(verdict, told.steps, has_task=has_task).exit_code
+    return RunResult(verdict, transcript.steps, has_task=has_task).exit_code
 
 
-def _print_changes(console: Console, other: Recording, told: Transcript, quiet: bool) -> int:
+def _print_changes(console: Console, other: Recording, transcript: Transcript, quiet: bool) -> int:
     """Print what differs from the other run; returns the exit code."""
     from visup.runs.replay import recorded_transcript, transcript_diff
 
-    changed = transcript_diff(recorded_transcript(other), told)
+    changed = transcript_diff(recorded_transcript(other), transcript)
     for text in _lines(changed, quiet):
         console.print(text, soft_wrap=True, markup=False)
     return int(bool(changed))
 
 
-def _speed(told: Transcript) -> str:
-    rate = told.steps / told.seconds if told.seconds else 0.0
-    return f"{told.steps} frames replayed in {told.seconds:.1f} s ({rate:.0f} per second)"
+def _speed(transcript: Transcript) -> str:
+    rate = transcript.steps / transcript.seconds if transcript.seconds else 0.0
+    return (
+        f"{transcript.steps} frames replayed in {transcript.seconds:.1f} s ({rate:.0f} per second)"
+    )
 
 
 def _differing_events(changed: TranscriptDiff) -> Iterator[str]:

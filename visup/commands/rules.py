@@ -97,8 +97,8 @@ def explain(
             break
     if mind is None or mind.time < at:
         raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
-    told = explanations(mind, rule)
-    for text in told or [f"at {mind.time:g} s too few objects are in view to evaluate any rule"]:
+    found = explanations(mind, rule)
+    for text in found or [f"at {mind.time:g} s too few objects are in view to evaluate any rule"]:
         echo(text)
 
 
@@ -144,7 +144,7 @@ def judge(
 
 
 def _minds(source: str, setting: Given) -> Iterator[Mind]:
-    """The mind after each step: of a video that is watched, or of a recorded run."""
+    """The mind after each step of a video or of a recorded run."""
     from visup.agent.storage.journal_reader import Recording, is_run
     from visup.runs.replay import settings_for
     from visup.runs.wiring import build_agent, open_video, reasoning_agent
@@ -189,10 +189,10 @@ def _cost(rule: Rule) -> str:
 
     cost = cost_of(rule)
     late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported immediately"
-    told = f"{late}, at most {cost.bytes / 1024:,.1f} kB per choice of objects"
+    shown = f"{late}, at most {cost.bytes / 1024:,.1f} kB per choice of objects"
     if cost.early_delay_s == cost.delay_s:
-        return told
+        return shown
     least = (
         f"at least {cost.early_delay_s:g} s late" if cost.early_delay_s else "possibly immediately"
     )
-    return f"{told}; with --early, {least}"
+    return f"{shown}; with --early, {least}"

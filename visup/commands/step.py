@@ -27,7 +27,7 @@ OPTIONS = (
     *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention", "preset"),
     *("detections", "motion"),
 )
-"""Settings that matter when stepping, where nothing is late and nothing is recorded."""
+"""Settings that matter when stepping, where no frame is late and nothing is recorded."""
 
 
 @takes(WatchSettings, only=OPTIONS)
@@ -70,7 +70,7 @@ def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
     video = stack.enter_context(open_video(settings))
     if not video.live:
         return agent, video
-    # The camera goes on while the user looks at a step; the next step should show the newest frame.
+    # A camera continues while the user inspects a step; the next step should show the newest frame.
     newest = in_real_time(video, video)
     stack.callback(newest.close)
     return agent, MonotonicFrames(newest, video.fps)

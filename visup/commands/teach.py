@@ -21,7 +21,7 @@ class OutlineCommand(TyperCommand):
     """A command whose `--outline` takes corners as separate words, so that no quotes are needed."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As of any command, the corners of each outline joined."""
+        """Join the corners of each outline."""
         from visup.teaching.outlines import join_corners
 
         return super().parse_args(ctx, join_corners(args))

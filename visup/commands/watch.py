@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 LAG_SHOWN_S = 0.5
-"""Lag behind a live source is shown from this many seconds on; nobody notices less."""
+"""Lag behind a live source is shown from this many seconds on; less is not noticeable."""
 
 
 def _parse_answers(texts: list[str]) -> dict[int, str]:
@@ -104,9 +104,9 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
         from visup.agent.plugins.settings import merge_settings
         from visup.runs.inputs.settings_file import read_settings_file
 
-        told = read_settings_file(settings_file)
-        merged = merge_settings(told["plugin_settings"], given.get("plugin_settings", {}))
-        given = {**told, **given, "plugin_settings": merged}
+        from_file = read_settings_file(settings_file)
+        merged = merge_settings(from_file["plugin_settings"], given.get("plugin_settings", {}))
+        given = {**from_file, **given, "plugin_settings": merged}
     return WatchSettings(source, **given)
 
 
@@ -221,11 +221,11 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
     with bar:
         task = bar.add_task(word, total=None, rate="")
 
-        def tell(done: int, total: int | None, lag_s: float | None = None) -> None:
+        def update(done: int, total: int | None, lag_s: float | None = None) -> None:
             took = bar.tasks[0].elapsed or 0.0
             bar.update(task, completed=done, total=total, rate=pace_text(done, took, lag_s))
 
-        yield tell
+        yield update
 
 
 def pace_text(done: int, took_s: float, lag_s: float | None) -> str:

@@ -263,23 +263,23 @@ def _changed(one: RunChanges) -> str:
 def _filled(
     console: Console, lake: Lake, plan: Plan, where: PoolSettings, store: LakeStore | None
 ) -> FillResult:
-    """Watch the clips that have no run yet, and report on each."""
+    """Process the clips that have no run yet, and report on each."""
     from visup.archive.filling.filling import FillResult, fill
     from visup.archive.filling.plan import check_settings
     from visup.archive.filling.pool import open_pool
     from visup.archive.storing.places import pushed
 
     for failed in plan.failed:
-        _tell_failure(console, failed)
+        _print_failure(console, failed)
     if not plan.jobs:
         return FillResult(failed=list(plan.failed))
     for warning in check_settings(plan.jobs):
         console.print(warning, style="yellow", soft_wrap=True, markup=False)
     try:
-        with open_pool(where) as pool, _progress(console, plan) as told:
+        with open_pool(where) as pool, _progress(console, plan) as notify:
             if pool.dashboard:
                 console.print(f"Dashboard: {pool.dashboard}", soft_wrap=True, markup=False)
-            return fill(lake, plan, pool, pushed(store, lake, told))
+            return fill(lake, plan, pool, pushed(store, lake, notify))
     except KeyboardInterrupt:
         console.print("Stopped. Run the same command again to continue.")
         raise typer.Exit(130) from None
@@ -304,10 +304,10 @@ def _progress(console: Console, plan: Plan) -> Iterator[Callable[[ClipOutcome], 
         task = bar.add_task("", total=plan.bytes or 1, clips="", speed="")
         done, video_s = 0, 0.0
 
-        def tell(outcome: ClipOutcome) -> None:
+        def notify(outcome: ClipOutcome) -> None:
             nonlocal done, video_s
             done, video_s = done + 1, video_s + outcome.video_s
-            _tell_outcome(console, outcome)
+            _print_outcome(console, outcome)
             took = bar.tasks[0].elapsed or 0.0
             speed = f"{video_s / took:.1f} s of video per second" if took > 1.0 else ""
             bar.update(
@@ -317,18 +317,18 @@ def _progress(console: Console, plan: Plan) -> Iterator[Callable[[ClipOutcome], 
                 speed=speed,
             )
 
-        yield tell
+        yield notify
 
 
-def _tell_outcome(console: Console, outcome: ClipOutcome) -> None:
+def _print_outcome(console: Console, outcome: ClipOutcome) -> None:
     if outcome.failure:
-        _tell_failure(console, outcome.failure)
+        _print_failure(console, outcome.failure)
         return
     said = f"{outcome.source}: {outcome.verdict or 'watched'}, {outcome.video_s:.0f} s of video"
     console.print(f"{said} in {outcome.wall_s:.0f} s", soft_wrap=True, markup=False)
 
 
-def _tell_failure(console: Console, failed: FailedClip) -> None:
+def _print_failure(console: Console, failed: FailedClip) -> None:
     word = "set aside" if failed.put_aside else "failed"
     text = f"{failed.source}: {word}: {failed.reason}"
     console.print(text, style="yellow", soft_wrap=True, markup=False)
@@ -373,5 +373,5 @@ def _counted(count: int, what: str) -> str:
 
 
 def _size(count: int) -> str:
-    """So many bytes, in what can be read at a glance."""
+    """A number of bytes in a readable unit."""
     return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e6:.1f} MB"

@@ -70,38 +70,40 @@ def find(
     search, runs = read_search(what, unknown=options.unknown), found.runs()
     with open_database(found) as database:
         possible = runs if options.scan_all else search.possible_runs(database)
-    told = _told(console, look(found, search, possible, options.workers), options)
+    counts = _print_found(console, look(found, search, possible, options.workers), options)
     if not options.as_json:
-        share = f" ({100 * told.runs / len(runs):.0f} %)" if runs else ""
-        left = "" if told.runs == len(possible) else f"; not searched: {len(possible) - told.runs}"
-        console.print(
-            f"Hits: {told.hits}, in {told.hit_runs} of {len(runs)} runs;"
-            f" searched: {told.runs}{share}{left}."
+        share = f" ({100 * counts.runs / len(runs):.0f} %)" if runs else ""
+        left = (
+            "" if counts.runs == len(possible) else f"; not searched: {len(possible) - counts.runs}"
         )
-    raise typer.Exit(0 if told.hits else 1)
+        console.print(
+            f"Hits: {counts.hits}, in {counts.hit_runs} of {len(runs)} runs;"
+            f" searched: {counts.runs}{share}{left}."
+        )
+    raise typer.Exit(0 if counts.hits else 1)
 
 
 @dataclass(slots=True)
-class _Told:
-    """What was told so far."""
+class _Counts:
+    """Counts of what was printed."""
 
     runs: int = 0
     hit_runs: int = 0
     hits: int = 0
 
 
-def _told(console: Console, found: Iterable[FoundRun], options: FindOptions) -> _Told:
-    """Tell each run, until there are enough."""
-    told = _Told()
+def _print_found(console: Console, found: Iterable[FoundRun], options: FindOptions) -> _Counts:
+    """Print each run, until enough have hits."""
+    counts = _Counts()
     for each in found:
-        _tell(console, each, options.as_json)
-        told.runs, told.hits = told.runs + 1, told.hits + len(each.hits)
-        told.hit_runs += bool(each.hits)
+        _print_run(console, each, options.as_json)
+        counts.runs, counts.hits = counts.runs + 1, counts.hits + len(each.hits)
+        counts.hit_runs += bool(each.hits)
         if each.hits and options.clips:
             _cut(None if options.as_json else console, each, options.clips)
-        if told.hit_runs == options.first:
+        if counts.hit_runs == options.first:
             break
-    return told
+    return counts
 
 
 def _cut(console: Console | None, found: FoundRun, folder: Path) -> None:
@@ -118,7 +120,7 @@ def _cut(console: Console | None, found: FoundRun, folder: Path) -> None:
         complain(str(fault))
 
 
-def _tell(console: Console, found: FoundRun, as_json: bool) -> None:
+def _print_run(console: Console, found: FoundRun, as_json: bool) -> None:
     from visup.agent.storage.jsonable import to_jsonable
     from visup.terminal.console import echo_json
 

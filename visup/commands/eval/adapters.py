@@ -1,4 +1,4 @@
-"""Evaluations that need more than to be called with their options, and what is printed below their tables."""
+"""Evaluations that need more than a call with their options, and the lines printed below their tables."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Progress = Callable[[str], None]
 
 
 def shapes_closing(figures: Figures) -> Iterator[str]:
-    """How many of the first ten neighbours are right, where that was counted."""
+    """How many of the first ten neighbours are right, if that was counted."""
     if ranks := figures["total"].get("ranks"):
         yield "ranks 1 to 10: " + " ".join(str(r) for r in ranks)
 
 
 def clips(names: list[str] | None, cache: Path, progress: Progress) -> Figures:
-    """Rendered clips and their bars."""
+    """Evaluate rendered clips against their thresholds."""
     from visup.commands.render import needs_renderer
     from visup.evaluation.motion.rendered_clips import evaluate_clips
 
@@ -29,7 +29,7 @@ def clips(names: list[str] | None, cache: Path, progress: Progress) -> Figures:
 
 
 def clips_closing(figures: Figures) -> Iterator[RenderableType]:
-    """Each clip with what it missed, and how many pass."""
+    """The thresholds that each clip misses, and how many clips pass."""
     from visup.commands.eval.tables import clips_table
 
     total = figures["total"]
@@ -38,7 +38,7 @@ def clips_closing(figures: Figures) -> Iterator[RenderableType]:
 
 
 def scale(folder: Path, views: int, seed: int, progress: Progress) -> Figures:
-    """Model databases that grow."""
+    """Measure model databases of growing size."""
     from visup.evaluation.oracles import oracle
 
     figures: Figures = oracle("shape.scale").evaluate_scale(
@@ -48,7 +48,7 @@ def scale(folder: Path, views: int, seed: int, progress: Progress) -> Figures:
 
 
 def scale_closing(figures: Figures) -> Iterator[str]:
-    """How fast views are built, and how cost grows with them."""
+    """The speed of building views, and how cost grows with their number."""
     total = figures["total"]
     yield (
         f"built at {total['build_views_per_s']:.0f} views a second; "
@@ -57,7 +57,7 @@ def scale_closing(figures: Figures) -> Iterator[str]:
 
 
 def views_closing(figures: Figures) -> Iterator[RenderableType]:
-    """Each condition, the time of a query, and what is hardest."""
+    """Each condition, the time of a query, and the hardest objects."""
     from visup.commands.eval.tables import hardest_views, views_table
 
     total = figures["total"]
@@ -70,20 +70,20 @@ def views_closing(figures: Figures) -> Iterator[RenderableType]:
 
 
 def machines_closing(figures: Figures) -> Iterator[RenderableType]:
-    """The baseline's figures, where it watched, and how many verdicts are right."""
+    """The baseline's figures, if there are any, and how many verdicts are right."""
     from visup.commands.eval.figures_table import figures_tables
 
     if "baseline" in figures:
         rows = {n: i["baseline"] for n, i in figures["items"].items()}
         keys = ("verdict", "verdicts_right", "stage_f1", "actors", "contact_f1", "move_f1", "ms")
-        told = {"items": rows, "total": figures["baseline"]}
-        yield from figures_tables("baseline: CSRT on the taught boxes", told, keys)
+        shown = {"items": rows, "total": figures["baseline"]}
+        yield from figures_tables("baseline: CSRT on the taught boxes", shown, keys)
     total = figures["total"]
     yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
 
 def random_worlds(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
-    """Random worlds."""
+    """Evaluate random worlds."""
     from visup.commands.render import needs_renderer
     from visup.evaluation.machines.random_worlds import evaluate_random
 
@@ -92,7 +92,7 @@ def random_worlds(kind: list[str] | None, progress: Progress, **settings: Any) -
 
 
 def learning(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
-    """Tasks learned from runs."""
+    """Evaluate tasks learned from runs."""
     from visup.commands.render import needs_renderer
     from visup.evaluation.learning.runner import evaluate_learning
 
@@ -101,7 +101,7 @@ def learning(kind: list[str] | None, progress: Progress, **settings: Any) -> Fig
 
 
 def learning_closing(figures: Figures) -> Iterator[str]:
-    """The runs that are judged wrong, and in how many missions the bar is held."""
+    """The runs that are judged wrong, and how many missions meet the threshold."""
     for kind, found in figures["items"].items():
         if found["wrong"]:
             yield f"{kind}: judged wrong: {', '.join(found['wrong'])}"
@@ -111,12 +111,12 @@ def learning_closing(figures: Figures) -> Iterator[str]:
 
 
 def learning_failed(figures: Figures) -> bool:
-    """Whether a mission misses its bar."""
+    """Whether a mission misses its threshold."""
     return bool(figures["total"]["held"] < figures["total"]["missions"])
 
 
 def random_closing(figures: Figures) -> Iterator[str]:
-    """The worlds whose verdict is wrong, and how many are right."""
+    """The worlds whose verdict is wrong, and how many verdicts are right."""
     for name, world in figures["worlds"].items():
         if not world["verdicts_right"]:
             yield f"{name}: {world['verdict']}, not {' or '.join(world['accept'])}"
@@ -126,7 +126,7 @@ def random_closing(figures: Figures) -> Iterator[str]:
 
 
 def random_orbits(progress: Progress, **settings: Any) -> Figures:
-    """Random missions in orbit."""
+    """Evaluate random missions in orbit."""
     from visup.commands.render import needs_renderer
     from visup.evaluation.missions.random_orbits import evaluate_orbits
 
@@ -135,7 +135,7 @@ def random_orbits(progress: Progress, **settings: Any) -> Figures:
 
 
 def orbits_closing(figures: Figures) -> Iterator[str]:
-    """The missions whose verdict is wrong, and how many are right."""
+    """The missions whose verdict is wrong, and how many verdicts are right."""
     for name, mission in figures["items"].items():
         if not mission["verdicts_right"]:
             yield f"{name}: {mission['verdict']}, not {mission['verdict_true']}"
@@ -146,7 +146,7 @@ def orbits_closing(figures: Figures) -> Iterator[str]:
 def reasoning(
     folder: Path, *, merge: bool, long: int, progress: Progress, **settings: int
 ) -> Figures:
-    """Reasoning alone; with `long` instead so many frames of a script, for memory and speed."""
+    """Evaluate reasoning alone; a nonzero `long` instead measures memory and speed over that many frames."""
     if long:
         from visup.evaluation.runtime.endurance import evaluate_endurance
 
@@ -159,7 +159,7 @@ def reasoning(
 
 
 def reasoning_closing(figures: Figures) -> Iterator[RenderableType]:
-    """How far confidence in identities can be believed."""
+    """The calibration of identities."""
     from visup.commands.eval.tables import reliability_table
 
     if "reliability" in figures["total"]:
@@ -167,43 +167,43 @@ def reasoning_closing(figures: Figures) -> Iterator[RenderableType]:
 
 
 def relations_settings(given: dict[str, Any]) -> dict[str, Any]:
-    """The options of `visup eval relations`, and what is fixed."""
+    """The options of `visup eval relations`, and the fixed settings."""
     from visup.evaluation.oracles import oracle
 
     return {**given, **oracle("reasoning.relations").settings_of_record()}
 
 
 def relations_closing(figures: Figures) -> Iterator[str]:
-    """What the oracles found wrong."""
+    """The errors that the oracles found."""
     yield "of {draws} random pairs, RCC-8 is wrong in {rcc8_wrong}, QTC in {qtc_wrong}".format(
         **figures["total"]
     )
 
 
 def rules_closing(figures: Figures) -> Iterator[str]:
-    """That there was nothing to compare with."""
+    """A note if there was nothing to compare with."""
     if not figures["total"]["rtamt"]:
         yield "rtamt is not installed: nothing was compared with it (pip install rtamt)"
 
 
 def rules_differ(figures: Figures) -> bool:
-    """Whether any formula came out otherwise than the oracle says."""
+    """Whether any formula differs from the oracle."""
     return any(item.get("different") for item in figures["items"].values())
 
 
 def peers_closing(figures: Figures) -> Iterator[str]:
-    """The first cases that do not come out as the peer's."""
+    """The first cases that differ from the peer."""
     for case in figures["differing"][:20]:
         yield f"{case['outcome'].replace('_', ' ')}: {case['id']} ({case['of']})"
 
 
 def peers_differ(figures: Figures) -> bool:
-    """Whether a case differs beyond what is said of semantics."""
+    """Whether a case differs beyond the documented differences of semantics."""
     return bool(figures["total"]["differ"])
 
 
 def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Figures:
-    """Recognition of random tasks, with its bars."""
+    """Evaluate the recognition of random tasks against its thresholds."""
     from visup.evaluation.oracles import oracle
 
     figures, bars = oracle("reasoning.recognition").evaluate_recognition(
@@ -213,7 +213,7 @@ def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Fig
 
 
 def recognition_closing(figures: Figures) -> Iterator[RenderableType]:
-    """All figures, and which bars are held."""
+    """All figures, and the thresholds that are met."""
     from visup.commands.eval.tables import totals_table
 
     yield totals_table(figures)
@@ -230,7 +230,7 @@ def tasks_closing(figures: Figures) -> Iterator[RenderableType]:
 
 
 def resume(kills: int, seed: int, demo: bool, progress: Progress) -> Figures:
-    """Runs that are killed and resumed."""
+    """Evaluate runs that are killed and resumed."""
     from visup.evaluation.runtime.resume import evaluate_resume
     from visup.runs.demo import demo_settings
 
@@ -244,13 +244,13 @@ def resume(kills: int, seed: int, demo: bool, progress: Progress) -> Figures:
 
 
 def resume_failed(figures: Figures) -> bool:
-    """Whether a resumed run differed from the unbroken one, or lost anything."""
+    """Whether a resumed run differed from the uninterrupted one, or lost anything."""
     total = figures["total"]
     return bool(total["equal"] < total["kills"] or total["lost"] > 0)
 
 
 def soak(frames: int, traffic: float, progress: Progress) -> Figures:
-    """A run of hours; with `traffic` so many of three lanes of cars."""
+    """Measure a long run; with `traffic`, that many hours of three lanes of cars instead."""
     if traffic:
         from visup.evaluation.runtime.traffic import evaluate_traffic
 
@@ -267,7 +267,7 @@ def totals_closing(figures: Figures) -> Iterator[str]:
 
 
 def stepping_closing(figures: Figures) -> Iterator[str]:
-    """The totals, and the bars that were missed."""
+    """The totals, and the thresholds that were missed."""
     from visup.evaluation.runtime.stepping import missed
 
     yield from totals_closing(figures)
@@ -275,14 +275,14 @@ def stepping_closing(figures: Figures) -> Iterator[str]:
 
 
 def stepping_failed(figures: Figures) -> bool:
-    """Whether a bar was missed."""
+    """Whether a threshold was missed."""
     from visup.evaluation.runtime.stepping import missed
 
     return bool(missed(dict(figures)))
 
 
 def failures_closing(form: str) -> Callable[[Figures], Iterator[str]]:
-    """The first failures, each in this form."""
+    """A function that lists the first failures, each in a format."""
 
     def closing(figures: Figures) -> Iterator[str]:
         for failure in figures["failures"][:20]:
@@ -292,7 +292,7 @@ def failures_closing(form: str) -> Callable[[Figures], Iterator[str]]:
 
 
 def hardening_closing(figures: Figures) -> Iterator[str]:
-    """Races and cuts of power, then the first failures."""
+    """Race conditions and power cuts, then the first failures."""
     total = figures["total"]
     yield f"{total['races']} races and {total['cuts']} cuts of power: {total['lost']} lost something."
     yield from failures_closing("{text}")(figures)
@@ -304,19 +304,19 @@ def any_failures(figures: Figures) -> bool:
 
 
 def archive_closing(figures: Figures) -> Iterator[str]:
-    """Each part in a line."""
+    """One line for each part."""
     for name, part in figures["items"].items():
-        told = (f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items())
-        yield f"{name}: {', '.join(told)}"
+        shown = (f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items())
+        yield f"{name}: {', '.join(shown)}"
 
 
 def anything_different(figures: Figures) -> bool:
-    """Whether something is not equal that ought to be."""
+    """Whether results differ that should be equal."""
     return bool(figures["total"]["different"])
 
 
 def serving_closing(figures: Figures) -> Iterator[str]:
-    """What went wrong, and how the service took it."""
+    """The faults, and how the service handled them."""
     total = figures["total"]
     yield (
         f"{total['kills']} kills, {total['troubles']} troubles of streams, {total['reloads']} reloads, "

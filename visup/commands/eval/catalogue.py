@@ -1,4 +1,4 @@
-"""The evaluations; the commands of `visup eval` are made from these tables."""
+"""The evaluations, from which the commands of `visup eval` are made."""
 
 from __future__ import annotations
 

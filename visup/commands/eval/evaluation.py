@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Figures = Mapping[str, Any]
-"""Has `items` by name, and `total`; other keys go only to the file."""
+"""`items` by name, and `total`; other keys appear only in the file."""
 
 JSON = Setting(
     "json_file", Path | None, None, Option("Also write the figures to this file.", "--json")
@@ -31,17 +31,17 @@ class EvaluationCommand:
     """One command of `visup eval`.
 
     Attributes:
-        name: Of the command.
-        about: What it measures: its help.
-        function: What computes the figures, 'module:function'; called with the argument, the settings and
-            `progress`.
-        verb: What is said to be done while it runs.
-        keys: Figures that make columns of the table, in order; none for an evaluation that draws its own.
+        name: Name of the command.
+        about: Its help: what it measures.
+        function: The function that computes the figures, as 'module:function'; called with the argument, the
+            settings and `progress`.
+        verb: Shown in the status line while it runs.
+        keys: Figures for the columns of the table, in order; empty for an evaluation with tables of its own.
         settings: Its options.
-        argument: What stands without an option, or None.
-        closing: What is printed after the table, from the figures.
+        argument: The positional argument, or None.
+        closing: Makes the lines after the table, from the figures.
         failed: Whether the exit code is 1, from the figures.
-        recorded: What the file of figures says of the settings; all of them by default.
+        recorded: Selects the settings for the file of figures; all of them by default.
     """
 
     name: str
@@ -56,7 +56,7 @@ class EvaluationCommand:
     recorded: Callable[[Given], Given] = field(default=dict)
 
     def command(self) -> Callable[..., None]:
-        """The function that typer turns into a command."""
+        """The function from which typer makes a command."""
 
         def run(json_file: Path | None, **given: Any) -> None:
             self._run(json_file, given)
@@ -79,7 +79,9 @@ class EvaluationCommand:
         module, _, function = self.function.partition(":")
         with _progress_line(self.verb) as progress:
             figures = getattr(evaluation_module(module), function)(**given, progress=progress)
-        if json_file:  # first of all: hours of work must not end in a table that cannot be drawn
+        if (
+            json_file
+        ):  # written first: hours of work must not be lost if the table cannot be printed
             settings = {k: v for k, v in given.items() if k != "folder"}
             write_record(json_file, figures, self.recorded(settings))
         console = make_console()
@@ -114,7 +116,7 @@ LIMIT = count("limit", None, "Most frames (or shapes) of each item, for a quick 
 
 
 def _check_paths(folder: Path | None, json_file: Path | None) -> None:
-    """Refuse what cannot work before an evaluation of minutes starts.
+    """Refuse invalid paths before an evaluation of minutes starts.
 
     Raises:
         SettingsError: The folder does not exist.

@@ -1,4 +1,4 @@
-"""Figures by item as tables that are whole at 80 columns, however many figures and items there are."""
+"""Tables of figures by item that fit 80 columns, for any number of figures and items."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Cells = Mapping[str, Mapping[str, str]]
 
 WIDTH = 80
 LONGEST_NAME = 26
-"""Longer names of items are folded."""
+"""Characters; longer names of items are wrapped."""
 
 HEADINGS = {
     "verdicts_right": "right",
@@ -20,22 +20,22 @@ HEADINGS = {
     "false_alerts_per_hour": "false alerts /hour",
     "false_reports_per_hour": "false reports /hour",
 }
-"""Headings that are shorter than their keys in the file of figures."""
+"""Headings that are shorter than the keys in the file of figures."""
 
 SHORT_WORDS = {"interrupted": "interr.", "in_progress": "in pr.", "succeeded": "succ."}
-"""Verdicts are long words for narrow columns: these stand in where the whole words find no room."""
+"""Abbreviated verdicts, used where the full words do not fit."""
 
 
 def figures_tables(title: str, figures: Mapping[str, Any], keys: Sequence[str]) -> Iterator[Table]:
     """Figures as tables that fit 80 columns.
 
-    Items are rows if that fits, else figures are rows and items are numbered columns if that fits, else
-    the figures are spread over several tables.
+    Items are rows if that fits, else figures are rows and items are numbered columns if that fits, else the
+    figures are spread over several tables.
 
     Args:
-        title: Of the table.
-        figures: With `items` by name and `total`.
-        keys: Which figures, in order; those that no item has are left out.
+        title: Title of the table.
+        figures: `items` by name, and `total`.
+        keys: The figures, in order; those that no item has are left out.
     """
     rows: Rows = {**figures["items"], "total": figures["total"]}
     shown = [k for k in keys if any(k in row for row in rows.values())]
@@ -71,22 +71,22 @@ def _name_width(rows: Mapping[str, object]) -> int:
 
 
 def _widths(cells: Cells, keys: Sequence[str]) -> list[int]:
-    """Of each figure's column: its widest cell, or the longest word of its heading."""
+    """Width of each figure's column: its widest cell, or the longest word of its heading."""
     return [max(len(text) for text in (*_words(k), *(c[k] for c in cells.values()))) for k in keys]
 
 
 def _turned_widths(cells: Cells, keys: Sequence[str]) -> list[int]:
-    """Of each item's column, when figures are rows."""
+    """Width of each item's column, when figures are rows."""
     return [max(5, *(len(row[k]) for k in keys)) for row in cells.values()]
 
 
 def _fits(widths: Sequence[int]) -> bool:
-    """Whether columns of these widths and the lines between them find room."""
+    """Whether columns of these widths fit, with the lines between them."""
     return 1 + sum(w + 1 for w in widths) <= WIDTH
 
 
 def _parts(cells: Cells, keys: Sequence[str]) -> Iterator[list[str]]:
-    """The figures in parts, each as large as finds room."""
+    """Split the figures into parts, each as large as fits."""
     names, part = _name_width(cells), list[str]()
     for key in keys:
         if part and not _fits([names, *_widths(cells, [*part, key])]):
@@ -99,7 +99,7 @@ def _parts(cells: Cells, keys: Sequence[str]) -> Iterator[list[str]]:
 def _wide(title: str, cells: Cells, keys: Sequence[str]) -> Table:
     table = _table(title)
     table.add_column("", overflow="fold", width=_name_width(cells))
-    # Widths are given: left to itself, rich makes room for whole headings at the cost of the cells.
+    # Explicit widths: by default, rich fits whole headings at the cost of the cells.
     for key, width in zip(keys, _widths(cells, keys), strict=True):
         table.add_column(" ".join(_words(key)), justify="right", width=width)
     for name, row in cells.items():
@@ -110,7 +110,7 @@ def _wide(title: str, cells: Cells, keys: Sequence[str]) -> Table:
 
 
 def _tall(title: str, cells: Cells, keys: Sequence[str]) -> Table:
-    """Figures as rows; items as numbered columns, whose names stand below."""
+    """Figures as rows; items as numbered columns, with their names below."""
     names = [name for name in cells if name != "total"]
     table = _table(title)
     table.add_column("", no_wrap=True)

@@ -1,4 +1,4 @@
-"""Evaluations of reasoning, languages and the runtime by themselves: a row for each."""
+"""Evaluations of reasoning, the languages and the runtime in isolation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`visup eval motion`: all sequences below a folder, or what was left out by folds."""
+"""`visup eval motion`: all sequences below a folder, or the left-out ones of folds."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Progress = Callable[[str], None]
 
 
 def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) -> Figures:
-    """Segmentation and tracking, of all sequences or by folds.
+    """Evaluate segmentation and tracking, on all sequences or by folds.
 
     Raises:
-        SettingsError: An option stands without the folds that it belongs to.
+        SettingsError: An option that belongs to folds is given without them.
     """
     if folds is not None:
         from visup.evaluation.cross_validation.runner import FoldPlan, evaluate_folds
@@ -38,7 +38,7 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
 
 
 def motion_settings(given: dict[str, Any]) -> dict[str, Any]:
-    """The options of `visup eval motion` that its figures follow from."""
+    """The options of `visup eval motion` that affect its figures."""
     by_folds = (
         ("folds", "tries", "stability", "train", "also", "seed")
         if given["folds"] is not None
@@ -48,7 +48,7 @@ def motion_settings(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def motion_closing(figures: Figures) -> Iterator[str]:
-    """How sure the mean over left-out sequences is, and whether what was tried is to be kept."""
+    """The uncertainty of the mean over left-out sequences, and whether to adopt the tried settings."""
     total = figures["total"]
     if "spread" not in total:
         return

@@ -1,4 +1,4 @@
-"""Evaluations of what is seen and supervised: a row for each."""
+"""Evaluations of perception and supervision."""
 
 from __future__ import annotations
 

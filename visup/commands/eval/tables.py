@@ -1,4 +1,4 @@
-"""Tables of single evaluations, and the lines below them; `figures_table.py` draws those that all share."""
+"""Tables of single evaluations, and the lines below them; `figures_table.py` has the shared ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WORST = 6
 
 
 def totals_table(figures: Mapping[str, Any]) -> Table:
-    """The totals, a row for each."""
+    """The totals, one row each."""
     table = Table("figure", "value")
     for name, value in figures["total"].items():
         table.add_row(name, f"{value:.3g}" if isinstance(value, float) else str(value))
@@ -22,7 +22,7 @@ def totals_table(figures: Mapping[str, Any]) -> Table:
 
 
 def reliability_table(figures: Mapping[str, Any]) -> Table:
-    """How often identities were right, by the confidence with which they were believed."""
+    """How often identities were right, by confidence."""
     table = Table("confidence", "right", "object-frames", title="identity: believed and right")
     for row in figures["total"]["reliability"]:
         believed, right = f"{row['confidence']:.2f}", f"{row['right']:.3f}"
@@ -31,10 +31,10 @@ def reliability_table(figures: Mapping[str, Any]) -> Table:
 
 
 def clips_table(items: Rows) -> Table:
-    """A row for each object of each clip, whole at 80 columns.
+    """A row for each object of each clip, within 80 columns.
 
     Args:
-        items: As of `evaluate_clips`.
+        items: From `evaluate_clips`.
     """
     table = Table(title="clips", title_justify="left", padding=(0, 0))
     table.add_column("clip", no_wrap=True)
@@ -59,7 +59,7 @@ def _clip_rows(name: str, item: Mapping[str, Any]) -> Iterator[tuple[str | Text,
 
 
 def views_table(total: Mapping[str, Any]) -> Table:
-    """How views are recognised in each condition."""
+    """Recognition of views in each condition."""
     from visup.evaluation.shape.view_queries import CONDITIONS
 
     baseline = total["baseline"]
@@ -71,14 +71,14 @@ def views_table(total: Mapping[str, Any]) -> Table:
         row = total[condition]
         angle = "" if row["angle_deg"] is None else f"{row['angle_deg']:.1f}°"
         others = (f"{baseline[name][condition]:.3f}" for name in baseline)
-        told = (f"{row[key]:.3f}" for key in ("known_told", "stranger_told"))
+        rates = (f"{row[key]:.3f}" for key in ("known_told", "stranger_told"))
         best = (f"{row[key]:.3f}" for key in ("top1", "top5"))
-        table.add_row(condition, *best, angle, *told, f"{row['ms']:.1f}", *others)
+        table.add_row(condition, *best, angle, *rates, f"{row['ms']:.1f}", *others)
     return table
 
 
 def hardest_views(items: Rows) -> str:
-    """The objects that are named rightly least often, over all conditions."""
+    """The objects that are named correctly least often, over all conditions."""
     from visup.evaluation.shape.view_queries import CONDITIONS
 
     shares = {

@@ -1,4 +1,4 @@
-"""`visup train`: makes the files of what was learnt."""
+"""`visup train`: makes the files of learned parameters."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 OPERATOR_VARIABLE = "VISUP_CONSOLE_TOKEN"
 VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
 PARENT_VARIABLE = "VISUP_CONSOLE_WITH_PARENT"
-"""Set by a process that starts the console: it then ends with that process, and runs at low priority."""
+"""Set by a process that starts the console, which then ends with that process and runs at low priority."""
 
 SHORTEST_TOKEN = 16
 
@@ -90,7 +90,7 @@ def _end_with_parent() -> None:
 
 
 def _check_reach(host: str) -> None:
-    """Refuse a host that others can reach unless somebody has chosen a token."""
+    """Refuse a host that others can reach unless the user has set a token."""
     from visup.console.access import LOOPBACK
 
     if host not in LOOPBACK and OPERATOR_VARIABLE not in os.environ:
@@ -102,7 +102,7 @@ def _check_reach(host: str) -> None:
 
 
 def _access(hosts: tuple[str, ...]) -> Access:
-    """Access rights, by the tokens of the environment."""
+    """Access rights, from the tokens in the environment."""
     from visup.console.access import Access
 
     operator, viewer = (_token(name) for name in (OPERATOR_VARIABLE, VIEWER_VARIABLE))

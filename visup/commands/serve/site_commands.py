@@ -20,12 +20,12 @@ RUN = "run"
 
 
 class SiteFirst(TyperGroup):
-    """Commands about sites; any other word is taken as a site file to watch."""
+    """Commands about sites; any other first word is a site file to watch."""
 
     default_command = RUN
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As usual, with `run` inserted before the name of a site file."""
+        """Insert `run` before the name of a site file."""
         named = next((word for word in args if not word.startswith("-")), None)
         if named is not None and named not in self.commands:
             args = [RUN, *args]
@@ -90,7 +90,7 @@ def check(
     for camera in site.cameras:
         echo(f"camera {camera.name}")
         checks.append(check_camera(camera, speed=speed))
-        _tell(checks[-1])
+        _print_check(checks[-1])
     for line in load_lines(checks):
         echo(line)
     refused = [c.camera.name for c in checks if c.fault]
@@ -103,7 +103,7 @@ def check(
     echo(f"All {len(checks)} cameras can be watched." if len(checks) > 1 else "It can be watched.")
 
 
-def _tell(checked: CameraCheck) -> None:
+def _print_check(checked: CameraCheck) -> None:
     from visup.serving.site.checking import speed_line
     from visup.terminal.console import complain, echo
 

@@ -1,4 +1,4 @@
-"""What editors ask of task and rule files beside mistakes and words: outline, uses, fixes, colours, hints.
+"""Outline, references, quick fixes, semantic tokens and inlay hints of task and rule files, for editors.
 
 The same handlers serve both languages; a file whose name ends in `.rules` holds rules.
 """
@@ -33,7 +33,7 @@ _WORDS = re.compile(r"[^\W\d]\w*")
 
 
 def holds_rules(document: TextDocument) -> bool:
-    """Whether a document is a file of rules and not of tasks."""
+    """Whether a document is a rule file, not a task file."""
     return document.uri.endswith(".rules")
 
 
@@ -45,7 +45,7 @@ def faults_of(document: TextDocument) -> list[Diagnostic]:
 
 
 def code_actions(ls: LanguageServer, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
-    """Every hint in a range that is a change, as an action."""
+    """Each hint in a range that is a text edit, as a code action."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     found = []
     for fault in faults_of(document):
@@ -66,7 +66,7 @@ def code_actions(ls: LanguageServer, params: lsp.CodeActionParams) -> list[lsp.C
 
 
 def symbols(ls: LanguageServer, params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
-    """Stages and what is declared, or rules."""
+    """Stages and declarations, or rules."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     if holds_rules(document):
         return [
@@ -88,7 +88,7 @@ def symbols(ls: LanguageServer, params: lsp.DocumentSymbolParams) -> list[lsp.Do
 
 
 def uses(ls: LanguageServer, params: lsp.ReferenceParams) -> list[lsp.Location]:
-    """All places of a file that mean the same stage, actor, zone or parameter, or variable of a rule."""
+    """All references in a file to the same stage, actor, zone, parameter, or variable of a rule."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     word = _word(document, params.position)
     found = [] if word is None else alike(document, word)
@@ -105,13 +105,13 @@ def prepare_rename(ls: LanguageServer, params: lsp.PrepareRenameParams) -> lsp.R
 
 
 def alike(document: TextDocument, word: NameUse) -> list[NameUse]:
-    """All places of a document that mean the same as one of its words."""
+    """All references in a document to the same entity as one of its words."""
     find = rule_references if holds_rules(document) else references
     return find(document.source, word)
 
 
 def rename_refused(document: TextDocument, word: NameUse, new: str) -> str | None:
-    """Why a name cannot become another one, or None when it can."""
+    """Why a name cannot be renamed, or None if it can."""
     text = document.source
     if holds_rules(document):
         return rule_rename_refused(text, word, new)
@@ -125,7 +125,7 @@ def rename_refused(document: TextDocument, word: NameUse, new: str) -> str | Non
 
 
 def folds(ls: LanguageServer, params: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
-    """Statements and runs of comments over several lines."""
+    """Statements and comment blocks of several lines."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     text = document.source
     pattern = _RULE if holds_rules(document) else _HEAD
@@ -155,7 +155,7 @@ def _comments(lines: list[str]) -> Iterator[lsp.FoldingRange]:
 
 
 def signature(ls: LanguageServer, params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
-    """What an action, word or quantity takes, while one writes its arguments."""
+    """The arguments of an action, predicate or quantity, while they are typed."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     here = document.position_from_client_units(params.position)
     before = document.lines[here.line][: here.character] if document.lines else ""
@@ -165,8 +165,10 @@ def signature(ls: LanguageServer, params: lsp.SignatureHelpParams) -> lsp.Signat
         return None
     kinds, about = takes
     label = f"{found[1]}({', '.join(kinds)})"
-    told = lsp.SignatureInformation(label, about, [lsp.ParameterInformation(k) for k in kinds])
-    return lsp.SignatureHelp([told], 0, found[2].count(","))
+    information = lsp.SignatureInformation(
+        label, about, [lsp.ParameterInformation(k) for k in kinds]
+    )
+    return lsp.SignatureHelp([information], 0, found[2].count(","))
 
 
 def _takes(document: TextDocument, name: str) -> tuple[tuple[str, ...], str] | None:
@@ -178,7 +180,7 @@ def _takes(document: TextDocument, name: str) -> tuple[tuple[str, ...], str] | N
 
 
 def tokens(ls: LanguageServer, params: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
-    """Colours by meaning: stages, actions, actors."""
+    """Semantic tokens: stages, actions, actors."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     data: list[int] = []
     line = column = 0
@@ -191,7 +193,7 @@ def tokens(ls: LanguageServer, params: lsp.SemanticTokensParams) -> lsp.Semantic
 
 
 def _tokens(document: TextDocument) -> Iterator[tuple[int, int, int, int]]:
-    """Line, column, length and kind of each token, in order."""
+    """Line, column, length and kind of each token, in document order."""
     if not holds_rules(document):
         kinds = {"stage": 0, "action": 1, "name": 2}
         for word in names(document.source):
@@ -208,7 +210,7 @@ def _tokens(document: TextDocument) -> Iterator[tuple[int, int, int, int]]:
 
 
 def inlays(ls: LanguageServer, params: lsp.InlayHintParams) -> list[lsp.InlayHint]:
-    """Behind each action of a task, when it is over."""
+    """After each action of a task, when it ends."""
     document = ls.workspace.get_text_document(params.text_document.uri)
     found: list[lsp.InlayHint] = []
     if holds_rules(document):
@@ -233,12 +235,12 @@ def inlays(ls: LanguageServer, params: lsp.InlayHintParams) -> list[lsp.InlayHin
 
 
 def file_of(document: TextDocument) -> str:
-    """The path of a document, or what it is called."""
+    """The path of a document, or its name."""
     return to_fs_path(document.uri) or document.uri
 
 
 def span_range(document: TextDocument, span: Span) -> lsp.Range:
-    """A place of ours in the units of the editor."""
+    """A span as a range in the editor's units."""
     start = ServerTextPosition(span.line - 1, span.column - 1)
     end = ServerTextPosition(max(span.line, span.end_line) - 1, span.end_column - 1)
     return document.range_to_client_units(ServerTextRange(start, end))
@@ -289,4 +291,4 @@ FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
     ),
     (lsp.TEXT_DOCUMENT_INLAY_HINT, inlays, None),
 )
-"""What is offered beside mistakes, words, meanings, definitions, layout and renaming."""
+"""Features besides diagnostics, completion, hover, definitions, formatting and renaming."""

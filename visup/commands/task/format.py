@@ -50,11 +50,11 @@ def _write(file: str, text: str) -> None:
 
 
 def formatted_source(text: str, file: str) -> str:
-    """The text of a task file in the layout of visup.
+    """The text of a task file in the standard layout.
 
     Raises:
-        TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
-        ErrorGroup: The same, for several reasons.
+        TaskError: It cannot be parsed; tabs are accepted.
+        ErrorGroup: The same, with several errors.
     """
     from visup.agent.model.errors import TaskError
     from visup.rules.language.diagnostics import Source, raise_all

@@ -1,4 +1,4 @@
-"""The language server of both languages: what `tasks/tools/editing.py` says, for editors."""
+"""The language server of both languages: `tasks/tools/editing.py` over LSP."""
 
 from __future__ import annotations
 
@@ -46,16 +46,16 @@ LARGEST_MESSAGE_BYTES = 2**26
 
 
 def serve(sent: BinaryIO, answers: BinaryIO) -> None:
-    """Serve one editor until it says that it is done, or goes away.
+    """Serve one editor until it exits or disconnects.
 
     Raises:
-        SourceError: It announces a message that is longer than any may be.
+        SourceError: It announces a message over the size limit.
     """
     make_server().start_io(cast("BinaryIO", EditorInput(sent)), answers)
 
 
 class EditorInput:
-    """What an editor sends; memory is taken for no more than a message may have.
+    """The input from an editor; limits the memory for a message.
 
     Args:
         sent: The stream.
@@ -66,10 +66,10 @@ class EditorInput:
         self._read = sent.read
 
     def read(self, count: int) -> bytes:
-        """So many bytes of a message.
+        """Read bytes of a message.
 
         Raises:
-            SourceError: They are too many.
+            SourceError: They are over the size limit.
         """
         if count > LARGEST_MESSAGE_BYTES:
             raise SourceError(
@@ -80,7 +80,7 @@ class EditorInput:
 
 
 def make_server() -> LanguageServer:
-    """A language server with all of `_FEATURES` and of `editor_features.FEATURES`."""
+    """A language server with `_FEATURES` and `editor_features.FEATURES`."""
     server = LanguageServer("visup-task", __version__)
     for feature, handler, options in (*_FEATURES, *FEATURES):
         server.feature(feature, options)(handler)
@@ -138,11 +138,11 @@ def _define(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | 
 def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
     document = ls.workspace.get_text_document(params.text_document.uri)
     if holds_rules(document):
-        return []  # rules are laid out as their authors like
+        return []  # rules have no standard layout
     try:
         new = formatted_source(document.source, _file(document))
     except VisupError:
-        return []  # the mistakes that hinder it are shown already
+        return []  # the errors are already shown
     if new == document.source:
         return []
     end = lsp.Position(len(document.lines), 0)
@@ -177,7 +177,7 @@ _FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
     (lsp.TEXT_DOCUMENT_FORMATTING, _format, None),
     (lsp.TEXT_DOCUMENT_RENAME, _rename, None),
 )
-"""What the server offers, by what, and how."""
+"""LSP method, handler and options of each feature."""
 
 
 def _publish(server: LanguageServer, uri: str) -> None:
@@ -192,7 +192,7 @@ def _publish(server: LanguageServer, uri: str) -> None:
 
 
 class _EditorFiles:
-    """Reads included files as they stand in the editor, else from the disk: from a folder, or below."""
+    """Reads included files from the editor if open there, else from a folder and below on disk."""
 
     def __init__(self, server: LanguageServer, root: Path) -> None:
         self._root = root

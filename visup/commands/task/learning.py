@@ -51,8 +51,8 @@ def learn(
     wrong = [n for n, v in learned.good.items() if v is not Verdict.SUCCEEDED]
     wrong += [n for n, v in learned.bad.items() if v is Verdict.SUCCEEDED]
     if as_json:
-        told = {n: v.value for n, v in (*learned.good.items(), *learned.bad.items())}
-        echo_json({"file": str(out), "verdicts": told, "left_out": learned.dropped}, indent=2)
+        verdicts = {n: v.value for n, v in (*learned.good.items(), *learned.bad.items())}
+        echo_json({"file": str(out), "verdicts": verdicts, "left_out": learned.dropped}, indent=2)
     else:
         echo(learned.text, nl=False)
         for what in learned.dropped:

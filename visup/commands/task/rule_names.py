@@ -1,4 +1,4 @@
-"""Names of one rule: its variables, those of `exists` and `forall`, values of `let`; where each stands."""
+"""References to the names of one rule: its variables, those of `exists` and `forall`, values of `let`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.tasks.tools.editing import NameUse
 
 _START = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
-_PASSED_OVER = re.compile(r"#[^\n]*|(?<=\")[^\"\n]*(?=\")")
+_IGNORED = re.compile(r"#[^\n]*|(?<=\")[^\"\n]*(?=\")")
 _IN_SENTENCE = re.compile(r"\{\w+\}")
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?!\w|\s*\()")
 _HEAD = re.compile(r"\s*rule\s+\w+\s*\(([^()]*)\)")
@@ -18,11 +18,11 @@ _BOUND = re.compile(r"\b(?:let|exists|forall)\s+(\w+)")
 
 
 def rule_references(text: str, word: NameUse) -> list[NameUse]:
-    """All places that mean the same variable or value as a word of a rule; none where it is bound by nothing.
+    """All references to the same variable or value as a word of a rule; none if it is unbound.
 
     Args:
-        text: A file of rules.
-        word: A name of it.
+        text: The text of a rule file.
+        word: A name in it.
     """
     begin, rule = _rule_around(text, word.span)
     if word.name not in _bound(rule):
@@ -36,7 +36,7 @@ def rule_references(text: str, word: NameUse) -> list[NameUse]:
 
 
 def rule_rename_refused(text: str, word: NameUse, new: str) -> str | None:
-    """Why a name of a rule cannot become another one, or None when it can."""
+    """Why a name of a rule cannot be renamed, or None if it can."""
     if re.fullmatch(r"[A-Za-z_]\w*", new) is None or new == "is":
         return f"`{new}` is no name: letters, digits and `_`, beginning with a letter"
     known = {**KEYWORDS, **FUNCTIONS, **PREDICATES, **QUANTITIES}
@@ -49,20 +49,20 @@ def rule_rename_refused(text: str, word: NameUse, new: str) -> str | None:
 
 
 def _rule_around(text: str, span: Span) -> tuple[int, str]:
-    """Where the rule begins that holds a place, and its text, comments and what no name is blank."""
+    """Offset and text of the rule around a span, with everything but names blanked."""
     at = sum(len(line) + 1 for line in text.split("\n")[: span.line - 1]) + span.column - 1
     starts = [m.start() for m in _START.finditer(text)]
     begin = max((s for s in starts if s <= at), default=0)
     end = min((s for s in starts if s > at), default=len(text))
-    return begin, _PASSED_OVER.sub(lambda m: _blank(m[0]), text[begin:end])
+    return begin, _IGNORED.sub(lambda m: _blank(m[0]), text[begin:end])
 
 
-def _blank(passed_over: str) -> str:
-    """Blanks in the place of a comment, or of a sentence but for the names in it."""
-    if passed_over.startswith("#"):
-        return " " * len(passed_over)
-    kept = [" "] * len(passed_over)
-    for m in _IN_SENTENCE.finditer(passed_over):
+def _blank(ignored: str) -> str:
+    """Blanks for a comment, or for a message except the names in it."""
+    if ignored.startswith("#"):
+        return " " * len(ignored)
+    kept = [" "] * len(ignored)
+    for m in _IN_SENTENCE.finditer(ignored):
         kept[m.start() : m.end()] = m[0]
     return "".join(kept)
 

@@ -66,14 +66,14 @@ def _walk(task: Task) -> None:
     places = initial_positions(task)
     while True:
         for number, place in enumerate(places, 1):
-            echo(f"  {number}) {_way(place)}")
+            echo(f"  {number}) {_option(place)}")
         chosen = _ask(places)
         if chosen is None:
             return
         if chosen.state is None:
             echo("the task is done")
             return
-        echo(f"now: {_said(chosen.moment)}")
+        echo(f"now: {_sentence(chosen.moment)}")
         places = successors(task, chosen)
 
 
@@ -93,13 +93,13 @@ def _ask(places: tuple[Position, ...]) -> Position | None:
         echo(f"  a number from 1 to {len(places)}, or q")
 
 
-def _way(place: Position) -> str:
-    return _said(place.moment) if place.state is not None else "(the task is done)"
+def _option(place: Position) -> str:
+    return _sentence(place.moment) if place.state is not None else "(the task is done)"
 
 
 def _line(course: Trace) -> str:
-    return ", then ".join(map(_said, course)) or "(nothing)"
+    return ", then ".join(map(_sentence, course)) or "(nothing)"
 
 
-def _said(moment: Moment) -> str:
+def _sentence(moment: Moment) -> str:
     return " & ".join(moment)

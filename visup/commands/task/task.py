@@ -52,14 +52,14 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
             found[file] = [f.error(TaskError) for f in faults]
         except VisupError as e:
             found[file] = [e]
-    told = [e for errors in found.values() for e in errors]
+    reported = [e for errors in found.values() for e in errors]
     if as_json:
         echo_json({f: [_as_data(e) for e in es] for f, es in found.items()}, indent=2)
-        raise typer.Exit(2 if told else 0)
+        raise typer.Exit(2 if reported else 0)
     for file, errors in found.items():
         if not errors:
             echo(f"{file}: ok")
-    raise_errors(told)
+    raise_errors(reported)
 
 
 @app.command()

@@ -23,19 +23,19 @@ STYLES: dict[Kind, str] = {
 
 
 def task_tree(task: Task) -> Tree:
-    """The tree of a task for the terminal: stages with what they require, and declarations.
+    """The tree of a task for the terminal: stages with their requirements, and declarations.
 
     Args:
-        task: A task without mistakes.
+        task: A valid task.
 
     Returns:
-        A rich tree; each stage is opened where it is first referred to.
+        A rich tree; each stage is expanded at its first reference.
     """
     whole = outline(task)
     tree = Tree(_text(whole))
     _grow(tree, whole)
     declared = (
-        ("actors", _told(task.actors)),
+        ("actors", _shown_actors(task.actors)),
         ("zones", task.zones),
         ("parameters", task.parameters),
         ("invariants", task.invariants),
@@ -48,8 +48,8 @@ def task_tree(task: Task) -> Tree:
     return tree
 
 
-def _told(actors: Sequence[Actor]) -> tuple[Actor, ...]:
-    """Actors with one for all of whom a loop has another one in each round."""
+def _shown_actors(actors: Sequence[Actor]) -> tuple[Actor, ...]:
+    """The actors, with a single one in place of those that a loop takes one per iteration."""
     kinds = (replace(a, name=a.spare) if a.spare else a for a in actors)
     return tuple({a.name: a for a in reversed(tuple(kinds))}.values())[::-1]
 
