@@ -65,7 +65,7 @@ class ArrivalMonitor:
 
 
         Returns:
-            How many frames were recently missing, when too many; else 0.
+            Number of recently missing frames if too many, else 0.
         """
         last, self._last = self._last, (index, time)
         if last is None:

@@ -87,7 +87,7 @@ class StandstillDetector:
             time: Seconds.
 
         Returns:
-            What stopped moving, or None.
+            The cause of a standstill, or None.
         """
         if self._looks and self._looks[-1].small.shape != small.shape:
             self.forget()

@@ -106,7 +106,7 @@ class ShapeBehaviour:
             frame: The frame; its time and its size are used.
             observation: Holds the regions.
             directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
-                (data: names) compares these whatever the index says; 'rest' (data: behaviour,
+                (data: names) compares these regardless of the index; 'rest' (data: behaviour,
                 region, every_s) limits how often a region is matched.
         """
         if self.database is None:

@@ -29,7 +29,7 @@ LONG_S = 1.0
 """Time without a processed frame from which it is a warning, seconds."""
 
 PATIENCE_S = 5.0
-"""How long to wait for a reader to end, seconds; one stuck in its capture is abandoned."""
+"""Longest wait for a reader to end, seconds; one stuck in its capture is abandoned."""
 
 
 class RealTimeFrames(Iterator[Frame], ABC):

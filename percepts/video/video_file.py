@@ -247,7 +247,7 @@ def _head(path: Path) -> bytes:
 
 
 def _not_a_video(head: bytes) -> str | None:
-    """What a file is instead of a video, by its first bytes."""
+    """The actual type of a file that is no video, by its first bytes."""
     if head.startswith((b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\0", b"MM\0*")):
         return STILL_IMAGE
     return TEXT if _is_text(head) else None

@@ -55,7 +55,7 @@ def sentences(
 def _said(
     content: Sequence[tuple[int, str]], names: Container[str], verb: Verb
 ) -> Iterator[tuple[int, tuple[str, ...]]]:
-    """What words say of things, each with its place, those that say nothing left out."""
+    """The meaningful words of a sentence, each with its place; fillers are dropped."""
     said = [w for _, w in content]
     for shape in ((0, 1, 2), (1, 0, 2), (2, 0, 1), (1, 0), (0, 1)):
         if len(said) <= max(shape) or (content[0][0] > 0 and shape[0] > 0):

@@ -75,9 +75,8 @@ class CouplingSettings:
     Attributes:
         relations: Thresholds; those of the relations.
         near: Gap from which on two bodies are followed, image diagonals.
-        window_s: Over how long a relative velocity is taken, or longer after a gap; those of one window
-            count as one.
-        path_s: How far back their relative path is kept.
+        window_s: Window of a relative velocity, longer after a gap; those of one window count as one.
+        path_s: Length of the stored relative path, seconds.
         moving: Usual relative speed of bodies that are not at rest, image diagonals per second.
         still_share: Relative speed that still is rest, as a share of the speed at which both move: what is
             carried sways and turns, and errors of velocities grow with these; and
@@ -278,8 +277,7 @@ class CouplingReasoner(ExplainableReasoner):
         together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
         moving = common_speed(mind, seen.pair) > least
-        # That they move together was judged over a while of its own; and what goes along is hardly
-        # ever at rest to the other by chance.
+        # Moving together was judged over its own window, and is hardly ever relative rest by chance.
         share = 0.4 if together else s.carried_share if moving else 1.0
         yield at_least(text, evidence.rest_odds, share * s.odds)
         if not (moving or together) and evidence.rest_since is not None:

@@ -43,7 +43,7 @@ CORRELATION_S = 0.2
 """Correlation time of velocity errors, seconds."""
 
 PART_VARIANCE = 4.0
-"""Factor of variance when the motion of a whole body stands in for that of a part."""
+"""Factor of variance when the motion of a whole body replaces that of a part."""
 
 LEAST_POINTS = 12
 LEAST_SAMPLES = 5
@@ -250,7 +250,7 @@ def begin_relative_track(
 
 
 UNKNOWN_MOTION = (np.nan, np.nan, np.nan)
-"""Unknown image motion: that of a whole region says little about a part of a bending one."""
+"""Unknown image motion: that of a whole region is poor evidence for a part of a bending one."""
 
 
 def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:

@@ -231,7 +231,7 @@ class PieceCompiler:
 
 
 def horizon(node: Node) -> float:
-    """How far into the future a formula looks, microseconds."""
+    """Future horizon of a formula, microseconds."""
     match node:
         case FutureOperator(part=part, window=TimeWindow() as window):
             return _bounds(window)[1] + horizon(part)

@@ -88,7 +88,7 @@ def masks_overlap(a: Region, b: Region) -> bool:
 
 
 def shared_pixels(a: Region, b: Region) -> int:
-    """How many pixels two regions share."""
+    """Number of pixels shared by two regions."""
     x0, y0 = max(a.bbox[0], b.bbox[0]), max(a.bbox[1], b.bbox[1])
     x1 = min(a.bbox[0] + a.bbox[2], b.bbox[0] + b.bbox[2])
     y1 = min(a.bbox[1] + a.bbox[3], b.bbox[1] + b.bbox[3])
@@ -98,7 +98,7 @@ def shared_pixels(a: Region, b: Region) -> int:
 
 
 def pixels_in(region: Region, box: Box) -> int:
-    """How many pixels of a region lie in a box."""
+    """Number of pixels of a region in a box."""
     x0, y0 = max(region.bbox[0], box[0]), max(region.bbox[1], box[1])
     x1 = min(region.bbox[0] + region.bbox[2], box[0] + box[2])
     y1 = min(region.bbox[1] + region.bbox[3], box[1] + box[3])

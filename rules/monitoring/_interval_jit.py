@@ -99,7 +99,7 @@ def subtracted(v: Pair, w: Pair, p: float) -> Pair:
 
 @compiled
 def compared(v: Pair, w: Pair, p: float) -> Pair:
-    """How far one quantity is above another; `p` decides ties."""
+    """Margin of one quantity above another; `p` decides ties."""
     low, high = v[0] - w[1], v[1] - w[0]
     return (-inf if low != low else low) + p, (inf if high != high else high) + p
 

@@ -9,7 +9,7 @@ from visup.rules.formula.units import ticks
 from visup.rules.monitoring.intervals import Interval
 
 SAMPLE_HOLD = ticks(0.5)
-"""How long a sample remains valid, microseconds."""
+"""Validity of a sample, microseconds."""
 MIN_SPACING = ticks(0.01)
 """Samples closer than this are skipped, which bounds the content of a window; microseconds."""
 LONG_AGO = -(2**62)

@@ -1,6 +1,6 @@
 """A snapshot of a mind for rules: truths and quantities of all objects and pairs, as arrays.
 
-What was not observed is unknown, never false. Truths are codes: `YES`, `NO`, and `MAYBE` for unknown.
+Unobserved facts are unknown, never false. Truths are codes: `YES`, `NO`, and `MAYBE` for unknown.
 Quantities are intervals: value +- `SIGMAS` standard deviations where these are known.
 """
 

@@ -194,7 +194,7 @@ def healthy(facts: Snapshot) -> Codes:
 
 
 def spin(facts: Snapshot) -> Floats:
-    """How fast an object rotates, degrees per second.
+    """Rotation rate of an object, degrees per second.
 
     Its deviation is that of one sequence of views; while another is nearly as likely it is unknown.
     """

@@ -267,7 +267,7 @@ def _velocity(
         old, new = track.velocity, region.velocity
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
     if len(centroids) < 3:
-        # Too few positions: the last velocity is kept.
+        # Too few positions: retain the last velocity.
         return track.velocity
     middle = sum([t for t, _, _ in centroids]) / len(centroids)
     lever = sum([(t - middle) ** 2 for t, _, _ in centroids])

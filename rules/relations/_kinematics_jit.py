@@ -23,7 +23,7 @@ def hull_gaps(
         separation: (M, M) signed distances of the hulls, pixels; NaN unknown.
         before: (M, M) gaps of the previous step, pixels.
         near: Gap beyond which outlines are not used, pixels.
-        hold: How long the last gap is kept for bodies out of view, seconds.
+        hold: Time for which the last gap is held for bodies out of view, seconds.
 
     Returns:
         (P,) pixels, and numbers of pairs.

@@ -35,7 +35,7 @@ class RelationSettings:
         sigmas: Standard deviations of the slope that a trend must exceed to enter.
         pending_sigmas: The same while a trend is pending.
         trend_minimum_s: Least duration of a trend before it is accepted.
-        hold_s: How long the last gap is kept for bodies that flicker out of view.
+        hold_s: Time for which the last gap is held for bodies that flicker out of view.
         depth_rate: Least relative rate of depth, share of the depth per second.
         touch_enter: Outline gap at which bodies touch, image diagonals.
         touch_exit: Outline gap at which they no longer do.

@@ -75,7 +75,7 @@ def sampled(
         history: The samples before.
         objects: The objects that are present now, by id.
         mind: The mind.
-        observation: The observation, which says whether regions were looked for.
+        observation: The observation, which records whether regions were searched for.
         drift: (M, 2) pixels; see `SampleWindow`.
         limits: Length of the window, seconds; most samples in it: a sample that comes too soon is
             skipped.

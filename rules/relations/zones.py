@@ -50,7 +50,7 @@ class ZoneSettings:
         enter: Half width of the hysteresis band about a zone's edge, image diagonals.
         depth_sigmas: The same for depth, in standard deviations of the object's depth.
         minimum_s: Least duration before a change is accepted.
-        hold_s: How long the last sighting is kept for a body that flickers out of view.
+        hold_s: Time for which the last sighting is held for a body that flickers out of view.
         points: Most points of an outline that are tested.
     """
 
@@ -250,7 +250,7 @@ def _relation(kept: ZoneMemory, question: str, object_id: int, zone: str) -> Rel
 
 
 def _beyond(zone: Zone, belief: ObjectBelief) -> float:
-    """How far the depth is outside the zone's range; -inf if the zone has none."""
+    """Distance of the depth outside the zone's range; -inf if the zone has none."""
     if zone.depth is None:
         return -np.inf
     if belief.depth is None:

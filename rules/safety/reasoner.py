@@ -118,7 +118,7 @@ class RuleReasoner:
 def once_per_machine(
     conditions: tuple[AlertCondition, ...], mind: Mind
 ) -> tuple[AlertCondition, ...]:
-    """Drop conditions that repeat for another part of a machine what one already says.
+    """Drop conditions that repeat another one for a different part of a machine.
 
     Those of an open alert stay; else the most severe stays, the first among equals.
     """

@@ -92,7 +92,7 @@ SHADES: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 
 def colour_fit(words: str, lightness: float, a: float, b: float) -> float:
-    """How well a colour fits words for it.
+    """Fit of a colour to its words.
 
     Args:
         words: `red`, `dark blue`.

@@ -39,7 +39,7 @@ _DOUBLED = re.compile(r",(?=\s*[,.;:!?])")
 
 
 def believed_name(mind: Mind, object_id: int) -> str | None:
-    """What an object is called: its actor in a task, else an actor bound to its model, else the model.
+    """Name of an object: its actor in a task, else an actor bound to its model, else the model.
 
     Args:
         mind: The mind.
@@ -95,7 +95,7 @@ def individual_name(mind: Mind, object_id: int) -> str | None:
 
 
 def called(mind: Mind, model: str) -> str:
-    """What an object of a model is called: the actor that is bound to the model, else the model."""
+    """Name of an object of a model: the actor that is bound to the model, else the model."""
     return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
 
 
@@ -229,7 +229,7 @@ def indefinite(noun: str) -> str:
 
 
 def with_article(mind: Mind, model: str) -> str:
-    """What an object of a model is called, with its article."""
+    """Name of an object of a model, with its article."""
     name = called(mind, model)
     of_kind = name == model and model in mind.recall(KIND_NAMES)
     return indefinite(spaced(name)) if of_kind else f"the {spaced(name)}"

@@ -13,8 +13,8 @@ Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
 _STEPS = 16  # bins of lightness and of each colour; 4096 in all
-# Shares of the pixels below which a colour says little. A colour met neither on the object nor around it
-# probably belongs to something else: it counts slightly against the object.
+# Shares of the pixels below which a colour is not distinctive. A colour seen neither on the object nor around
+# it probably belongs to something else: it counts slightly against the object.
 _RARE, _STRANGE = np.float32(1 / 1500), np.float32(1 / 450)
 _CLIP = np.float32(3.0)
 

@@ -199,7 +199,7 @@ def covered_pixels(
     by: tuple[int, int],
     count: int,
 ) -> NDArray[np.int64]:
-    """How many pixels of each of `count` cells some old cells cover when moved by (x, y) pixels."""
+    """Pixels of each of `count` cells covered by some old cells moved by (x, y) pixels."""
     dx, dy = by
     out = np.zeros(count, np.int64)
     height, width = new.shape

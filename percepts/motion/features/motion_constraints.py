@@ -2,7 +2,7 @@
 
 A corner fixes both components of its motion, an edge only the one across it (the aperture
 problem). Both are carried in one form: a displacement with a 2 x 2 information matrix, whose
-small eigenvalue says along which direction nothing is known (paper, section 3; Chung, MacLean and
+small eigenvalue marks the direction that is not constrained (paper, section 3; Chung, MacLean and
 Dickinson). Points are taken only where the image has structure, because dense flow invents motion
 in a dark sky.
 """

@@ -239,7 +239,7 @@ def _border_distance(cells: Superpixels) -> Floats:
 
 
 def _inside(flow: Floats, labels: Labels, median: float, looked: Floats) -> Floats:
-    """How far flow edges enclose each cell, (count,) 0 to 1."""
+    """Degree to which flow edges enclose each cell, (count,) 0 to 1."""
     coarse = flow[::4, ::4]
     right, down = (
         np.diff(coarse, axis=1, append=coarse[:, -1:]),

@@ -131,7 +131,7 @@ class ExpectedBackground:
 
     Attributes:
         camera: The camera's motion over the baseline, as predicted.
-        fixed_too: Whether things fixed to the camera are background as well.
+        fixed_too: Whether objects fixed to the camera are background as well.
         prevalence: Which motion prevailed where.
     """
 
@@ -232,7 +232,7 @@ def _spans(
 
 def _scale(m2: Floats, weight: Floats, cell: NDArray[np.int64]) -> float:
     """Robust width of the errors of the background, from their weighted 40 % quantile."""
-    # A small part of the view says nothing about the whole.
+    # A small part of the view does not represent the whole.
     if len(np.unique(cell[weight > 0])) < 0.25 * BALANCE_GRID[0] * BALANCE_GRID[1]:
         return 1.0
     order = np.argsort(m2, kind="stable")

@@ -87,7 +87,7 @@ def _former_owner(
     for i, t in enumerate(tracks):
         if not t.id or t.recent_share is None:
             continue
-        # What emerges from behind an object is not a part of it.
+        # A region emerging from behind an object is not a part of it.
         others = [
             o.predicted_share > BEHIND
             for o in tracks
@@ -109,7 +109,7 @@ def _uncovered(
 ) -> int | None:
     """Owner of a part that turned up where a track was: the track, unless another moves like the part.
 
-    What an occluder uncovers moves like the hidden object and lies beside the rest of it.
+    A region uncovered by an occluder moves like the hidden object and adjoins the rest of it.
     """
     near = scene.cells.dilated(where[:, None], NEAR_STEPS)[:, 0]
     best, most = host, 0

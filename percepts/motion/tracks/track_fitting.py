@@ -155,7 +155,7 @@ def _whole_rate(
 
 
 def _middle_of(c: Constraints, weight: Floats) -> tuple[float, float]:
-    """Centre of a part; a motion fitted there says little about other places."""
+    """Centre of a part; a motion fitted there extrapolates poorly."""
     x, y = c.xy[weight > 0].mean(axis=0)
     return float(x), float(y)
 

@@ -45,7 +45,7 @@ from visup.percepts.shape.silhouette.height_functions import outline_heights
 from visup.percepts.taught.view import TaughtView
 
 WHAT = "this model database"
-"""What messages about the file lock call a database."""
+"""Name of a database in messages about the file lock."""
 
 
 def write_new(

@@ -43,7 +43,7 @@ class QueryOptions(TypedDict, total=False):
         per_name: Most views of one model among them; unlimited when None, the default.
         threshold: Least similarity; default 0.
         restrict: The only names to search; all when None, the default.
-        try_first: Names whose likeliest views are compared whatever the index says.
+        try_first: Names whose likeliest views are compared regardless of the index.
         mirror: Whether a view also matches by its mirror image, which is its silhouette from behind;
             default True.
     """
@@ -271,7 +271,7 @@ class ModelDatabase:
 
 
 def candidates_wanted(views: int, budget: float = 0.1) -> int:
-    """How many of `views` are compared in full: a share of them, within limits (see `query`)."""
+    """Number of `views` compared in full: a share of them, within limits (see `query`)."""
     if budget >= 1:
         return views
     return int(min(CANDIDATES, max(16 if budget >= 0.1 else 4, budget * views)))

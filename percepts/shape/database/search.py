@@ -190,7 +190,7 @@ class ViewSearch:
             query: The shape.
             among: Numbers of the views to search, ascending.
             wanted: Limits.
-            favoured: Numbers of views of which as many again are compared, whatever the index says.
+            favoured: Numbers of views of which as many again are compared, regardless of the index.
         """
         likely = self.index.candidates(query, among, wanted.most, favoured)
         shapes = [self._shapes[k] for k in likely.numbers]

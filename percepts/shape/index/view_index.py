@@ -72,7 +72,7 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewSummaries:
-    """What the first two stages need of views.
+    """The data of views for the first two stages.
 
     Attributes:
         roots: (V,) records of `view_records.NODE`.

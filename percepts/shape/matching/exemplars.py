@@ -59,7 +59,7 @@ def medoids(similarity: NDArray[np.float64], count: int) -> list[int]:
 
 
 def _covered(similarity: NDArray[np.float64], chosen: list[int]) -> float:
-    """How well all members are represented: the sum of similarities to the nearest exemplar."""
+    """Quality of the representation of all members: the sum of similarities to the nearest exemplar."""
     return float(similarity[:, chosen].max(axis=1).sum())
 
 

@@ -27,7 +27,7 @@ BREAK = 0.9
 
 @dataclass(frozen=True, slots=True)
 class MatchWeights:
-    """How much each feature of a node counts when two nodes are compared.
+    """Weight of each node feature in the comparison of two nodes.
 
     Attributes:
         kind: Different kinds of shock.
@@ -155,7 +155,7 @@ def correspond(
 
     The best pair of a best matching is accepted; every pair that contradicts it, with one node below its
     node and the other not, is from then on worth `BREAK` of its value; and so on with the rest. The
-    matching is solved anew only when one of its pairs lost value: the rest of a best matching whose
+    matching is solved again only when one of its pairs lost value: the rest of a best matching whose
     pairs keep their value is a best matching of the rest.
 
     Args:

@@ -41,7 +41,7 @@ def heights_along(points: NDArray[np.float64], stops: NDArray[np.intp], out: Flo
 
 @compiled
 def complexity(heights: Floats) -> float:
-    """How much heights vary along an outline: the mean of their standard deviations."""
+    """Variation of heights along an outline: the mean of their standard deviations."""
     count, width = heights.shape
     total = 0.0
     for k in range(width):
