@@ -3,7 +3,7 @@
 Rooms, in reading order:
 
 - `scenario`: the format of scenario files, trajectories, camera and light, the shipped scenarios.
-- `meshes`: solids that stand in scenes: spacecraft, an arm, animals, distractors.
+- `meshes`: the solids in scenes: spacecraft, an arm, animals, distractors.
 - `imaging`: the renderer: ray casting over a background through a sensor.
 - `output`: ground truth, mission folders, the demo clip and its model database.
 

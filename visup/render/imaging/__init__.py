@@ -1,5 +1,5 @@
-"""Images from scenes: rays are cast from the camera, shaded, put before a background and exposed.
+"""Images of scenes: ray casting, shading, background and exposure.
 
-Read `scene_poses` (where everything is at a time), `renderer` (the frame loop), `raycast` (which face a ray
-meets), `texture`, `background`, `sensor`.
+Read `scene_poses` (poses at a time), `renderer` (the frame loop), `raycast` (which face a ray hits),
+`texture`, `background`, `sensor`.
 """

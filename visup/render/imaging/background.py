@@ -1,4 +1,4 @@
-"""What is behind everything: stars, a cloudy Earth with its limb, or a patterned surface far away."""
+"""Backgrounds: stars, a cloudy Earth with its limb, or a distant patterned surface."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from visup.render.scenario.trajectories import spin_about
 Floats = NDArray[np.float32]
 EARTH_RADIUS_KM = 6371.0
 MAP_SIDE = 1536
-"""Pixels along each side of the map of clouds."""
+"""Side of the cloud map, pixels."""
 
 AIR_KM = 60.0
-"""Height of the air that shows as the bright rim of the Earth."""
+"""Height of the atmosphere that appears as the bright limb of the Earth."""
 
 OCEAN = np.array([0.30, 0.17, 0.08], np.float32)
 CLOUD = np.array([0.95, 0.95, 0.95], np.float32)
@@ -32,7 +32,7 @@ def stars(camera: Camera, rotation: NDArray[np.float64], settings: Stars | Earth
     Args:
         camera: Size and field of view.
         rotation: (3, 3), camera to world.
-        settings: How many stars and how bright the brightest ones are.
+        settings: Number of stars and brightness of the brightest ones.
 
     Returns:
         (H, W, 3) float32 radiance, BGR.
@@ -40,7 +40,7 @@ def stars(camera: Camera, rotation: NDArray[np.float64], settings: Stars | Earth
     width, height = camera.size
     random = np.random.default_rng(settings.seed)
     directions = random.standard_normal((settings.count, 3))
-    # Three times as many stars per magnitude, which is what the sky has.
+    # Three times as many stars per magnitude, as in the real sky.
     light = 3.0 ** (-4.0 * random.random(settings.count)) * min(settings.brightness, 1.0)
     seen = directions @ rotation
     front = seen[:, 2] > 0
@@ -58,12 +58,12 @@ def earth(
 
     Args:
         rays: (N, 3) float32 unit directions, world.
-        rotation: (3, 3), turns the world to what the Earth itself is drawn in; see `ground_turn`.
+        rotation: (3, 3), from the world to the Earth's own frame; see `ground_turn`.
         settings: Altitude, clouds, brightness.
-        light: Where the Earth and the sun are.
+        light: Directions of the Earth and the sun.
 
     Returns:
-        (N, 3) float32 radiance, BGR, and (N,) bool, whether the ray meets the Earth or its air.
+        (N, 3) float32 radiance, BGR, and (N,) bool, whether the ray hits the Earth or its atmosphere.
     """
     down = np.asarray(light.earth, float) / np.linalg.norm(light.earth)
     sun = np.asarray(light.sun, float) / np.linalg.norm(light.sun)
@@ -90,7 +90,7 @@ def earth(
 
 
 def panorama(rays: Floats, settings: Panorama) -> Floats:
-    """A patterned surface far away on all sides, still in the world.
+    """A distant patterned surface on all sides, at rest in the world.
 
     Args:
         rays: (N, 3) float32 unit directions, world.
@@ -105,18 +105,19 @@ def panorama(rays: Floats, settings: Panorama) -> Floats:
 
 
 def ground_turn(settings: Earth, time: float) -> NDArray[np.float64]:
-    """(3, 3): how the ground has turned under the camera at a time."""
+    """(3, 3) rotation of the ground under the camera at a time."""
     turn = spin_about(np.asarray(settings.turn_axis, float), settings.turn_deg_per_s * time)
     return np.asarray(turn.as_matrix())
 
 
 def clouds(ground: NDArray[np.float64], extent: float, amount: float, seed: int) -> Floats:
-    """How much cloud there is over places on the ground.
+    """Cloud cover over points on the ground.
 
     Args:
-        ground: (N, 2) places in the plane through the middle of the Earth, across the line of sight to
-            it, in Earth radii; they may lie anywhere, the weather repeats.
-        extent: Half the side of the square that is drawn, Earth radii.
+        ground: (N, 2) points in the plane through the centre of the Earth, normal to the line of sight to it,
+            in
+            Earth radii; unbounded, since the pattern repeats.
+        extent: Half the side of the map, Earth radii.
         amount: 0 for a clear sky to 1 for an overcast one.
         seed: Chooses the weather.
 
@@ -130,7 +131,7 @@ def clouds(ground: NDArray[np.float64], extent: float, amount: float, seed: int)
 
 @lru_cache(maxsize=4)
 def _cloud_map(extent: float, amount: float, seed: int) -> Floats:
-    """(MAP_SIDE, MAP_SIDE): noise of six sizes added up, thresholded to clouds with soft edges."""
+    """(MAP_SIDE, MAP_SIDE): six octaves of noise, thresholded to clouds with soft edges."""
     random = np.random.default_rng(seed)
     total = np.zeros((MAP_SIDE, MAP_SIDE), np.float32)
     weight, cells = 0.5, 30.0
@@ -144,7 +145,7 @@ def _cloud_map(extent: float, amount: float, seed: int) -> Floats:
 
 
 def _across(down: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 2): two directions square to one and to each other."""
+    """(3, 2): two directions perpendicular to one and to each other."""
     other = np.eye(3)[int(np.argmin(np.abs(down)))]
     first = np.cross(down, other)
     first /= np.linalg.norm(first)
@@ -154,7 +155,7 @@ def _across(down: NDArray[np.float64]) -> NDArray[np.float64]:
 def _splat(
     image: Floats, x: NDArray[np.float64], y: NDArray[np.float64], light: NDArray[np.float64]
 ) -> None:
-    """Add points of light, shared bilinearly between four pixels."""
+    """Add points of light, distributed bilinearly over four pixels."""
     height, width = image.shape
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = x - x0, y - y0

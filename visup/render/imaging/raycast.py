@@ -1,6 +1,6 @@
-"""Casting rays at the bodies of a scene, in the camera's frame.
+"""Ray casting against the bodies of a scene, in the camera's frame.
 
-Everything here stands in camera coordinates: x right, y down, z forward, metres, the pinhole at the
+Everything is in camera coordinates: x right, y down, z forward, metres, the pinhole at the
 origin. Rays are cast by Embree in single precision.
 """
 
@@ -18,12 +18,12 @@ from visup.render.meshes.solids import Solid
 
 Floats = NDArray[np.float32]
 OFFSET = 1e-3
-"""Metres by which a shadow ray starts off its surface, so as not to hit it again."""
+"""Offset of the origin of a shadow ray from its surface, metres, to avoid hitting it again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A solid placed before the camera.
+    """A solid posed in the camera's frame.
 
     Attributes:
         name: Its name.
@@ -40,12 +40,12 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hits:
-    """What N rays met.
+    """Hits of N rays.
 
     Attributes:
-        body: (N,) int32, index of the body, -1 where nothing was met.
-        face: (N,) int32, index of the face in the whole scene, -1 where nothing was met.
-        distance: (N,) float32, along the ray in units of its direction; infinite where nothing was met.
+        body: (N,) int32, index of the body, -1 for no hit.
+        face: (N,) int32, index of the face in the whole scene, -1 for no hit.
+        distance: (N,) float32, along the ray in units of its direction; infinite for no hit.
     """
 
     body: NDArray[np.int32]
@@ -54,7 +54,7 @@ class Hits:
 
 
 class RayCaster:
-    """All bodies of a frame, ready for rays.
+    """All bodies of a frame, prepared for ray casting.
 
     Args:
         bodies: At least one.
@@ -89,11 +89,11 @@ class RayCaster:
         return self.cast(np.zeros_like(directions), directions)
 
     def blocked(self, points: Floats, normals: Floats, direction: Floats) -> NDArray[np.bool_]:
-        """Whether something stands between points and a distant light.
+        """Whether something blocks a distant light from points.
 
         Args:
             points: (N, 3) on surfaces.
-            normals: (N, 3) unit, on the side of the surface that is meant.
+            normals: (N, 3) unit, on the visible side of the surface.
             direction: (3,) unit, towards the light.
 
         Returns:

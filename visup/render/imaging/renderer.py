@@ -1,4 +1,4 @@
-"""The frame loop: from a scenario and a number to a picture, a mask and what is true of it."""
+"""The frame loop: from a scenario and a frame number to an image, a mask and ground truth."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from visup.render.scenario.trajectories import (
 
 Floats = NDArray[np.float32]
 SUBRAYS = 3
-"""Rays along each side of a pixel on an edge; other pixels take one."""
+"""Rays along each side of a pixel on an edge; other pixels have one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,8 +32,8 @@ class RenderedFrame:
     Attributes:
         index: Number of the frame.
         image: (H, W, 3) uint8, BGR.
-        mask: (H, W) uint8, the label of what the ray through the middle of each pixel meets.
-        amodal_px: For each labelled object, pixels it would show with nothing before it.
+        mask: (H, W) uint8, the label hit by the ray through the centre of each pixel.
+        amodal_px: For each labelled object, its pixels if nothing occluded it.
         poses: For each labelled rigid object, (4, 4) from its frame to the camera's; arms have none.
     """
 
@@ -48,8 +48,8 @@ def pixel_rays(camera: Camera, at: NDArray[np.float64] | None = None) -> Floats:
     """Directions of rays through points of the image.
 
     Args:
-        camera: Size and field of view; square pixels, the axis through the middle of the image.
-        at: (N, 2) points (x, y) in pixels, the centres of all pixels row by row when None.
+        camera: Size and field of view; square pixels, the optical axis through the centre of the image.
+        at: (N, 2) points (x, y) in pixels; None for the centres of all pixels, row by row.
 
     Returns:
         (N, 3) float32 in the camera's frame, z = 1.
@@ -64,13 +64,13 @@ def pixel_rays(camera: Camera, at: NDArray[np.float64] | None = None) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """How the scene is seen at a time.
+    """Camera and light at a time.
 
     Attributes:
         time: Seconds.
-        camera: As zoomed.
+        camera: With its current zoom.
         pose: (4, 4), from the camera's frame to the world's.
-        light: As strong as it is.
+        light: With its current strength.
         rays: (H * W, 3) float32 through the pixels, row by row, in the camera's frame.
     """
 
@@ -82,7 +82,7 @@ class CameraView:
 
 
 class Renderer:
-    """Makes any frame of a scenario, in any order.
+    """Renders any frame of a scenario, in any order.
 
     Args:
         scenario: What to render.
@@ -104,7 +104,7 @@ class Renderer:
             index: Number of the frame, from 0.
 
         Returns:
-            The frame; the same for the same scenario and index, whatever was rendered before.
+            The frame; depends only on the scenario and the index.
         """
         view = self.view(index)
         bodies = self.scene.bodies(view.time, view.pose)
@@ -126,7 +126,7 @@ class Renderer:
         )
 
     def mask(self, index: int) -> NDArray[np.uint8]:
-        """The mask of a frame alone, (H, W) uint8, as in `picture` but in a fraction of its time."""
+        """Only the mask of a frame, (H, W) uint8, as from `picture` but much faster."""
         view = self.view(index)
         bodies = self.scene.bodies(view.time, view.pose)
         inside = self._window(bodies, view)
@@ -135,7 +135,7 @@ class Renderer:
         )
 
     def view(self, index: int) -> CameraView:
-        """How the scene is seen in a frame."""
+        """Camera and light in a frame."""
         time = index / self.scenario.camera.fps
         camera = self.scenario.camera.at(time)
         if self._rays is None or self._rays[0] != camera.fov_vertical_deg:
@@ -144,12 +144,12 @@ class Renderer:
         return CameraView(time, camera, self.scene.camera_pose(time), light, self._rays[1])
 
     def _labels(self, bodies: list[Body], hits: Hits) -> NDArray[np.uint8]:
-        """(H, W): the label of what each ray met."""
+        """(H, W): the label that each ray hit."""
         width, height = self.scenario.camera.size
         return np.array([*(b.label for b in bodies), 0], np.uint8)[hits.body].reshape(height, width)
 
     def _window(self, bodies: list[Body], view: CameraView) -> NDArray[np.bool_]:
-        """(H * W,): the pixels inside the boxes that the bodies project to."""
+        """(H * W,): the pixels inside the bounding boxes of the projected bodies."""
         width, height = view.camera.size
         window = np.zeros((height, width), bool)
         for body in bodies:
@@ -158,7 +158,7 @@ class Renderer:
         return window.ravel()
 
     def _amodal(self, bodies: list[Body], view: CameraView) -> dict[str, int]:
-        """Pixels of each labelled object were it alone."""
+        """Pixels of each labelled object without occluders."""
         counts = {}
         for body in bodies:
             if not body.label:
@@ -169,7 +169,7 @@ class Renderer:
         return counts
 
     def _background(self, view: CameraView) -> Floats:
-        """(H, W, 3) radiance; kept from frame to frame while nothing of it changes."""
+        """(H, W, 3) radiance; cached between frames while it does not change."""
         settings = self.scenario.background
         moving = isinstance(settings, Earth) and settings.turn_deg_per_s != 0
         lens, light = view.camera.fov_vertical_deg, view.light.strength
@@ -205,7 +205,7 @@ class Renderer:
         face, rays = hits.face[met], rays[met]
         points = rays * hits.distance[met][:, None]
         normals = caster.normals[face]
-        # Thin shells are seen from both sides: a surface always shows the side that is turned to us.
+        # Thin shells are two-sided: normals always face the camera.
         normals = np.where(np.sum(normals * rays, axis=1, keepdims=True) > 0, -normals, normals)
         light = view.light
         sun, earth = (_to_camera(view.pose, d) for d in (light.sun, light.earth))
@@ -220,7 +220,7 @@ class Renderer:
         return radiance
 
     def _grain(self, caster: RayCaster, body: NDArray[np.int32], points: Floats) -> Floats:
-        """(N,) factors of reflectance at points on bodies, by the textures of these."""
+        """(N,) factors of reflectance at points on bodies, from their textures."""
         factor = np.ones(len(points), np.float32)
         for number, placed in enumerate(caster.bodies):
             texture = self.scene.objects[placed.name].texture
@@ -258,7 +258,7 @@ def _to_camera(camera: Matrix, direction: tuple[float, float, float]) -> Floats:
 
 
 def _spread(hits: Hits, inside: NDArray[np.bool_]) -> Hits:
-    """Hits of some rays, put in their places among all."""
+    """Hits of some rays, scattered into the array of all."""
     body = np.full(len(inside), -1, np.int32)
     face = np.full(len(inside), -1, np.int32)
     distance = np.full(len(inside), np.inf, np.float32)
@@ -267,7 +267,7 @@ def _spread(hits: Hits, inside: NDArray[np.bool_]) -> Hits:
 
 
 def _edges(radiance: Floats, body: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(H, W): pixels next to another body, or to clearly lighter or darker light on the same one."""
+    """(H, W): pixels next to another body, or to clearly different shading on the same one."""
     grey = np.sqrt(radiance.mean(axis=2))
     kernel = np.ones((3, 3), np.uint8)
     contrast = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, kernel) > 0.05
@@ -277,7 +277,7 @@ def _edges(radiance: Floats, body: NDArray[np.int32]) -> NDArray[np.bool_]:
 
 
 def _projected_box(body: Body, camera: Camera) -> tuple[int, int, int, int]:
-    """(x0, y0, x1, y1), half open: pixels that a body may touch; all of them if it passes the pinhole."""
+    """(x0, y0, x1, y1), half open: pixels that a body may cover; all if it passes the pinhole."""
     width, height = camera.size
     points = body.solid.vertices @ body.pose[:3, :3].T + body.pose[:3, 3]
     near = 1e-3

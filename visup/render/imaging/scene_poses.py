@@ -1,4 +1,4 @@
-"""Where everything of a scenario is at a time: the camera, the objects, the joints of arms."""
+"""Poses of a scenario at a time: the camera, the objects, the joints of arms."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from visup.render.scenario.trajectories import (
 
 
 class PosedScene:
-    """The camera and the bodies of a scenario, placed at any time.
+    """Poses of the camera and the bodies of a scenario at any time.
 
     Args:
-        scenario: What is in the scene.
+        scenario: The scenario.
 
     Raises:
         SettingsError: A mesh is missing.
@@ -54,7 +54,7 @@ class PosedScene:
         return pose_of(at[:3], rotation)
 
     def bodies(self, time: float, camera: Matrix) -> list[Body]:
-        """All objects, placed before the camera."""
+        """All objects, in the camera's frame."""
         to_camera = inverse(camera)
         placed = []
         for item in self.scenario.object:
@@ -65,7 +65,7 @@ class PosedScene:
         return placed
 
     def object_pose(self, item: SceneObject, time: float) -> Matrix:
-        """(4, 4) from an object's frame to the world's; for an arm, of its foot."""
+        """(4, 4) from an object's frame to the world's; for an arm, that of its foot."""
         if item.attach is not None and time > item.attach.from_s:
             carrier, since = self.objects[item.attach.to], item.attach.from_s
             carried = inverse(self.grip(carrier, since)) @ self.object_pose(item, since)
@@ -73,7 +73,7 @@ class PosedScene:
         return track_pose(item, time)
 
     def grip(self, item: SceneObject, time: float) -> Matrix:
-        """The frame that things attached to an object move with."""
+        """The frame in which things attached to an object are at rest."""
         pose = self.object_pose(item, time)
         return pose @ arm_model.tip_pose(self._joints(item, time)) if item.mesh == "arm" else pose
 
@@ -101,7 +101,7 @@ class PosedScene:
 
 
 def track_pose(item: SceneObject, time: float) -> Matrix:
-    """(4, 4) of an object by its keyframes and spins alone, world."""
+    """(4, 4) world pose of an object from its keyframes and spins alone."""
     keys = item.track
     times = np.array([k.at_s for k in keys])
     position = value_at(times, np.array([k.position for k in keys]), time, item.smooth)

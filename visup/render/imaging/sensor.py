@@ -12,15 +12,14 @@ from visup.render.scenario.optics import Sensor
 def expose(
     radiance: NDArray[np.float32], sensor: Sensor, seed: int, index: int
 ) -> NDArray[np.uint8]:
-    """The picture a sensor takes of the light that falls on it.
+    """The image that a sensor records.
 
-    Noise is drawn from the seed and the number of the frame alone, so that any frame can be made
-    without those before it.
+    Noise depends only on the seed and the frame number, so that frames can be rendered in any order.
 
     Args:
         radiance: (H, W, 3) float32, linear, 1.0 for a white surface square to the sun; BGR.
         sensor: Exposure and flaws.
-        seed: Of the noise.
+        seed: Seed of the noise.
         index: Number of the frame.
 
     Returns:

@@ -1,4 +1,4 @@
-"""A pattern in space: value noise of several sizes, which a surface cuts as a saw cuts wood."""
+"""Solid texture: several octaves of value noise in space."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIDE = 32
 
 OCTAVES = 4
 STEEP = 2.2
-"""Sums of noise crowd round the middle: this spreads them over the range."""
+"""Contrast factor: sums of noise concentrate around zero."""
 
 
 def pattern(points: NDArray[np.floating], seed: int) -> Floats:
@@ -34,7 +34,7 @@ def pattern(points: NDArray[np.floating], seed: int) -> Floats:
     for _ in range(OCTAVES):
         cell = np.floor(at)
         step = at - cell
-        # Eased within each cell, or the eye sees the lattice.
+        # Smoothstep within each cell hides the lattice.
         eased = cell + step * step * (3 - 2 * step)
         total += np.float32(weight) * map_coordinates(lattice, eased.T, order=1, mode="grid-wrap")
         most += weight

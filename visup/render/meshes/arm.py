@@ -1,4 +1,4 @@
-"""The robot arm: where its six joints stand, and which angles bring its tip to a place.
+"""The robot arm: forward and inverse kinematics of its six joints, and its mesh.
 
 The arm's frame has its origin at the foot of the shoulder, z along the axis of the shoulder's yaw, and
 x along the arm stretched out at angle zero. Joints in order: shoulder yaw, shoulder pitch, elbow
@@ -43,7 +43,7 @@ class Joints:
 
 
 def link_poses(joints: Joints) -> list[NDArray[np.float64]]:
-    """Where the links are.
+    """Forward kinematics: the poses of the links.
 
     Args:
         joints: The angles.
@@ -82,22 +82,22 @@ def reach(
     roll: float = 0.0,
     elbow_up: bool = True,
 ) -> Joints:
-    """The angles that bring the tip to a place, pointing in a direction.
+    """Inverse kinematics: the angles for a position and direction of the tip.
 
     The axes of the three pitch joints are parallel, so the booms and the first wrist link lie in one
     plane with the yaw axis of the shoulder; the wrist's yaw alone leads out of that plane.
 
     Args:
         tip: (3,) metres, in the arm's frame.
-        direction: (3,) the way the end effector points, any length but zero.
+        direction: (3,) direction of the end effector, any length but zero.
         roll: Radians, of the wrist.
-        elbow_up: Which of the two ways to bend.
+        elbow_up: Which of the two solutions to take.
 
     Returns:
         The angles.
 
     Raises:
-        SettingsError: The place is out of reach.
+        SettingsError: The position is out of reach.
     """
     d = np.asarray(direction, float) / np.linalg.norm(direction)
     wrist_yaw_at = np.asarray(tip, float) - (HAND + TOOL) * d

@@ -1,6 +1,6 @@
-"""Seventeen things that are neither satellite nor arm, to be told apart from them by their outline.
+"""Seventeen objects that are neither satellite nor arm, as distractors for recognition by outline.
 
-All are built from primitives, upright along z, a metre or a few in size.
+All are built from primitives, upright along z, one to a few metres in size.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Thirteen machines, to be recognised among other things by their outline, and to stand for strangers.
+"""Thirteen machines, for recognition by outline and as unknown objects.
 
-Each is built from primitives, upright along z, a metre or a few in size; parts overlap, which changes no
-silhouette.
+Each is built from primitives, upright along z, one to a few metres in size; parts overlap, which does not
+change silhouettes.
 """
 
 from __future__ import annotations

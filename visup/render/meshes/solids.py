@@ -1,7 +1,7 @@
-"""Solids and the primitives they are made of.
+"""Solids and their primitives.
 
-A solid is a triangle mesh with a reflectance for each face. Solids are joined by laying their
-triangles side by side: parts may overlap, which changes neither silhouettes nor shading.
+A solid is a triangle mesh with a reflectance for each face. Joining solids concatenates their triangles:
+parts may overlap, which changes neither silhouettes nor shading.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Solid:
         turn: ArrayLike = (0.0, 0.0, 0.0),
         scale: ArrayLike = 1.0,
     ) -> Solid:
-        """The solid scaled, then turned, then shifted.
+        """The solid scaled, then rotated, then translated.
 
         Args:
             by: (3,) shift.
@@ -104,7 +104,7 @@ def from_trimesh(mesh: trimesh.Trimesh, colour: Colour = GREY) -> Solid:
 
 
 def box(size: ArrayLike, at: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY) -> Solid:
-    """A box of (x, y, z) extents with its middle at a point."""
+    """A box of (x, y, z) extents, centred at a point."""
     return from_trimesh(trimesh.creation.box(extents=np.asarray(size, float)), colour).moved(by=at)
 
 

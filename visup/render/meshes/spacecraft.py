@@ -149,7 +149,7 @@ def read_mesh(path: Path) -> Solid:
     try:
         loaded = trimesh.load_mesh(path)
         solid = from_trimesh(loaded)
-    except Exception as error:  # readers of mesh files raise whatever their format makes them raise
+    except Exception as error:  # the exceptions of mesh readers depend on the format
         raise SettingsError(
             f"the mesh cannot be read: {error}",
             where=str(path),

@@ -1,4 +1,4 @@
-"""Random missions in orbit: an arm, a satellite, sometimes a stranger, and what comes of it.
+"""Random missions in orbit: an arm, a satellite, sometimes an unexpected object, and an outcome.
 
-Read `courses` (what happens), then `scenes` (what it is filmed with), then `random_orbit` (draws one).
+Read `courses` (the events), then `scenes` (camera and light), then `random_orbit` (draws a mission).
 """

@@ -1,4 +1,4 @@
-"""How a capture goes: the ways of arm, satellite and stranger, and what is true of them.
+"""Courses of a capture: trajectories of arm, satellite and unexpected object, with ground truth.
 
 World as in the shipped `sts87`: metres, the camera at the origin looks along x, y to the left, z up.
 """
@@ -27,27 +27,27 @@ Vector = NDArray[np.float64]
 Verdict = Literal["succeeded", "failed", "interrupted", "in_progress"]
 
 OUTCOMES = ("ok", "lost", "aborted", "intruder", "crossing", "short")
-"""Captured; touched and sent away; the arm draws back; a stranger comes at the satellite, or passes before
-it; the clip ends before the two touch."""
+"""Captured; knocked away; the arm draws back; an unexpected object approaches the satellite, or passes in front
+of it; the clip ends before contact."""
 
 SCORED_FROM_S = 2.0
 SHOWS_AFTER_S = 0.8
-"""What fails is plain to see so long after it began."""
+"""Seconds after which a failure is visible."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Approach:
-    """What all courses begin with: the arm's tip draws near to a place on the satellite.
+    """The approach with which all courses begin: the arm's tip moves towards a point on the satellite.
 
     Attributes:
-        contact: (3,) where the two would touch.
-        away: (3,) unit, from the satellite back along the tip's way.
-        pointing: (3,) the way the end effector points.
+        contact: (3,) point of contact.
+        away: (3,) unit, from the satellite back along the tip's path.
+        pointing: (3,) direction of the end effector.
         begin: Metres between tip and contact at the start.
-        drift: (3,) metres per second of the satellite before anything touches it.
-        spin: How it turns by then.
-        touch_s: When they touch, or would.
-        end_s: When the clip ends.
+        drift: (3,) velocity of the satellite before contact, metres per second.
+        spin: Its rotation until then.
+        touch_s: Time of contact, also if it does not happen.
+        end_s: End of the clip.
     """
 
     contact: Vector
@@ -65,24 +65,24 @@ class Approach:
         return self.begin / self.touch_s
 
     def satellite_at(self, time: float, at_touch: Vector) -> Vector:
-        """Where the satellite is while nothing touches it, from where it would be touched."""
+        """Position of the satellite before contact, relative to that at contact."""
         return np.asarray(at_touch + (time - self.touch_s) * self.drift)
 
     def tip_at(self, time: float) -> Vector:
-        """Where the tip is while it draws near, or how far it would be through later."""
+        """Position of the tip during the approach, extrapolated after it."""
         return np.asarray(self.contact + (self.touch_s - time) * self.speed * self.away)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaptureCourse:
-    """What happens in a mission.
+    """The events of a mission.
 
     Attributes:
         tip: Keys of the arm's tip.
-        satellite: Where the satellite is, by time.
-        spins: How it turns.
+        satellite: Keys of the satellite.
+        spins: Its rotations.
         attach: From when on the arm holds it.
-        truth: What is true of it.
+        truth: Ground truth.
     """
 
     tip: tuple[TipKey, ...]
@@ -95,13 +95,13 @@ class CaptureCourse:
 def course_of(
     rng: np.random.Generator, outcome: str, approach: Approach, at_touch: Vector
 ) -> CaptureCourse:
-    """The course of an outcome; a stranger is no part of it.
+    """The course of an outcome, without an unexpected object.
 
     Args:
-        rng: Draws what is left open.
+        rng: Draws the free parameters.
         outcome: One of `OUTCOMES`.
         approach: How it begins.
-        at_touch: (3,) where the satellite's origin is when it is touched.
+        at_touch: (3,) position of the satellite's origin at contact.
     """
     if outcome == "lost":
         return _lost(rng, approach, at_touch)
@@ -113,7 +113,7 @@ def course_of(
 
 
 def _short(approach: Approach, at_touch: Vector) -> CaptureCourse:
-    """The arm draws near until the clip ends."""
+    """The arm approaches until the clip ends."""
     end = approach.end_s
     truth = ScenarioTruth(
         verdict="in_progress",
@@ -125,7 +125,7 @@ def _short(approach: Approach, at_touch: Vector) -> CaptureCourse:
 
 
 def _captured(rng: np.random.Generator, approach: Approach, at_touch: Vector) -> CaptureCourse:
-    """The arm takes hold of it and carries it off."""
+    """The arm grasps the satellite and carries it off."""
     touch, end = approach.touch_s, approach.end_s
     side = _across(rng, approach.away)
     goal = approach.contact + (end - touch - 1.0) * rng.uniform(0.14, 0.3) * side
@@ -146,7 +146,7 @@ def _captured(rng: np.random.Generator, approach: Approach, at_touch: Vector) ->
 
 
 def _lost(rng: np.random.Generator, approach: Approach, at_touch: Vector) -> CaptureCourse:
-    """The arm pushes it away, and it tumbles."""
+    """The arm knocks the satellite away, and it tumbles."""
     touch, end = approach.touch_s, approach.end_s
     push = -approach.away * rng.uniform(0.14, 0.3) + rng.uniform(0, 0.12) * _across(
         rng, approach.away
@@ -172,7 +172,7 @@ def _lost(rng: np.random.Generator, approach: Approach, at_touch: Vector) -> Cap
 
 
 def _aborted(rng: np.random.Generator, approach: Approach, at_touch: Vector) -> CaptureCourse:
-    """The arm draws back before it has touched anything."""
+    """The arm draws back before contact."""
     turn = approach.touch_s * rng.uniform(0.6, 0.8)
     end = approach.end_s
     near = approach.tip_at(turn)
@@ -214,6 +214,6 @@ def _unit(vector: Vector) -> Vector:
 
 
 def _across(rng: np.random.Generator, away: Vector) -> Vector:
-    """(3,) unit across a direction, along the image rather than towards it."""
+    """(3,) unit, perpendicular to a direction and mostly parallel to the image."""
     drawn = rng.normal(size=3) * (0.4, 1.0, 1.0)
     return _unit(drawn - (drawn @ away) * away)

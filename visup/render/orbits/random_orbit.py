@@ -1,8 +1,8 @@
 """Random missions in orbit: `random_orbit` draws a scenario from a seed.
 
-Drawn are the satellite, how it lies, drifts and turns; the side that the arm comes from and how it bends;
-sun, Earth or stars, lens, unsteadiness, exposure and noise; the outcome. What cannot be reached or is not
-seen as it should be is drawn again.
+Drawn are the satellite, its attitude, drift and spin; the side of the arm and its elbow; sun, Earth or stars,
+lens, camera shake, exposure and noise; the outcome. Missions that are out of reach or not properly visible
+are drawn again.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ ORBIT = "orbit"
 """Name of this kind of random world."""
 
 SATELLITES = ("spartan", "spartan", "relay_satellite", "lander", "station")
-"""Meshes of which one is captured, two times of five the one of `sts87`."""
+"""Meshes of which one is captured, the one of `sts87` in two of five missions."""
 
 ARM, SATELLITE = 2, 3
-"""Labels, as in the missions that are shared."""
+"""Labels, as in the shared missions."""
 
 SIZE = (480, 360)
 FPS = 12.5
-"""Pixels and frames at which things move by as many pixels a frame as in missions of 640 x 480 at 25."""
+"""Image size and frame rate with motion per frame, in pixels, as in missions of 640 x 480 at 25 fps."""
 
 _TRIES = 200
 _SMALL = (96, 72)
@@ -51,15 +51,15 @@ Vector = NDArray[np.float64]
 
 
 def random_orbit(seed: int, outcome: str | None = None, size: tuple[int, int] = SIZE) -> Scenario:
-    """A mission in orbit, the same for the same seed, outcome and size.
+    """A mission in orbit; deterministic for a seed, outcome and size.
 
     Args:
-        seed: Chooses all that is random.
+        seed: Random seed.
         outcome: One of `OUTCOMES`; drawn when None.
         size: Of the image, (width, height).
 
     Raises:
-        SettingsError: It cannot go that way.
+        SettingsError: No such mission was found.
     """
     if outcome is not None and outcome not in OUTCOMES:
         raise SettingsError(
@@ -87,7 +87,7 @@ def _drawn(rng: np.random.Generator, name: str, outcome: str) -> Scenario:
     approach = _approach(rng, contact, away, outcome)
     course = course_of(rng, outcome, approach, middle)
     camera = _camera(rng, approach.end_s)
-    # The pose of the track is that at the touch: what it turned by until then is taken off.
+    # The pose of the track is that at contact: the rotation until then is subtracted.
     turned = Rotation.from_rotvec(
         np.radians(approach.spin.deg_per_s * approach.touch_s)
         * _unit(np.asarray(approach.spin.axis))
@@ -140,7 +140,7 @@ def _approach(rng: np.random.Generator, contact: Vector, away: Vector, outcome: 
 
 
 def _arm(rng: np.random.Generator, approach: Approach, tip: Any) -> SceneObject:
-    """The arm: its foot out of view beyond where it comes from, bending along the image."""
+    """The arm: its foot out of view on its side, bending parallel to the image."""
     out = _unit(approach.away + rng.normal(scale=0.2, size=3))
     foot = approach.contact + rng.uniform(10.0, 12.0) * out
     yaw_axis = _unit(np.cross([1.0, 0.0, 0.0], out)) * rng.choice([-1.0, 1.0])
@@ -158,7 +158,7 @@ def _arm(rng: np.random.Generator, approach: Approach, tip: Any) -> SceneObject:
 
 
 def _grain(rng: np.random.Generator, model: str, scale: float) -> Texture | None:
-    """What a mesh of one colour shows of foil and panels; the satellite of `sts87` has its own."""
+    """A texture of foil and panels for a mesh of one colour; the satellite of `sts87` has its own."""
     if model == "spartan":
         return None
     seed = int(rng.integers(1 << 20))
@@ -211,7 +211,7 @@ def _surroundings(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _is_well_seen(scenario: Scenario) -> bool:
-    """Whether the arm can do it, and arm and satellite show until the arm is near, clear of the border."""
+    """Whether the arm reaches, and arm and satellite are visible until it is near, clear of the border."""
     small = Renderer(scenario.resized(_SMALL))
     near = max((s.to_s for s in scenario.truth.stage[:1]), default=0.6 * scenario.duration_s)
     try:

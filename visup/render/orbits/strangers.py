@@ -1,4 +1,4 @@
-"""Strangers: what comes by while an arm is at work, on its way into the satellite or past it."""
+"""Unexpected objects that come by while an arm is at work, towards the satellite or past it."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from visup.render.scenario.scenario import (
 )
 
 KNOWN = ("dish", "astronaut", "station", "airplane", "umbrella", "rocket")
-"""Meshes of which one comes by half of the time."""
+"""Meshes of which one comes by in half of the missions."""
 
 HIDDEN = ("rover", "helicopter", "hammer", "quadcopter", "robot", "teapot")
-"""Meshes of which one comes by otherwise: nobody told the supervisor of them."""
+"""Meshes of which one comes by otherwise; the supervisor has no models of them."""
 
 LABEL = 4
 
@@ -36,14 +36,14 @@ def with_stranger(
     approach: Approach,
     camera: Camera,
 ) -> tuple[SceneObject, ScenarioTruth]:
-    """A stranger and what is true of a mission in which it comes by.
+    """An unexpected object and the ground truth of a mission in which it comes by.
 
     Args:
-        rng: Draws what it is, where it comes from and when.
+        rng: Draws its mesh, direction and time.
         outcome: `intruder` or `crossing`.
-        course: What happens without it.
-        approach: Of that course.
-        camera: What sees it.
+        course: The events without it.
+        approach: The approach of that course.
+        camera: The camera.
     """
     middle = np.asarray(course.satellite[-1].position)
     collides = outcome == "intruder"
@@ -82,7 +82,7 @@ def with_stranger(
 def _disturbed(
     truth: ScenarioTruth, shows_s: float, end_s: float, *, collides: bool
 ) -> ScenarioTruth:
-    """What is true once a stranger shows: it was not expected, and it may be about to collide."""
+    """Ground truth once an unexpected object appears: it was not expected, and it may collide."""
     alerts = [AlertTruth(kind="unexpected_object", from_s=shows_s)]
     stages: tuple[StageTruth, ...] = ()
     if collides:
@@ -95,7 +95,7 @@ def _disturbed(
 
 
 def _to_border(aim: Vector, side: Vector, camera: Camera) -> float:
-    """Metres from a place along a direction to where the image ends, at the place's depth."""
+    """Metres from a point along a direction to the image border, at the point's depth."""
     reach = aim[0] * np.tan(np.radians(camera.fov_vertical_deg) / 2)
     halves = np.array([reach * camera.size[0] / camera.size[1], reach])
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""A folder with a clip: the video, its masks, and files beside them."""
+"""The folder of a clip: the video, its masks, and other files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from visup.agent.model.errors import OutputError, SettingsError
 from visup.percepts.opencv_names import opencv_name
 
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".webm": "VP90"}
-"""Container -> codec that OpenCV writes and reads everywhere."""
+"""Container -> codec that OpenCV supports on all platforms."""
 
 
 class ClipWriter:
@@ -56,10 +56,10 @@ def check_container(suffix: str) -> None:
 
 
 def make_clip_folder(out: Path) -> None:
-    """Make a folder, new or empty, with one for masks: those of another clip would be taken for its own.
+    """Make a new or empty folder with one for masks; masks of another clip would be mistaken for its own.
 
     Raises:
-        OutputError: It cannot be made, or something is in it already.
+        OutputError: It cannot be made, or is not empty.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""The clip that ships with visup: the scenario ``sts87.toml`` as a video with its truth.
+"""The clip that ships with visup: the scenario ``sts87.toml`` as a video with ground truth.
 
-Run ``python -m visup.render.output.demo_clip`` to make it anew after a change to the renderer.
+Run ``python -m visup.render.output.demo_clip`` to render it again after a change to the renderer.
 """
 
 from __future__ import annotations

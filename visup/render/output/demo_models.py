@@ -46,13 +46,13 @@ def view_counts() -> dict[str, int]:
 
 
 def rendered_views(name: str, count: int) -> list[NewView]:
-    """Views of one of our meshes from directions spread evenly over half of the sphere."""
+    """Views of one of the meshes from directions spread evenly over a hemisphere."""
     solid = mesh(name)
     with TemporaryDirectory() as folder:
-        # Through a file, as any user's mesh would come, so that both are treated alike.
+        # Through a file, like any user's mesh, so that both are treated alike.
         path = Path(folder) / f"{name}.ply"
         trimesh.Trimesh(solid.vertices, solid.faces, process=False).export(path)
-        # Symmetric views stay apart, so that there are as many as the paper had.
+        # Symmetric views are not merged, to have as many as the paper.
         return rendered(path, half_sphere_directions(count))
 
 

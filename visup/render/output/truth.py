@@ -1,4 +1,4 @@
-"""What is true of a rendered scene, from its geometry and from what the scenario means by it."""
+"""Ground truth of a rendered scene, from its geometry and the scenario's annotations."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from visup.render.scenario.scenario import Scenario
 from visup.render.scenario.trajectories import Matrix
 
 ENTERED = 0.10
-"""An object is in the image while it would show this share of the most it ever shows."""
+"""An object is in the image while its amodal area is at least this share of its maximum."""
 
 HIDDEN, SHOWN = 0.20, 0.50
-"""It is occluded when less than the first share of it is visible, and back when more than the second."""
+"""An object is occluded when less than the first share of it is visible, and visible again above the
+second."""
 
 
 def frame_truth(picture: RenderedFrame, labels: Mapping[str, int]) -> dict[str, Any]:
-    """What is true of one frame.
+    """Ground truth of one frame.
 
     Args:
         picture: The frame.
@@ -59,11 +60,11 @@ def _pose(pose: Matrix) -> dict[str, Any]:
 
 
 def presence_events(name: str, frames: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Entry, exit, occlusion and reappearance of one object, in order of time.
+    """Entry, exit, occlusion and reappearance of one object, by time.
 
     Args:
         name: The object.
-        frames: As of `frame_truth`, one for each frame.
+        frames: From `frame_truth`, one for each frame.
 
     Returns:
         Records of ``kind``, ``object``, ``frame``.
@@ -88,7 +89,7 @@ def presence_events(name: str, frames: Sequence[Mapping[str, Any]]) -> list[dict
 
 
 def spin_deg_per_s(renderer: Renderer, name: str) -> float:
-    """How fast an object turns in the world at the end of the scenario, degrees per second."""
+    """Rate of rotation of an object in the world at the end of the scenario, degrees per second."""
     scenario = renderer.scenario
     item = next(o for o in scenario.object if o.name == name)
     last, step = scenario.duration_s, 1.0 / scenario.camera.fps
@@ -100,11 +101,11 @@ def spin_deg_per_s(renderer: Renderer, name: str) -> float:
 
 
 def mission_truth(renderer: Renderer, frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The whole of ``truth.json``.
+    """The content of ``truth.json``.
 
     Args:
-        renderer: Of the scenario.
-        frames: As of `frame_truth`, one for each frame.
+        renderer: Renderer of the scenario.
+        frames: From `frame_truth`, one for each frame.
 
     Returns:
         A JSON-like record.
@@ -133,7 +134,7 @@ def mission_truth(renderer: Renderer, frames: Sequence[Mapping[str, Any]]) -> di
 
 
 def mission(scenario: Scenario) -> dict[str, Any]:
-    """The whole of ``mission.json``: what a supervisor may be told."""
+    """The content of ``mission.json``: what a supervisor may know."""
     return {
         "task": scenario.task,
         "actors": {o.name: o.model or o.mesh for o in scenario.labelled if o.actor},

@@ -34,10 +34,10 @@ def write_mission(
         progress: Told frames done and frames in all.
 
     Returns:
-        What stands in ``truth.json``.
+        The content of ``truth.json``.
 
     Raises:
-        OutputError: The folder cannot be written, or something is in it already.
+        OutputError: The folder cannot be written, or is not empty.
         SettingsError: The scenario cannot be rendered.
     """
     check_container(container)

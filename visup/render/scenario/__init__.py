@@ -1,4 +1,4 @@
-"""Scenario files: what is in the scene, how it moves, how it is lit, and what is true of it.
+"""Scenario files: objects, motion, light and ground truth of a scene.
 
 Read `scenario` (the format), `optics` (camera, light, background), `trajectories` (poses over time),
 `library` (scenarios that ship).

@@ -12,16 +12,16 @@ SCENARIOS = "scenarios"
 """Folder of the scenarios that ship with visup."""
 
 BENCH = "bench"
-"""Folder of the scenarios that the bench scores."""
+"""Folder of the scenarios of the benchmark."""
 
 
 def shipped_names() -> tuple[str, ...]:
-    """Names of the shipped scenarios, sorted, but for those of the bench."""
+    """Names of the shipped scenarios, sorted, without those of the benchmark."""
     return _names(".")
 
 
 def bench_names() -> tuple[str, ...]:
-    """Names of the scenarios that the bench scores, sorted."""
+    """Names of the scenarios of the benchmark, sorted."""
     return _names(BENCH)
 
 
@@ -52,8 +52,8 @@ def find_scenario(word: str) -> Scenario:
     """A scenario by the path of its file, or by the name of a shipped one.
 
     Raises:
-        SettingsError: There is none, or the file is not as it should be.
-        ErrorGroup: The file has several faults.
+        SettingsError: There is none, or the file is invalid.
+        ErrorGroup: The file has several errors.
     """
     path = Path(word)
     if path.is_file() or path.suffix == ".toml":

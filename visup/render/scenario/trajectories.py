@@ -34,8 +34,8 @@ def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Rotation:
 
     Args:
         position: (3,) of the camera, world.
-        target: (3,) point that shall stand in the middle of the image.
-        up: (3,) direction that shall point up in the image; not along the line of sight.
+        target: (3,) point for the centre of the image.
+        up: (3,) direction that points up in the image; not along the line of sight.
 
     Returns:
         Camera to world.
@@ -50,13 +50,13 @@ def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Rotation:
 def value_at(
     times: NDArray[np.float64], values: NDArray[np.float64], t: float, smooth: bool
 ) -> NDArray[np.float64]:
-    """A vector between keyframes; it stays at the first and last value outside them.
+    """A vector between keyframes, constant outside them.
 
     Args:
         times: (N,) seconds, rising.
         values: (N, D).
         t: Seconds.
-        smooth: Monotone cubic instead of straight from one key to the next.
+        smooth: Monotone cubic instead of linear interpolation.
 
     Returns:
         (D,).
@@ -77,21 +77,21 @@ def rotation_at(times: NDArray[np.float64], rotations: Rotation, t: float) -> Ro
 
 
 def spin_about(axis: NDArray[np.float64], degrees: float) -> Rotation:
-    """A turn about an axis of any length."""
+    """A rotation about an axis of any length."""
     return Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
 def shake(t: float, amplitude_deg: float, frequency_hz: float, seed: int) -> Rotation:
-    """A small turn of the camera that wanders without ever repeating.
+    """A small camera rotation that varies without repeating.
 
     Args:
         t: Seconds.
         amplitude_deg: Standard deviation about each axis, roughly.
-        frequency_hz: The slowest of three waves that are added for each axis.
+        frequency_hz: The lowest of three frequencies that are summed for each axis.
         seed: Chooses their phases.
 
     Returns:
-        The turn, in the camera's frame.
+        The rotation, in the camera's frame.
     """
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (3, 3))
     rates = 2 * np.pi * frequency_hz * np.array([1.0, 1.73, 2.91])
