@@ -27,8 +27,8 @@ Vector = NDArray[np.float64]
 Verdict = Literal["succeeded", "failed", "interrupted", "in_progress"]
 
 OUTCOMES = ("ok", "lost", "aborted", "intruder", "crossing", "short")
-"""Captured; knocked away; the arm draws back; an unexpected object approaches the satellite, or passes in front
-of it; the clip ends before contact."""
+"""Captured; knocked away; the arm draws back; an unexpected object approaches the satellite, or passes in
+front of it; the clip ends before contact."""
 
 SCORED_FROM_S = 2.0
 SHOWS_AFTER_S = 0.8

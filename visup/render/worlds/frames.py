@@ -1,4 +1,4 @@
-"""From a world and a number to a picture, a mask and what is seen of each object."""
+"""From a world and a frame number to an image, a mask and the visibility of each object."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from visup.render.worlds.shading import PlacedThings, ambient, direct
 from visup.render.worlds.world import Floats, Thing, World
 
 SUBRAYS = 2
-"""Rays along each side of a pixel on an edge of what moves."""
+"""Rays along each side of a pixel on the edge of a moving thing."""
 
 NEAR = 1e-3
 SURFACE = 1e-4
-"""Share of a distance by which what moves must be nearer than what rests in order to hide it."""
+"""Share of the distance by which a moving thing must be nearer than the static scene to hide it."""
 
 
 class WorldRenderer:
-    """Makes any frame of a world, in any order.
+    """Renders any frame of a world, in any order.
 
     Args:
-        world: What to draw; at least one thing must rest.
+        world: The world; at least one thing must be static.
     """
 
     def __init__(self, world: World) -> None:
@@ -43,7 +43,7 @@ class WorldRenderer:
         self._eye = np.asarray(world.viewpoint.position, float)
 
     def picture(self, index: int) -> RenderedFrame:
-        """Render one frame; the same for the same world and index, whatever was rendered before."""
+        """Render one frame; depends only on the world and the index."""
         plate = self.plate.warped(self.camera.to_plate(index), self.world.size)
         scene = PlacedThings(self.movers, index) if self.movers else None
         light = self._resting(plate, scene, index)
@@ -56,7 +56,7 @@ class WorldRenderer:
         return RenderedFrame(index, self._exposed(light, index), mask, amodal, {})
 
     def mask(self, index: int) -> NDArray[np.uint8]:
-        """(H, W) labels of a frame, as of `picture`, without its light: some ten times as fast."""
+        """(H, W) labels of a frame, as from `picture` but without shading: about ten times as fast."""
         plate = self.plate.warped(self.camera.to_plate(index), self.world.size)
         if not self.movers:
             return plate.labels.copy()
@@ -69,7 +69,7 @@ class WorldRenderer:
         return self._labelled(plate, scene, places, body)
 
     def _exposed(self, light: Floats, index: int) -> NDArray[np.uint8]:
-        """(H, W, 3) uint8, BGR, as the camera stores it."""
+        """(H, W, 3) uint8, BGR, as the camera records it."""
         imager = self.world.imager
         sensor = Sensor(exposure=imager.exposure, noise=imager.noise, blur_px=imager.blur_px)
         image = expose(np.ascontiguousarray(light[..., ::-1]), sensor, self.world.seed, index)
@@ -77,7 +77,7 @@ class WorldRenderer:
         return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
 
     def _resting(self, plate: Plate, scene: PlacedThings | None, index: int) -> Floats:
-        """(H, W, 3) radiance of what rests, under the shadows of what moves."""
+        """(H, W, 3) radiance of the static scene, with the shadows of moving things."""
         hidden = self._shadows(plate, scene)
         light = plate.shade + plate.lamp * (1 - hidden[..., None])
         world = self.world
@@ -91,7 +91,7 @@ class WorldRenderer:
         return light
 
     def _shadows(self, plate: Plate, scene: PlacedThings | None) -> Floats:
-        """(H, W): share of the lamp that what moves takes away from what rests."""
+        """(H, W): share of the lamp's light that moving things block from the static scene."""
         hidden = np.zeros(plate.labels.shape, np.float32)
         if scene is None:
             return hidden
@@ -119,7 +119,7 @@ class WorldRenderer:
         window: NDArray[np.bool_],
         index: int,
     ) -> NDArray[np.uint8]:
-        """Draw what moves over what rests, into `light`; returns the (H, W) mask."""
+        """Draw moving things over the static scene, into `light`; returns the (H, W) mask."""
         width, height = self.world.size
         places = np.flatnonzero(window)
         flat, rests = light.reshape(-1, 3), light.reshape(-1, 3).copy()
@@ -139,7 +139,7 @@ class WorldRenderer:
         places: NDArray[np.intp],
         body: NDArray[np.int32],
     ) -> NDArray[np.uint8]:
-        """(H, W) labels of what rests, with those of what moves where it shows."""
+        """(H, W) labels of the static scene, with those of visible moving things."""
         width, height = self.world.size
         mask = plate.labels.ravel().copy()
         mask[places[body >= 0]] = scene.labels[body[body >= 0]]
@@ -148,7 +148,7 @@ class WorldRenderer:
     def _met(
         self, scene: PlacedThings, at: NDArray[np.float64], far: Floats, index: int
     ) -> tuple[Floats, Hits, NDArray[np.int32]]:
-        """Rays through points (N, 2) of the picture, what they hit, and which mover shows, -1 for none."""
+        """Rays through image points (N, 2), their hits, and the visible moving thing, -1 for none."""
         directions = self._directions(at, index)
         hits = scene.cast(self._eye, directions)
         before = hits.distance * np.linalg.norm(directions, axis=1) < far * (1 - SURFACE)
@@ -157,7 +157,7 @@ class WorldRenderer:
     def _seen(
         self, scene: PlacedThings, at: NDArray[np.float64], far: Floats, behind: Floats, index: int
     ) -> tuple[Floats, NDArray[np.int32]]:
-        """Colours (N, 3) through points (N, 2) of the picture, and which mover shows there, -1 for none."""
+        """Colours (N, 3) at image points (N, 2), and the visible moving thing, -1 for none."""
         directions, hits, body = self._met(scene, at, far, index)
         met = np.flatnonzero(body >= 0)
         seen = Hits(hits.body[met], hits.face[met], hits.distance[met])
@@ -180,7 +180,7 @@ class WorldRenderer:
         plate: Plate,
         index: int,
     ) -> None:
-        """Replace pixels on edges of what moves by the mean over a grid of rays within them."""
+        """Replace pixels on edges of moving things by the mean over a grid of rays within them."""
         width, height = self.world.size
         kernel = np.ones((3, 3), np.uint8)
         edges = cv2.morphologyEx(bodies.reshape(height, width), cv2.MORPH_GRADIENT, kernel) > 0
@@ -210,7 +210,7 @@ class WorldRenderer:
         return np.ascontiguousarray(own @ rotation.T.astype(np.float32))
 
     def _window(self, things: tuple[Thing, ...], index: int) -> NDArray[np.bool_]:
-        """(H * W,): pixels inside the boxes that things project to."""
+        """(H * W,): pixels inside the bounding boxes of projected things."""
         view, (width, height) = self.world.viewpoint, self.world.size
         focal = vp.focal_px(view, height, float(view.zoom[index]))
         rotation = self.camera.rotation @ vp.turn(view, index)
@@ -229,7 +229,7 @@ class WorldRenderer:
         return window.ravel()
 
     def _amodal(self, plate: Plate, label: int, index: int) -> int:
-        """Pixels of an object were it alone."""
+        """Pixels of an object without occluders."""
         if label in plate.amodal:
             return int(np.count_nonzero(plate.amodal[label]))
         things = tuple(t for t in self.movers if t.label == label)

@@ -1,4 +1,4 @@
-"""The same things on another day: where a user outlines them who does not do so in the clip itself."""
+"""A second clip of the same things, for users who outline objects in another clip than the watched one."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from visup.render.worlds.viewpoint import steady
 from visup.render.worlds.world import World
 
 SHARE = 0.4
-"""Of worlds whose things are shown in another clip than the one that is watched."""
+"""Share of worlds whose things are outlined in another clip than the watched one."""
 
 SUFFIX = "-shown"
-"""What the folder of that clip has behind the name of the world."""
+"""Suffix of that clip's folder, after the name of the world."""
 
 
 def lesson(world: World) -> World | None:
-    """The world under other light, by a camera on a tripod that stands a little elsewhere.
+    """The world under other light, from a slightly different camera on a tripod.
 
     Args:
-        world: As it is watched.
+        world: The watched world.
 
     Returns:
-        None for worlds whose things are shown in themselves.
+        None for worlds whose things are outlined in the watched clip.
     """
     rng = np.random.default_rng([world.seed, 2])
     if rng.random() >= SHARE:

@@ -1,4 +1,4 @@
-"""Where things are over time: keyframes with a soft start and stop, falling, following."""
+"""Motion over time: keyframes with smooth start and stop, falling, following."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ GRAVITY = 9.81
 
 
 def clock(frames: int) -> Doubles:
-    """(F,) seconds at which frames are taken."""
+    """(F,) times of the frames, seconds."""
     return np.arange(frames) / FPS
 
 
 def eased(at: Doubles, keys: Sequence[tuple[float, Any]]) -> Doubles:
-    """Values between keyframes, each reached with no speed (minimum jerk); held outside.
+    """Values between keyframes with zero speed at each (minimum jerk); constant outside.
 
     Args:
         at: (F,) seconds.
@@ -43,9 +43,9 @@ def eased(at: Doubles, keys: Sequence[tuple[float, Any]]) -> Doubles:
 
 
 def cruised(at: Doubles, begin: float, end: float, ramp: float = 0.2) -> Doubles:
-    """(F,) shares of a way, 0 to 1: speeds up, goes evenly, slows down.
+    """(F,) shares of a path, 0 to 1: acceleration, constant speed, deceleration.
 
-    `ramp` is the share of the time that each of speeding up and slowing down takes.
+    `ramp` is the share of the time for each of acceleration and deceleration.
     """
     u = np.clip((at - begin) / (end - begin), 0, 1)
     speed = 1 / (1 - ramp)
@@ -61,11 +61,11 @@ def posed(
     Args:
         positions: (F, 3) or (3,).
         yaw: Radians about z; a number or (F,), as the others.
-        pitch: Radians about the turned y; positive lowers what lies ahead.
-        roll: Radians about the turned x.
+        pitch: Radians about the rotated y; positive lowers the front.
+        roll: Radians about the rotated x.
 
     Returns:
-        (F, 4, 4); (1, 4, 4) when all is given once.
+        (F, 4, 4); (1, 4, 4) if every argument is constant.
     """
     xyz = np.atleast_2d(np.asarray(positions, float))
     given = [np.atleast_1d(np.asarray(a, float)) for a in (yaw, pitch, roll)]
@@ -112,10 +112,10 @@ def carried(rest: Poses, carrier: Poses, grasp: int, release: int) -> Poses:
     """What lies still, moves with a carrier as one body, and stays where it is let go.
 
     Args:
-        rest: (4, 4), where it lies at first.
+        rest: (4, 4), its pose at the start.
         carrier: (F, 4, 4).
         grasp: First frame in which it moves with the carrier.
-        release: First frame in which it does not any more.
+        release: First frame in which it no longer does.
 
     Returns:
         (F, 4, 4).
@@ -131,17 +131,17 @@ def carried(rest: Poses, carrier: Poses, grasp: int, release: int) -> Poses:
 def dropped(
     poses: Poses, since: int, floor: float, tumble: ArrayLike = (0.0, 0.0, 0.0), scale: float = 1.0
 ) -> tuple[Poses, int]:
-    """Poses with a fall from some frame on, and a small bounce.
+    """Poses with a fall from a frame on, and a small bounce.
 
     Args:
-        poses: (F, 4, 4) as they were without the fall.
+        poses: (F, 4, 4) without the fall.
         since: First frame of the fall.
-        floor: Height at which the thing's origin comes to lie.
-        tumble: Radians by which it has turned (world axes) when it lies.
-        scale: Factor on gravity, for scenes that are not built in metres.
+        floor: Final height of the thing's origin.
+        tumble: Rotation during the fall, radians (world axes).
+        scale: Factor on gravity, for scenes that are not in metres.
 
     Returns:
-        (F, 4, 4), and the frame in which it meets the floor.
+        (F, 4, 4), and the frame in which it hits the floor.
     """
     out = poses.copy()
     speed = (poses[since, :3, 3] - poses[since - 1, :3, 3]) * FPS

@@ -1,7 +1,7 @@
-"""Everything that never moves, drawn once, wide enough for all that the camera will ever look at.
+"""The static scene, rendered once for the whole field that the camera covers.
 
-The camera turns about its pinhole and zooms, so each picture of what rests is this plate, warped by a
-homography; only what moves has to be drawn anew.
+The camera only rotates about its pinhole and zooms, so each image of the static scene is this plate warped by
+a homography; only moving things are rendered in each frame.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from visup.render.worlds.shading import PlacedThings, ambient, direct, sky
 from visup.render.worlds.world import Floats, World
 
 FAR = 1e4
-"""Metres at which what stands nowhere is taken to be."""
+"""Distance assumed for the background, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plate:
-    """What rests, as the undisturbed camera sees it; H and W are those of the plate.
+    """The static scene, seen by the camera without shake; H and W are those of the plate.
 
     Attributes:
         shade: (H, W, 3) radiance without the lamp, red, green, blue.
-        lamp: (H, W, 3) what the lamp adds.
-        points: (H, W, 3) where rays end, world, metres.
+        lamp: (H, W, 3) radiance that the lamp adds.
+        points: (H, W, 3) end points of rays, world, metres.
         labels: (H, W) uint8.
-        amodal: Label -> (H, W) uint8, 1 where it would show with nothing before it.
+        amodal: Label -> (H, W) uint8, 1 where it would be visible without occluders.
         water: (H, W) uint8, 1 on water.
     """
 
@@ -42,10 +42,10 @@ class Plate:
     water: NDArray[np.uint8]
 
     def warped(self, matrix: NDArray[np.float64] | None, size: tuple[int, int]) -> Plate:
-        """As it is seen in a frame.
+        """The plate as seen in a frame.
 
         Args:
-            matrix: (3, 3) from pixels of the frame to pixels of the plate; None where both are the same.
+            matrix: (3, 3) from pixels of the frame to pixels of the plate; None if both are the same.
             size: Width and height of the frame.
         """
         if matrix is None:
@@ -73,10 +73,10 @@ def _warp(image: Any, matrix: Any, size: tuple[int, int], how: int) -> Any:
 
 
 class PlateCamera:
-    """The field of the plate, and the way from frames to it.
+    """The field of the plate, and the mapping from frames to it.
 
     Args:
-        world: Whose camera it is.
+        world: The world of the camera.
     """
 
     def __init__(self, world: World) -> None:
@@ -85,14 +85,14 @@ class PlateCamera:
         self.focal = vp.focal_px(self.view, self.height, float(self.view.zoom.max()))
         corners = np.concatenate([self._border(i) for i in range(world.frames)])
         low, high = corners.min(axis=0), corners.max(axis=0)
-        # Ends of the plate on the pixel grid that a camera on a tripod has.
+        # The borders of the plate lie on the pixel grid of a camera on a tripod.
         self.origin = low
         extent = np.ceil((high - low) * self.focal - 1e-6).astype(int) + 1
         self.fixed = not self.view.turns.any() and bool((self.view.zoom == 1).all())
         self.size = world.size if self.fixed else (int(extent[0]), int(extent[1]))
 
     def directions(self, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
-        """(H * W, 3) world directions through the plate's pixels, shifted by parts of a pixel."""
+        """(H * W, 3) world directions through the plate's pixels, with a subpixel shift."""
         y, x = np.mgrid[: self.size[1], : self.size[0]]
         flat = (
             np.column_stack([x.ravel() + shift[0], y.ravel() + shift[1]]) / self.focal + self.origin
@@ -101,7 +101,7 @@ class PlateCamera:
         return np.asarray(own @ self.rotation.T, np.float32)
 
     def to_plate(self, index: int) -> NDArray[np.float64] | None:
-        """(3, 3) from pixels of a frame to pixels of the plate; None where both are the same."""
+        """(3, 3) from pixels of a frame to pixels of the plate; None if both are the same."""
         if self.fixed:
             return None
         focal = vp.focal_px(self.view, self.height, float(self.view.zoom[index]))
@@ -122,7 +122,7 @@ class PlateCamera:
         return np.asarray(place @ vp.turn(self.view, index) @ lens)
 
     def _border(self, index: int) -> NDArray[np.float64]:
-        """(N, 2): points of a frame's border on the plane z = 1 of the undisturbed camera."""
+        """(N, 2): points of a frame's border on the plane z = 1 of the camera without shake."""
         focal = vp.focal_px(self.view, self.height, float(self.view.zoom[index]))
         x, y = self.width - 1, self.height - 1
         at = np.array([(a * x, b * y) for a in (0, 0.5, 1) for b in (0, 0.5, 1)], float)
@@ -133,12 +133,12 @@ class PlateCamera:
 
 
 def draw_plate(world: World, camera: PlateCamera, rest: PlacedThings) -> Plate:
-    """Draw what rests.
+    """Render the static scene.
 
     Args:
-        world: All of it.
+        world: The world.
         camera: The plate's field.
-        rest: The things that never move.
+        rest: The static things.
     """
     width, height = camera.size
     eye = np.asarray(world.viewpoint.position, float)
@@ -166,7 +166,7 @@ def draw_plate(world: World, camera: PlateCamera, rest: PlacedThings) -> Plate:
 def _reach(
     world: World, distance: Floats, eye: NDArray[np.float64], directions: Floats
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """How far rays go before they meet something or water, and whether it is water."""
+    """Distance along rays to the first thing or water, and whether it is water."""
     reach = np.where(np.isfinite(distance), distance, FAR)
     if world.water is None:
         return reach, np.zeros(len(reach), bool)
@@ -179,7 +179,7 @@ def _reach(
 def _shaded(
     world: World, rest: PlacedThings, eye: NDArray[np.float64], directions: Floats
 ) -> tuple[Floats, Floats]:
-    """(N, 3) radiance without the lamp, and what the lamp adds."""
+    """(N, 3) radiance without the lamp, and the part that the lamp adds."""
     hits = rest.cast(eye, directions)
     shade, lamp = sky(directions, world.heaven), np.zeros((len(directions), 3), np.float32)
     met = np.flatnonzero(hits.body >= 0)
@@ -197,6 +197,6 @@ def _shaded(
 def _alone(
     world: World, label: int, eye: NDArray[np.float64], directions: Floats
 ) -> NDArray[np.uint8]:
-    """(N,): 1 where an object that rests would show by itself."""
+    """(N,): 1 where a static object would be visible without occluders."""
     things = [t for t in world.things if t.label == label and not t.moves]
     return (PlacedThings(things, 0).cast(eye, directions).body >= 0).astype(np.uint8)

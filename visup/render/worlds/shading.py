@@ -1,4 +1,4 @@
-"""Light on things: what a ray meets, of which colour it is, how it faces the lamp."""
+"""Shading: ray hits, reflectance, and light of sky and lamp."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from visup.render.worlds.world import Daylight, Floats, Heaven, Thing
 
 CLOUD_SIZE = 0.35
 SHADOW_OFFSET = 2e-3
-"""Metres by which a ray towards the lamp starts off a surface, so as not to meet it again."""
+"""Offset of the origin of a shadow ray from its surface, metres, to avoid hitting it again."""
 
 
 class PlacedThings:
-    """Things at one time, ready for rays, in world coordinates.
+    """Things at one time, prepared for ray casting, in world coordinates.
 
     Args:
         things: At least one.
@@ -33,19 +33,19 @@ class PlacedThings:
         self.labels = np.array([*(t.label for t in things), 0], np.uint8)
 
     def cast(self, origin: NDArray[np.float64], directions: Floats) -> Hits:
-        """What rays from one point meet first; directions (N, 3), world."""
+        """First hits of rays from one point; directions (N, 3), world."""
         origins = np.ascontiguousarray(np.broadcast_to(origin, directions.shape), np.float32)
         return self.caster.cast(origins, directions)
 
     def blocked(self, points: Floats, towards: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(N,): whether something stands between points (N, 3) and a distant lamp."""
+        """(N,): whether something blocks a distant lamp from points (N, 3)."""
         way = np.asarray(towards, np.float32)
         direction = np.ascontiguousarray(np.broadcast_to(way, points.shape), np.float32)
         start = (points + SHADOW_OFFSET * way).astype(np.float32)
         return self.caster.cast(start, direction).body >= 0
 
     def surface(self, hits: Hits, points: Floats, directions: Floats) -> tuple[Floats, Floats]:
-        """Reflectance (N, 3; red, green, blue) and unit normals (N, 3) towards the viewer where rays met."""
+        """Reflectance (N, 3; red, green, blue) and unit normals (N, 3) towards the viewer at hits."""
         albedo = self.caster.albedo[hits.face]
         for number, (thing, body) in enumerate(zip(self.things, self.caster.bodies, strict=True)):
             mine = hits.body == number
@@ -59,15 +59,15 @@ class PlacedThings:
 
 
 def ambient(normals: Floats, light: Daylight) -> Floats:
-    """(N, 3) light from all around on white surfaces: most from above, some thrown back from below."""
+    """(N, 3) ambient light on white surfaces: most from above, some reflected from below."""
     share = 0.72 + 0.28 * normals[:, 2:3]
-    # Walls that face each other would be alike without a little from one side.
+    # A little light from one side, or facing walls would look the same.
     side = 1 + 0.12 * normals[:, :1] - 0.05 * normals[:, 1:2]
     return np.asarray(share * side * np.asarray(light.ambient, np.float32), np.float32)
 
 
 def direct(normals: Floats, light: Daylight) -> Floats:
-    """(N, 3) light of the lamp on white surfaces with nothing between."""
+    """(N, 3) light of the lamp on white surfaces, without shadows."""
     facing = np.clip(normals @ np.asarray(light.sun, np.float32), 0, None)
     return np.asarray(facing[:, None] * np.asarray(light.sun_colour, np.float32), np.float32)
 

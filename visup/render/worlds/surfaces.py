@@ -1,6 +1,6 @@
-"""Patterns of reflectance: what makes a floor look like a floor.
+"""Procedural textures of reflectance.
 
-Each takes points in the thing's own frame, in units of the pattern's size, and gives a share from -1 to 1
+Each takes points in the thing's own frame, in units of the pattern's size, and returns a value from -1 to 1
 that mixes the thing's two colours.
 """
 
@@ -22,7 +22,7 @@ def mixed(points: Points, albedo: Floats, surface: Surface) -> Floats:
 
     Args:
         points: (N, 3) metres, in the thing's frame.
-        albedo: (N, 3) reflectance of the faces they lie on, red, green, blue.
+        albedo: (N, 3) reflectance of their faces, red, green, blue.
         surface: The pattern.
 
     Returns:
@@ -50,7 +50,7 @@ def _wood(at: Points, seed: int) -> Floats:
 
 
 def _tiles(at: Points, seed: int) -> Floats:
-    """Squares of unequal tone with dark joints, on whichever sides of a thing."""
+    """Squares of unequal tone with dark joints, on all sides of a thing."""
     cell, joint = _cells(at, 0.03)
     tone = _hashed(cell[:, 0] + 31 * cell[:, 2], cell[:, 1], seed)
     return np.asarray(np.where(joint, -1, 0.3 * tone + 0.15 * pattern(at, seed)), np.float32)
@@ -87,7 +87,7 @@ def _marble(at: Points, seed: int) -> Floats:
 
 
 def _cells(at: Points, joint: float) -> tuple[Points, NDArray[np.bool_]]:
-    # Shifted off the planes of boxes, which would flicker between two cells.
+    # Shifted off the faces of boxes, which would alternate between two cells.
     shifted = at + np.float32(0.013)
     cell = np.floor(shifted)
     part = shifted - cell

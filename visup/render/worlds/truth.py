@@ -1,4 +1,4 @@
-"""What is written beside a random world: `truth.json` and `brief.json`, as of the shared worlds."""
+"""`truth.json` and `brief.json` of a random world, in the format of the shared worlds."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ BOX_EVERY = 10
 
 TOLERANCE_S = 0.7
 HIDDEN = 0.3
-"""A thing of which less than this share shows has no box."""
+"""A thing of which less than this share is visible has no box."""
 
 Mask = NDArray[np.uint8]
 
 
 def world_truth(world: World, frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The whole of ``truth.json``; frames as of `frame_truth`."""
+    """The content of ``truth.json``; frames from `frame_truth`."""
     course = world.course
     return {
         "mission": world.name,
@@ -54,7 +54,7 @@ def world_truth(world: World, frames: Sequence[Mapping[str, Any]]) -> dict[str, 
 
 
 def world_brief(world: World, teach: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """The whole of ``brief.json``: what a supervisor may be told."""
+    """The content of ``brief.json``: what a supervisor may know."""
     return {
         "name": world.name,
         "family": f"random_{world.kind}",
@@ -65,14 +65,14 @@ def world_brief(world: World, teach: Mapping[str, Mapping[str, Any]]) -> dict[st
 
 
 def outline(mask: NDArray[np.bool_], rng: np.random.Generator) -> list[list[int]]:
-    """The outline that a user would draw about the largest piece of a mask.
+    """The outline that a user would draw around the largest component of a mask.
 
     Args:
-        mask: (H, W); something must be set.
-        rng: Of the hand that draws.
+        mask: (H, W); not empty.
+        rng: Draws the inaccuracy of the outline.
 
     Returns:
-        Corners [x, y] in pixels, within the picture.
+        Corners [x, y] in pixels, within the image.
     """
     found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     largest = max(found, key=cv2.contourArea)
@@ -83,22 +83,22 @@ def outline(mask: NDArray[np.bool_], rng: np.random.Generator) -> list[list[int]
 
 
 def well_seen(name: str, frames: Sequence[Mapping[str, Any]], size: tuple[int, int]) -> int:
-    """The first frame in which a thing is about as well seen as it ever is.
+    """The first frame in which a thing is about as visible as it ever is.
 
     Args:
         name: The thing.
-        frames: As of `frame_truth`.
+        frames: From `frame_truth`.
         size: Width and height.
 
     Returns:
-        Index of the frame; the one that shows most of it where it is always cut or hidden.
+        Index of the frame; the one that shows most of it if it is always truncated or hidden.
     """
     score = np.array([_seen(f[name], size) for f in frames])
     return int(np.flatnonzero(score >= 0.9 * score.max())[0])
 
 
 def _seen(record: Mapping[str, Any], size: tuple[int, int]) -> float:
-    """Visible pixels, fewer where it is hidden in part or cut by the border."""
+    """Visible pixels, with a penalty for occlusion and truncation."""
     visible = float(record["visible_px"])
     if not visible:
         return 0.0

@@ -1,4 +1,4 @@
-"""How the camera looks: rotations, focal lengths, rays, and ways to hold a camera."""
+"""Camera geometry: rotations, focal lengths, rays, and camera motions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def base_rotation(view: Viewpoint) -> Doubles:
-    """(3, 3) from the undisturbed camera's frame (x right, y down, z forward) to the world's."""
+    """(3, 3) from the frame of the camera at rest (x right, y down, z forward) to the world's."""
     ahead = np.subtract(view.look_at, view.position)
     steep = abs(ahead[2]) > 0.995 * float(np.linalg.norm(ahead))
     up = np.array([0.0, 1.0, 0.0]) if steep else UP
@@ -27,13 +27,13 @@ def base_rotation(view: Viewpoint) -> Doubles:
 
 
 def turn(view: Viewpoint, index: int) -> Doubles:
-    """(3, 3) from the camera's frame in a frame of the clip to the undisturbed one's."""
+    """(3, 3) from the camera's frame in a frame of the clip to that of the camera at rest."""
     pan, tilt, roll = np.radians(view.turns[index])
     return np.asarray(Rotation.from_euler("YXZ", [pan, tilt, roll]).as_matrix(), float)
 
 
 def focal_px(view: Viewpoint, height: int, zoom: float = 1.0) -> float:
-    """Focal length in pixels of a picture of some height."""
+    """Focal length in pixels for an image height."""
     return zoom * height / 2 / tan(radians(view.fov_vertical_deg) / 2)
 
 
@@ -47,14 +47,14 @@ def rays(width: int, height: int, focal: float, at: Doubles | None = None) -> Fl
 
 
 def projected(view: Viewpoint, points: ArrayLike, size: tuple[int, int]) -> Doubles:
-    """(N, 2) pixels at which the undisturbed camera sees points (N, 3) before it, world."""
+    """(N, 2) pixels of world points (N, 3) in front of the camera at rest."""
     own = (np.atleast_2d(np.asarray(points, float)) - view.position) @ base_rotation(view)
     middle = np.array([(size[0] - 1) / 2, (size[1] - 1) / 2])
     return np.asarray(own[:, :2] / own[:, 2:] * focal_px(view, size[1]) + middle)
 
 
 def shows(view: Viewpoint, points: ArrayLike, size: tuple[int, int], margin: float = 0.06) -> bool:
-    """Whether the undisturbed camera sees all points, a share of the picture from its border."""
+    """Whether the camera at rest sees all points, with a margin as a share of the image."""
     share = projected(view, points, size) / size
     return bool(((share > margin) & (share < 1 - margin)).all())
 
@@ -67,15 +67,15 @@ def steady(position: ArrayLike, aim: ArrayLike, fov_vertical_deg: float, frames:
 
 
 def disturbed(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoint:
-    """The same camera, held or led otherwise.
+    """The same camera with another motion.
 
     Args:
         view: On a tripod.
-        rng: Draws how much and when.
+        rng: Draws amplitudes and times.
         style: `fixed`, `shaking`, `panning` or `zooming`.
 
     Returns:
-        A viewpoint whose picture keeps the middle of the scene in view.
+        A viewpoint that keeps the centre of the scene in view.
     """
     frames = len(view.zoom)
     size = view.fov_vertical_deg
@@ -90,7 +90,7 @@ def disturbed(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoin
 
 
 def _jitter(rng: np.random.Generator, frames: int, degrees: float) -> Doubles:
-    """(F, 3): an unsteady hand; slow sway and quick tremor, little roll."""
+    """(F, 3): handheld shake; slow sway and quick tremor, little roll."""
     white = rng.standard_normal((frames + 40, 3))
     slow = gaussian_filter1d(white, 0.45 * FPS, axis=0)[20:-20]
     quick = gaussian_filter1d(white[:, ::-1], 0.1 * FPS, axis=0)[20:-20]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from visup.render.worlds.world import Daylight, Floats, Heaven, Water
 
 SMOOTH_AT = 60.0
-"""Metres at which waves look half as rough, since a pixel holds several of them."""
+"""Distance at which waves look half as rough, since a pixel covers several, metres."""
 
 
 def radiance(
@@ -17,11 +17,11 @@ def radiance(
     """Light from the surface of the water.
 
     Args:
-        points: (N, 3) on it, world.
+        points: (N, 3) on the surface, world.
         eye: The camera's position.
         time: Seconds.
         water: Colour and waves.
-        heaven: What it mirrors.
+        heaven: The reflected sky.
 
     Returns:
         (N, 3) radiance, red, green, blue, without shadows.
@@ -36,7 +36,7 @@ def radiance(
     distance = np.linalg.norm(away, axis=1)
     steepness = away[:, 2] / np.maximum(distance, 1e-6)
     rough /= 1 + (distance / SMOOTH_AT) ** 2
-    # Schlick's approximation, with the share that water mirrors at right angles.
+    # Schlick's approximation, with the reflectance of water at normal incidence.
     mirror = np.clip(0.04 + 0.96 * (1 - np.clip(steepness, 0, 1)) ** 4 + rough, 0, 1)[:, None]
     glow = (
         np.asarray(heaven.horizon, np.float32) * 0.75 + np.asarray(heaven.zenith, np.float32) * 0.25
@@ -49,7 +49,7 @@ def random_waves(rng: np.random.Generator, length: float, steepness: float) -> N
     """(N, 4) waves about one direction of the wind; `length` is of the longest, metres."""
     count = 12
     heading = rng.uniform(0, 2 * np.pi)
-    # Lengths without a common measure: waves that fit each other look woven.
+    # Incommensurate lengths: harmonic waves would show a regular pattern.
     lengths = length * np.exp(-rng.uniform(0, 2.3, count))
     angle = heading + rng.normal(0, 0.7, count)
     number = 2 * np.pi / lengths
@@ -59,5 +59,5 @@ def random_waves(rng: np.random.Generator, length: float, steepness: float) -> N
 
 
 def dimmed(light: Daylight) -> float:
-    """Share of the water's light that is lost where the lamp does not reach it."""
+    """Share of the water's light that is lost in shadow."""
     return 0.25 * float(np.mean(light.sun_colour)) / (float(np.mean(light.ambient)) + 0.2)

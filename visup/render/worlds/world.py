@@ -1,8 +1,7 @@
-"""What a random world is made of: things with a pose for every frame, light, a camera, and its truth.
+"""The records of a random world: things with a pose for every frame, light, camera and ground truth.
 
-World coordinates are right-handed with z up, in metres; the floor or table stands at z = 0. Everything is
-sampled: a thing that moves has one pose for each frame, so that kinds may simulate as they please and the
-renderer needs to know nothing of it.
+World coordinates are right-handed with z up, in metres; the floor or table is at z = 0. Motion is sampled: a
+moving thing has one pose for each frame, so the renderer does not depend on how a kind simulates it.
 """
 
 from __future__ import annotations
@@ -24,14 +23,15 @@ SIZE = (480, 360)
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """How a thing's reflectance varies over it.
+    """The texture of a thing.
 
     Attributes:
         pattern: One of those in `surfaces.py`.
-        size: Metres of the largest features of the pattern.
+        size: Size of the largest features of the pattern, metres.
         contrast: 0 to 1.
         seed: Chooses the pattern.
-        second: Reflectance (red, green, blue) that the pattern mixes in; a darker first one when None.
+        second: Reflectance (red, green, blue) that the pattern mixes in; None for a darker shade of the
+            first.
     """
 
     pattern: str = "grain"
@@ -43,12 +43,12 @@ class Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thing:
-    """A solid and where it is in each frame.
+    """A solid and its pose in each frame.
 
     Attributes:
         name: Its name; things that share a name and a label are one object, such as the links of an arm.
         solid: Its mesh.
-        poses: (F, 4, 4) from the solid's frame to the world's, or (1, 4, 4) for what never moves.
+        poses: (F, 4, 4) from the solid's frame to the world's, or (1, 4, 4) if static.
         label: Value in masks; 0 for scenery.
         surface: Its pattern.
     """
@@ -67,13 +67,13 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class Daylight:
-    """One distant lamp and what the surroundings throw back.
+    """One distant lamp and ambient light.
 
     Attributes:
-        sun: The way to the lamp, unit.
-        sun_colour: Radiance of a white surface square to it, red, green, blue.
-        ambient: Radiance of a white surface that faces up and lies in shadow, red, green, blue.
-        softness_px: Standard deviation by which edges of shadows are blurred.
+        sun: Direction to the lamp, unit.
+        sun_colour: Radiance of a white surface perpendicular to it, red, green, blue.
+        ambient: Radiance of a white surface that faces up in shadow, red, green, blue.
+        softness_px: Standard deviation of the blur of shadow edges.
     """
 
     sun: tuple[float, float, float]
@@ -84,13 +84,13 @@ class Daylight:
 
 @dataclass(frozen=True, slots=True)
 class Heaven:
-    """What is seen where nothing stands.
+    """The sky.
 
     Attributes:
-        zenith: Reflected colour overhead, red, green, blue.
-        horizon: And at the horizon.
+        zenith: Colour overhead, red, green, blue.
+        horizon: Colour at the horizon.
         clouds: Share of white that clouds mix in, 0 to 1.
-        seed: Of the clouds.
+        seed: Seed of the clouds.
     """
 
     zenith: tuple[float, float, float] = (0.25, 0.42, 0.75)
@@ -101,7 +101,7 @@ class Heaven:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Water:
-    """Water at z = 0 wherever nothing stands before it.
+    """Water at z = 0.
 
     Attributes:
         colour: Reflectance when seen from above, red, green, blue.
@@ -115,15 +115,15 @@ class Water:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Viewpoint:
-    """A camera that stands still and turns about its pinhole.
+    """A camera at a fixed position that rotates about its pinhole.
 
     Attributes:
         position: Metres.
-        look_at: The point that is in the middle of an undisturbed picture.
+        look_at: The point in the centre of the image without rotation.
         fov_vertical_deg: Vertical field of view at zoom 1.
         turns: (F, 3) degrees of pan, tilt and roll in each frame.
         zoom: (F,) magnification in each frame.
-        style: In a word: fixed, shaking, panning or zooming.
+        style: fixed, shaking, panning or zooming.
     """
 
     position: tuple[float, float, float]
@@ -136,13 +136,13 @@ class Viewpoint:
 
 @dataclass(frozen=True, slots=True)
 class Imager:
-    """What the camera makes of the light.
+    """The sensor of the camera.
 
     Attributes:
         exposure: Factor on all light.
         noise: Standard deviation, of 255.
-        blur_px: Of the lens.
-        jpeg: Quality, 0 to 100, at which each picture is stored before it goes into the video.
+        blur_px: Blur of the lens.
+        jpeg: Quality, 0 to 100, with which each image is compressed before it enters the video.
     """
 
     exposure: float = 1.0
@@ -153,13 +153,13 @@ class Imager:
 
 @dataclass(frozen=True, slots=True)
 class StageSpan:
-    """A stage of the task as it went.
+    """The course of a stage of the task.
 
     Attributes:
         stage: Its name in the task file.
         from_s: When it began.
-        to_s: When it was over, or when the clip ends.
-        outcome: `complete`, `failing` or `unsafe`; `complete` as well where the clip ends before it does.
+        to_s: When it ended, or the end of the clip.
+        outcome: `complete`, `failing` or `unsafe`; `complete` also if the clip ends first.
     """
 
     stage: str
@@ -189,16 +189,16 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """How a task went: what a careful person would note.
+    """The course of a task, as a careful observer would annotate it.
 
     Attributes:
-        outcome: The way it went, one of its kind's, such as `ok` or `drop`.
+        outcome: One of the outcomes of its kind, such as `ok` or `drop`.
         verdict: `succeeded`, `failed`, `interrupted` or `in_progress`.
         stages: In order of time.
-        accept: All verdicts that can be defended; the verdict alone when empty.
-        contacts: Between actors.
-        moves: Of actors.
-        alerts: Kind of invariant that is broken -> since when, seconds.
+        accept: All defensible verdicts; empty for the verdict alone.
+        contacts: Contacts between actors.
+        moves: Motions of actors.
+        alerts: Kind of violated invariant -> since when, seconds.
     """
 
     outcome: str
@@ -212,23 +212,23 @@ class Course:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class World:
-    """All of a random world.
+    """A random world.
 
     Attributes:
-        name: Of its folder.
-        kind: Of machine at work.
-        things: What stands and moves in it.
+        name: Name of its folder.
+        kind: Kind of machine at work.
+        things: Its static and moving things.
         viewpoint: The camera.
         light: The light.
         heaven: The sky.
-        imager: What the camera makes of it.
+        imager: The sensor.
         task: Name of its task file, without suffix.
         task_text: The task in visup's language.
         actors: Actor of the task -> name of the thing.
-        course: What is true.
-        frames: How many there are.
-        water: If there is any.
-        seed: Of noise.
+        course: Ground truth.
+        frames: Number of frames.
+        water: The water, if there is any.
+        seed: Seed of the noise.
         size: Width and height in pixels.
     """
 

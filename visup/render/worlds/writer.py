@@ -25,7 +25,7 @@ from visup.render.worlds.world import FPS, World
 
 Masks = list[NDArray[np.uint8]]
 LEAST_PX = 60
-"""A thing of which less shows in another clip is shown in the clip itself."""
+"""A thing with fewer visible pixels in the second clip is outlined in the clip itself."""
 
 
 def write_world(
@@ -36,17 +36,17 @@ def write_world(
     Args:
         world: What to render.
         out: Folder, new or empty: ``video.mp4``, ``masks/00000.png``, the task file, ``brief.json``,
-            ``truth.json``. The clip in which things are shown, if it is another, goes beside it.
+            ``truth.json``. A second clip, for outlines, is written next to it.
         progress: Told frames done and frames in all.
 
     Returns:
-        What stands in ``truth.json``.
+        The content of ``truth.json``.
 
     Raises:
-        OutputError: The folder cannot be written, or something is in it already.
+        OutputError: The folder cannot be written, or is not empty.
     """
     make_clip_folder(out)
-    # Outlines name the clip that they are drawn in by its folder.
+    # Outlines refer to their clip by its folder.
     world = replace(world, name=out.resolve().name)
     renderer = WorldRenderer(world)
     frames, masks = [], []
@@ -82,7 +82,7 @@ def _shown(world: World, actor: str, at: int, mask: NDArray[np.uint8]) -> dict[s
 
 
 def _lesson(world: World, out: Path, best: dict[str, int]) -> dict[str, Any]:
-    """Write a clip of those frames alone in which things are well seen; nothing if one of them is not."""
+    """Write a clip of only the frames in which things are well visible; nothing if one of them never is."""
     renderer = WorldRenderer(world)
     pictures = [renderer.picture(at) for at in best.values()]
     pairs = list(zip(best, pictures, strict=True))

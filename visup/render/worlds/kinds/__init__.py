@@ -1,4 +1,4 @@
 """The kinds of machines at work: each a function from a random generator and an outcome to a world.
 
-Read `pick.py` first. `KINDS` in `catalogue.py` lists all of them, with the ways in which each may go.
+Read `pick.py` first. `KINDS` in `catalogue.py` lists all of them, with their outcomes.
 """

@@ -61,12 +61,12 @@ class Transfer:
     """One part is taken from a place and put on another; times in seconds.
 
     Attributes:
-        start: (x, y, z) of the part's foot where it stands at first.
-        goal: (x, y, z) where it is put.
+        start: (x, y, z) of the part's foot at the start.
+        goal: (x, y, z) of its goal.
         reach: When the hand sets out for it.
-        close: When it is held.
-        lift: When it leaves its place.
-        place: When it stands on its goal.
+        close: When it is grasped.
+        lift: When it is lifted.
+        place: When it is placed on its goal.
         loose: When the hand leaves it.
     """
 
@@ -81,7 +81,7 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchLayout:
-    """Where things stand on the table, metres: (x, y) each, and the height of the base."""
+    """Positions on the table, (x, y) each, and the height of the base, metres."""
 
     block: Doubles
     cap: Doubles
@@ -92,7 +92,7 @@ class BenchLayout:
 
 
 def build(rng: np.random.Generator, outcome: str) -> World:
-    """A world in which something is put together; `outcome` is one of `OUTCOMES`."""
+    """A world in which parts are assembled; `outcome` is one of `OUTCOMES`."""
     robot = random_robot(rng, (float(rng.uniform(-0.1, 0.1)), 0.38), 0.78)
     half = float(rng.uniform(0.034, 0.044))
     first, second = pick_colour(rng), pick_colour(rng)
@@ -129,7 +129,7 @@ def _layout(
     sizes: tuple[float, float, tuple[float, float]],
     frames: int,
 ) -> tuple[BenchLayout, Viewpoint]:
-    """Places within reach and in the picture."""
+    """Positions within reach and in view."""
     half, high, tall = sizes
     for _ in range(3000):
         places = rng.uniform([-0.42, -0.32], [0.42, 0.12], (3, 2))
@@ -147,7 +147,7 @@ def _layout(
 
 
 def _transfers(rng: np.random.Generator, layout: BenchLayout, outcome: str) -> list[Transfer]:
-    """What is moved, in order: block and cap, or the other way round, and perhaps one away again."""
+    """The transfers, in order: block and cap, or the reverse, and perhaps one taken away again."""
     shift = np.array([1.25 * layout.half, 0.0])
     on = [(*(layout.base - shift), layout.high), (*(layout.base + shift), layout.high)]
     lies = [(*layout.block, 0.0), (*layout.cap, 0.0)]
@@ -180,7 +180,7 @@ def _tip(
     steps: list[Transfer],
     frames: int,
 ) -> RobotCourse:
-    """What the arm does: from part to base, again, and home."""
+    """The arm's course: from part to base, again, and home."""
     home = np.array([0.5 * robot.foot[0], 0.1, float(rng.uniform(0.3, 0.38))])
     grip = 0.45 * min(layout.tall)
     held, rise = np.array([0.0, 0.0, grip]), np.array([0.0, 0.0, 0.13])
@@ -205,7 +205,7 @@ def _tip(
             (s.place + 0.1, tight),
             (s.loose, wide),
         ]
-    # Transfers may follow closely: what would come after the next begins is left out.
+    # Transfers may overlap: keys after the start of the next one are left out.
     keys = [
         k for k, after in zip(keys, [*keys[1:], (np.inf, home)], strict=True) if k[0] < after[0]
     ]
@@ -245,13 +245,13 @@ def _parts(
 def _moved(rng: np.random.Generator, step: Transfer, hand: Poses) -> Poses:
     rest = posed(step.start, float(rng.uniform(0, 6.3)))[0]
     poses = carried(rest, hand, frame_at(step.lift), frame_at(step.place))
-    # Let go a hair above: it stands on the base.
+    # Released slightly above: it comes to rest on the base.
     poses[frame_at(step.place) :, 2, 3] = step.goal[2]
     return poses
 
 
 def _base(rng: np.random.Generator, half: float, high: float, colour: Colour) -> Solid:
-    """A plate or block on which both parts find room side by side."""
+    """A plate or block with room for both parts side by side."""
     wide, deep = half * 6.0, half * float(rng.uniform(3.0, 4.2))
     plate = box((wide, deep, high), (0, 0, high / 2), colour)
     if rng.random() < 0.5:
@@ -270,11 +270,11 @@ def _surroundings(rng: np.random.Generator, robot: RobotDesign, layout: BenchLay
 
 
 def _course(outcome: str, steps: list[Transfer], drop_s: float, end: float) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     a, b = steps[:2]
     touch: tuple[Contact, ...]
     if outcome == "wrong_order":
-        # The cap comes first: what the first stage asks for is not what happens.
+        # The cap comes first: the first stage requires something else.
         stages = spans(("bring_block", a.lift, a.place, "failing"))
         touch = (Contact("cap", "base", a.place, end), Contact("block", "base", b.place, end))
         moves = (Motion("cap", a.lift, a.place), Motion("block", b.lift, b.place))

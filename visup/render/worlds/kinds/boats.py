@@ -39,7 +39,7 @@ TASK = """\
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sailing:
-    """The boat's way: (F, 2) places, (F,) headings; when it is alongside and when it leaves, seconds."""
+    """The boat's path: (F, 2) positions, (F,) headings; when it is alongside and when it leaves, seconds."""
 
     at: Doubles
     heading: Doubles
@@ -82,7 +82,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
 def _sail(
     rng: np.random.Generator, wide: float, outcome: str, begin: float, frames: int
 ) -> Sailing:
-    """The way; the edge of the berth lies along x at y = 0, the boat comes from -y."""
+    """The path; the edge of the berth lies along x at y = 0, the boat comes from -y."""
     t = clock(frames)
     side = float(rng.choice([-1, 1]))
     near = begin + float(rng.uniform(5.5, 7.0))
@@ -117,7 +117,7 @@ def _sail(
 def _bobbing(
     rng: np.random.Generator, t: Doubles, at: Doubles, amount: float, heading: Doubles | float = 0.0
 ) -> Poses:
-    """(F, 4, 4) of what floats at (2,) or (F, 2)."""
+    """(F, 4, 4) poses of a vessel floating at (2,) or (F, 2)."""
     a, b, c = rng.uniform(0, 6.3, 3)
     heave = 0.05 * amount * np.sin(2 * np.pi * t / 2.6 + a)
     roll = 0.05 * amount * np.sin(2 * np.pi * t / 2.1 + b)
@@ -165,7 +165,7 @@ def _boat(rng: np.random.Generator, length: float, wide: float, colour: Colour) 
 
 
 def _pier(rng: np.random.Generator) -> tuple[Solid, float]:
-    """A pier on posts whose edge lies at y = 0 of its frame, and where that is."""
+    """A pier on posts whose edge lies at y = 0 of its frame, and its pose."""
     half, deep = float(rng.uniform(2.6, 4.0)), float(rng.uniform(1.2, 2.2))
     colour = (0.42, 0.33, 0.24) if rng.random() < 0.5 else pick_colour(rng, vivid=False)
     deck = box((2 * half, deep, 0.2), (0, deep / 2, 0.6), colour)
@@ -211,7 +211,7 @@ def _surroundings(rng: np.random.Generator) -> list[Thing]:
 
 
 def _course(outcome: str, berth: str, sailing: Sailing, begin: float, end: float) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     stages = spans(("approach", begin, sailing.near))
     moves = (Motion("boat", begin, sailing.near),)
     touch = (Contact("boat", berth, sailing.near, min(sailing.off, end)),)

@@ -42,10 +42,10 @@ KINDS: Mapping[str, WorldKind] = {
 
 
 def known_kinds(kinds: Sequence[str]) -> tuple[str, ...]:
-    """These kinds; all when empty.
+    """The kinds of these names; all if empty.
 
     Raises:
-        SettingsError: There is no kind of a name.
+        SettingsError: A kind does not exist.
     """
     for kind in kinds:
         if kind not in KINDS:
@@ -54,19 +54,19 @@ def known_kinds(kinds: Sequence[str]) -> tuple[str, ...]:
 
 
 def random_world(kind: str, seed: int, outcome: str | None = None) -> World:
-    """A world of a kind, the same for the same kind, seed and outcome.
+    """A world of a kind; deterministic for a kind, seed and outcome.
 
     Args:
         kind: One of `KINDS`.
-        seed: Chooses all that is random.
-        outcome: How it goes; drawn from the seed when None, half of the time success.
+        seed: Random seed.
+        outcome: The outcome; if None, drawn from the seed, with success in half of the worlds.
 
     Raises:
-        SettingsError: There is no such kind, or it cannot go that way.
+        SettingsError: The kind does not exist, or does not have that outcome.
     """
     known_kinds((kind,))
     chosen = KINDS[kind]
-    # Seeds are shared by kinds: the name keeps them from drawing the same numbers.
+    # With the kind in the seed, kinds draw different numbers from the same seed.
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     drawn = chosen.outcomes[0]
     if rng.random() > 0.35:

@@ -67,14 +67,14 @@ RETRY = """\
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChargeLayout:
-    """Where the charger stands and how it is driven to, metres.
+    """Positions of the charger and of the vehicle, metres.
 
     Attributes:
         charger: (x, y).
         ahead: (2,) unit, the heading in which the vehicle docks.
-        start: (x, y) of the vehicle's middle at first.
-        dock: (x, y) of its middle when it touches the charger.
-        length: Of the vehicle.
+        start: (x, y) of the vehicle's centre at the start.
+        dock: (x, y) of its centre when it touches the charger.
+        length: Length of the vehicle.
     """
 
     charger: Doubles
@@ -86,10 +86,10 @@ class ChargeLayout:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """The vehicle's way: (F, 2) places, (F,) headings, and the times of what happens, seconds.
+    """The vehicle's path: (F, 2) positions, (F,) headings, and the times of events, seconds.
 
-    `near` is when it is at the charger (or nearest to it), `off` when it backs off, `again` when it sets out
-    for another try; the last two are past the end where they do not happen.
+    `near` is when it is at the charger (or nearest to it), `off` when it backs off, `again` when it starts
+    another attempt; the last two are past the end if they do not happen.
     """
 
     at: Doubles
@@ -146,7 +146,7 @@ def _task(rng: np.random.Generator, outcome: str) -> tuple[str, str]:
 def _layout(
     rng: np.random.Generator, length: float, front: float, frames: int
 ) -> tuple[ChargeLayout, Viewpoint]:
-    """The charger within the picture, the vehicle at its start within it or not."""
+    """Positions with the charger in view; the vehicle may start out of view."""
     for _ in range(2000):
         side = rng.choice([-1.0, 1.0])
         charger = np.array([side * rng.uniform(0.7, 1.7), rng.uniform(-0.7, 1.0)])
@@ -171,7 +171,7 @@ def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
 def _drive(
     rng: np.random.Generator, layout: ChargeLayout, outcome: str, begin: float, frames: int
 ) -> Drive:
-    """The way and its times."""
+    """The path and its times."""
     t = clock(frames)
     near = begin + float(rng.uniform(4.0, 6.0))
     none = t[-1] + 1
@@ -200,14 +200,14 @@ def _drive(
 
 
 def _retry(rng: np.random.Generator, layout: ChargeLayout, begin: float, t: Doubles) -> Drive:
-    """Comes up beside the charger, backs off, comes again and docks."""
+    """The vehicle misses the charger, backs off, tries again and docks."""
     first = begin + float(rng.uniform(2.6, 3.4))
     off = first + float(rng.uniform(0.4, 0.7))
     again = off + float(rng.uniform(1.8, 2.3))
     docked = again + float(rng.uniform(2.2, 2.8))
     way = _way(layout, layout.dock - rng.uniform(0.3, 0.5) * layout.ahead)
     at, heading = along(way, cruised(t, begin, first))
-    # Back along the way it came, then on to the dock itself.
+    # Back along its path, then to the dock itself.
     back = float(rng.uniform(0.9, 1.3))
     shift = eased(t, [(off, 0.0), (again, -back)])
     at = at + shift[:, None] * layout.ahead
@@ -217,7 +217,7 @@ def _retry(rng: np.random.Generator, layout: ChargeLayout, begin: float, t: Doub
 
 
 def _pass_by(rng: np.random.Generator, layout: ChargeLayout, begin: float, t: Doubles) -> Drive:
-    """Drives past the charger, before or behind it."""
+    """The vehicle drives past the charger, in front of or behind it."""
     across = np.array([-layout.ahead[1], layout.ahead[0]])
     if across[1] > 0:
         across = -across
@@ -242,7 +242,7 @@ def _way(layout: ChargeLayout, goal: Doubles) -> Doubles:
 
 
 def _in_view(view: Viewpoint, drive: Drive, frames: int) -> float:
-    """When the middle of the vehicle is first within the picture, seconds."""
+    """When the centre of the vehicle is first in view, seconds."""
     points = np.column_stack([drive.at, np.full(len(drive.at), 0.2)])
     xy = projected(view, points, SIZE)
     inside = ((xy > 0) & (xy < np.array(SIZE))).all(axis=1)
@@ -250,7 +250,7 @@ def _in_view(view: Viewpoint, drive: Drive, frames: int) -> float:
 
 
 def _post_poses(layout: ChargeLayout, drive: Drive, outcome: str) -> Poses:
-    """The charger, which faces the vehicle; it gives way when it is rammed."""
+    """The charger, which faces the vehicle; it is pushed back if rammed."""
     yaw = float(np.arctan2(-layout.ahead[1], -layout.ahead[0]))
     if outcome != "ram":
         return posed([*layout.charger, 0.0], yaw)
@@ -261,7 +261,7 @@ def _post_poses(layout: ChargeLayout, drive: Drive, outcome: str) -> Poses:
 
 
 def _course(outcome: str, drive: Drive, begin: float, end: float, hold: int) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     touch = (Contact("vehicle", "charger", drive.docked, min(drive.off, end)),)
     stages: tuple[StageSpan, ...] = spans(("approach", begin, drive.near))
     moves: tuple[Motion, ...] = (Motion("vehicle", begin, drive.near),)

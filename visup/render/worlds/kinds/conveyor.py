@@ -41,7 +41,7 @@ TASK = """\
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ride:
-    """The parcel's poses (F, 4, 4), and when it goes over the edge and is down; seconds."""
+    """The parcel's poses (F, 4, 4), and when it goes over the edge and lands, seconds."""
 
     poses: Poses
     over: float
@@ -82,7 +82,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
 
 
 def _ride(rng: np.random.Generator, way: float, outcome: str, begin: float, frames: int) -> Ride:
-    """Along the belt and over its end, off its side, or to a stop half way."""
+    """Along the belt and over its end, off its side, or to a stop halfway."""
     t = clock(frames)
     over = begin + float(rng.uniform(4.5, 6.0))
     start = -RIDE + rng.uniform(0.15, 0.5)
@@ -113,7 +113,7 @@ def _ride(rng: np.random.Generator, way: float, outcome: str, begin: float, fram
 def _follower(
     rng: np.random.Generator, parcel: Solid, ride: Ride, way: float, surface: Surface
 ) -> Thing:
-    """A parcel that looks the same, behind the first; the belt stops when the first is through."""
+    """An identical parcel behind the first; the belt stops when the first has arrived."""
     frames = len(ride.poses)
     first = way * ride.poses[:, 0, 3]
     last = min(frame_at(ride.over) - 1, frames - 1)
@@ -165,7 +165,7 @@ def _surroundings(rng: np.random.Generator, frames: int) -> list[Thing]:
 
 
 def _course(outcome: str, ride: Ride, begin: float, end: float) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     moves = (Motion("parcel", begin, ride.down),)
     if outcome == "jams":
         stages = spans(("ride", begin, end, "failing"))

@@ -52,7 +52,7 @@ SHORT = """\
 
 @dataclass(frozen=True, slots=True)
 class CraneTimes:
-    """When the container sets out, hangs above its goal, stands, is let go and the crane rises; seconds."""
+    """When the container starts, is above its goal, is set down, is released, and the crane rises."""
 
     begin: float
     above: float
@@ -78,7 +78,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     things = [
         Thing("container", box(size, (0, 0, size[2] / 2), colour), load, CONTAINER, surface),
         Thing("spreader", _spreader(rng, size), hook, SPREADER, plain),
-        # The rope that it hangs from is nobody's actor: ever more of it comes into view.
+        # The rope is no actor: more and more of it comes into view.
         Thing("rope", cone((0, 0, 0.6), (0, 0, 9), 0.035, None, BLACK), hook, 0, plain),
         Thing("truck", truck, still(0, 0, 0, float(rng.uniform(-0.25, 0.25))), TRUCK, plain),
         *_surroundings(rng, frames),
@@ -111,11 +111,11 @@ def _moves_of(
     start = np.array([side * rng.uniform(2.8, 3.4), rng.uniform(-0.3, 0.6), rng.uniform(2.0, 2.5)])
     goal = bed.copy()
     if outcome == "miss":
-        # Before the truck: in the picture it may well touch it.
+        # In front of the truck: in the image they may touch.
         goal = np.array([rng.uniform(-1.0, 0.4), -rng.uniform(1.7, 2.3), 0.0])
     over = np.array([goal[0], goal[1], max(start[2], 2.0)])
     if outcome == "drop":
-        # It comes along before the truck, so that what falls meets the ground.
+        # It moves in front of the truck, so that a dropped container falls to the ground.
         start[1] = over[1] = -rng.uniform(2.1, 2.6)
     keys = [(times.begin, start), (times.above, over), (times.down, goal)]
     path = eased(t, keys)
@@ -136,7 +136,7 @@ def _moves_of(
 
 
 def _sway(rng: np.random.Generator, t: Doubles, times: CraneTimes) -> Doubles:
-    """(F,) metres by which the load swings while it hangs."""
+    """(F,) displacement of the swinging load, metres."""
     hangs = np.clip((times.down - 0.3 - t) / 1.5, 0, 1) * np.clip((t - times.begin) / 1.0, 0, 1)
     return np.asarray(0.05 * hangs * np.sin(2 * np.pi * t / rng.uniform(1.8, 2.6)))
 
@@ -157,7 +157,7 @@ def _truck(rng: np.random.Generator, colour: Colour) -> Solid:
 
 
 def _spreader(rng: np.random.Generator, size: Doubles) -> Solid:
-    """A frame with its slings, whose lower side lies on the container; origin there."""
+    """A frame with its slings; origin on its lower side, which lies on the container."""
     colour = pick_colour(rng)
     frame = box((size[0] * 0.9, size[1] * 0.7, 0.12), (0, 0, 0.06), colour)
     block = box((0.5, 0.35, 0.3), (0, 0, 0.5), STEEL)
@@ -192,7 +192,7 @@ def _surroundings(rng: np.random.Generator, frames: int) -> list[Thing]:
 
 
 def _course(times: CraneTimes, outcome: str, drop_s: float, short: bool) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     t = times
     held = Contact("spreader", "container", 0.0, min(t.loose, drop_s))
     touch = Contact("container", "truck", t.down, t.end)

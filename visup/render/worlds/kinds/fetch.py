@@ -50,14 +50,14 @@ TASK = """\
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FetchLayout:
-    """Where the cart stands and how it is taken, metres.
+    """Positions of the cart and of the tug, metres.
 
     Attributes:
-        cart: (x, y) of the cart's middle.
-        ahead: (2,) unit, the heading in which the tug meets it.
-        start: (x, y) of the tug's middle at first.
-        meet: (x, y) of its middle when it touches the cart.
-        goal: (2,) by which the cart is hauled, backwards.
+        cart: (x, y) of the cart's centre.
+        ahead: (2,) unit, heading of the tug when it reaches the cart.
+        start: (x, y) of the tug's centre at the start.
+        meet: (x, y) of its centre when it touches the cart.
+        goal: (2,) displacement of the cart, backwards.
     """
 
     cart: Doubles
@@ -69,7 +69,7 @@ class FetchLayout:
 
 @dataclass(frozen=True, slots=True)
 class FetchTimes:
-    """When the tug sets out, meets the cart, leaves with it, loses it, stops, and the clip ends; seconds."""
+    """When the tug starts, reaches the cart, leaves with it, loses it, stops, and the clip ends, seconds."""
 
     begin: float
     meet: float
@@ -114,7 +114,7 @@ def _times(rng: np.random.Generator, outcome: str) -> FetchTimes:
 
 
 def _layout(rng: np.random.Generator, reach: float, frames: int) -> tuple[FetchLayout, Viewpoint]:
-    """The cart in the picture, and where it is hauled to."""
+    """Positions with the cart and its goal in view."""
     for _ in range(2000):
         side = float(rng.choice([-1, 1]))
         cart = np.array([side * rng.uniform(0.9, 1.8), rng.uniform(-0.7, 1.0)])
@@ -139,7 +139,7 @@ def _layout(rng: np.random.Generator, reach: float, frames: int) -> tuple[FetchL
 
 
 def _drive(layout: FetchLayout, times: FetchTimes, frames: int) -> tuple[Doubles, Doubles]:
-    """(F, 2) places and (F,) headings of the tug: forward to the cart, backward from it."""
+    """(F, 2) positions and (F,) headings of the tug: forward to the cart, backward from it."""
     t = clock(frames)
     straight = layout.meet - 0.6 * layout.ahead
     curve = bend(layout.start, straight - 0.9 * layout.ahead, straight)
@@ -151,7 +151,7 @@ def _drive(layout: FetchLayout, times: FetchTimes, frames: int) -> tuple[Doubles
 def _cart_poses(
     layout: FetchLayout, times: FetchTimes, at: Doubles, outcome: str, frames: int
 ) -> Poses:
-    """(F, 4, 4) of the cart: it stands, follows, and stands where it is lost."""
+    """(F, 4, 4) of the cart: at rest, then following, then at rest where it is lost."""
     yaw = float(np.arctan2(layout.ahead[1], layout.ahead[0]))
     first, last = frame_at(times.haul), min(frame_at(times.loses), frames)
     shift = np.zeros((frames, 2))
@@ -201,7 +201,7 @@ def _surroundings(
 
 
 def _course(outcome: str, times: FetchTimes) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     t = times
     moves: tuple[Motion, ...] = (Motion("tug", t.begin, t.meet), Motion("tug", t.haul, t.stop))
     stages = spans(("approach", t.begin, t.meet), ("coupling", t.meet, t.haul))

@@ -50,7 +50,7 @@ TASK = """\
 
 @dataclass(frozen=True, slots=True)
 class HandoverTimes:
-    """When the giver sets out, the receiver does, is there, holds, the giver lets go, draws back; seconds."""
+    """When giver and receiver start, the receiver arrives, grasps, the giver releases, retreats, seconds."""
 
     begin: float
     offer: float
@@ -117,9 +117,9 @@ class Partner:
 
     Attributes:
         design: The arm.
-        goal: (3,) where its tip is while the bar changes hands, metres.
-        tight: Width of its fingers when they hold the bar, metres, and
-        wide: When they do not.
+        goal: (3,) position of its tip during the handover, metres.
+        tight: Distance of its fingers when they hold the bar, metres.
+        wide: The same when they do not.
     """
 
     design: RobotDesign
@@ -133,7 +133,7 @@ class Partner:
         return cls(design, goal, 2 * thick, 2 * thick + 0.05)
 
     def random_home(self, rng: np.random.Generator) -> Doubles:
-        """(3,) where its tip waits: on its own side, a little before the foot."""
+        """(3,) rest position of its tip: on its own side, slightly in front of the foot."""
         x, y = self.design.foot[:2]
         return np.array([0.62 * x, y - 0.12, float(rng.uniform(0.3, 0.4))])
 
@@ -180,7 +180,7 @@ def _payload_poses(
 ) -> tuple[Poses, float]:
     """(F, 4, 4) of the bar, and when it is dropped (past the end if it is not), seconds.
 
-    The bar lies level where it changes hands; before that it goes with the giver, after with the receiver.
+    The bar is level during the handover; before it moves with the giver, afterwards with the receiver.
     """
     (giver, receiver), t = hands, times
     frames = len(giver)
@@ -222,7 +222,7 @@ def _surroundings(
 
 
 def _course(times: HandoverTimes, outcome: str, drop_s: float) -> Course:
-    """What is true of it."""
+    """Ground truth."""
     t = times
     offer = ("offer", t.offer, t.take)
     moves: tuple[Motion, ...] = (Motion("payload", t.begin, t.reach - 0.3),)

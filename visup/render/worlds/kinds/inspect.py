@@ -51,7 +51,7 @@ STATUES = (
 )
 HOLD_S = 5
 CLEAR_PX = 12
-"""Pixels between both in the picture, for those flights that are clearly free of the station."""
+"""Image distance between both, pixels, in flights that are clear of the station."""
 
 Doubles = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ never touching(inspector, station)
 
 @dataclass(frozen=True, slots=True)
 class InspectTimes:
-    """When it sets out, is on its circle, leaves it (or hits the station), and the clip ends; seconds."""
+    """When it starts, is on its circle, leaves it (or hits the station), and the clip ends, seconds."""
 
     begin: float
     arrive: float
@@ -85,7 +85,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     times = _times(rng, outcome)
     frames = frames_until(times.end)
     standing = still(0, 0, 0, float(rng.uniform(0, 6.3)))
-    # Some pass before or behind the station in the picture, which is no touch but looks like one.
+    # Some pass in front of or behind the station, which looks like contact in the image but is not.
     crossing = bool(rng.random() < 0.2)
     for least in (55, 65, 72, 78, 82, 85):
         view = _view(rng, (radius, height), least, frames)
@@ -154,7 +154,7 @@ def _tower(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
 def _craft(
     rng: np.random.Generator, colour: Colour, height: float, flies: bool
 ) -> tuple[Solid, float]:
-    """The inspector and the height at which it goes."""
+    """The inspector and its height."""
     if flies:
         return machines.drone(rng, colour, float(rng.uniform(0.6, 0.9))), height * float(
             rng.uniform(0.35, 0.75)
@@ -173,7 +173,7 @@ def _times(rng: np.random.Generator, outcome: str) -> InspectTimes:
 def _view(
     rng: np.random.Generator, sizes: tuple[float, float], least_deg: float, frames: int
 ) -> Viewpoint:
-    """From high up, so that going round is seen as such; no zoom, since the task counts pixels."""
+    """From high up, so that the circle is visible; no zoom, since the task measures in pixels."""
     radius, height = sizes
     high, side = np.radians(rng.uniform(least_deg, 88)), rng.uniform(0, 2 * np.pi)
     far = 3.6 * (radius + 0.5)
@@ -235,7 +235,7 @@ def _scattered_over(solid: Solid, count: int) -> Doubles:
 
 
 def _stopped(poses: Poses, hit: int, level: float) -> tuple[Poses, float]:
-    """It stops where it hits; what flies falls a little later."""
+    """It stops at the impact; a flying craft falls a little later."""
     out = poses.copy()
     out[hit:] = poses[hit]
     since = hit + FPS
@@ -245,7 +245,7 @@ def _stopped(poses: Poses, hit: int, level: float) -> tuple[Poses, float]:
 
 
 def _gaps(view: Viewpoint, station: Solid, standing: Poses, craft: Solid, poses: Poses) -> Doubles:
-    """(F,) pixels between the outlines of both, about, as the undisturbed camera sees them."""
+    """(F,) approximate distance between their outlines, pixels, for the camera without shake."""
     still_points = projected(view, _scattered_over(station, 600) @ standing[0, :3, :3].T, SIZE)
     own = _scattered_over(craft, 200)
     found = []
@@ -256,7 +256,7 @@ def _gaps(view: Viewpoint, station: Solid, standing: Poses, craft: Solid, poses:
 
 
 def _course(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> tuple[Course, int]:
-    """What is true, and the range in pixels that its user chose."""
+    """Ground truth, and the range in pixels that its user chose."""
     t = clock(len(gaps))
     round_about = (t >= times.arrive) & (t <= times.leave)
     limit = int(np.ceil(gaps[round_about].max() * 1.12 / 10) * 10)

@@ -1,4 +1,4 @@
-"""What a kind of world is, and what its builders share."""
+"""A kind of world, and helpers shared by the builders."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from visup.render.worlds.viewpoint import disturbed, steady
 from visup.render.worlds.world import FPS, Course, StageSpan, Thing, Viewpoint, Water, World
 
 STYLES = ("fixed", "fixed", "shaking", "panning", "zooming")
-"""Ways to hold the camera, two of five on a tripod."""
+"""Camera motions; in two of five worlds it is on a tripod."""
 
 STRANGERS = ("bystander", "other")
-"""Things that move and have no part in the work."""
+"""Moving things without a role in the task."""
 
 LONGEST_S = 15.0
 
@@ -26,9 +26,9 @@ class WorldKind:
     """A kind of machine at work.
 
     Attributes:
-        name: Such as `pick`.
-        outcomes: The ways it may go; the first is success.
-        build: Makes a world from a generator and one of the outcomes.
+        name: Its name, such as `pick`.
+        outcomes: The possible outcomes; the first is success.
+        build: Makes a world from a random generator and an outcome.
     """
 
     name: str
@@ -39,23 +39,23 @@ class WorldKind:
 def random_view(
     rng: np.random.Generator, position: ArrayLike, aim: ArrayLike, frames: int
 ) -> Viewpoint:
-    """A camera of random field of view at a place, held in one of the ways of `STYLES`."""
+    """A camera of random field of view at a position, with one of the motions of `STYLES`."""
     fov = float(rng.uniform(35, 43))
     return disturbed(steady(position, aim, fov, frames), rng, str(rng.choice(STYLES)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Script:
-    """What a kind scripts; the rest of a world is drawn when it is finished.
+    """The scripted part of a world; the rest is drawn when it is finished.
 
     Attributes:
-        things: What stands and moves in it.
+        things: Its static and moving things.
         view: The camera.
         task: Name of the task file and its text.
-        actors: Of the task, named as their things are.
-        course: What is true.
-        frames: How many there are.
-        water: If there is any.
+        actors: Actors of the task, with the names of their things.
+        course: Ground truth.
+        frames: Number of frames.
+        water: The water, if there is any.
     """
 
     things: Sequence[Thing]
@@ -68,11 +68,11 @@ class Script:
 
 
 def finished(rng: np.random.Generator, kind: str, script: Script) -> World:
-    """The world of a script, with light, sky and the flaws of a camera."""
+    """The world of a script, with light, sky and camera flaws."""
     light = random_light(rng, np.asarray(script.view.position))
     name, text = script.task
     if any(thing.name in STRANGERS for thing in script.things):
-        # Who knows that others come by says so; whoever does not is right to be alarmed.
+        # A user who expects bystanders declares them; otherwise alerts about them are correct.
         text += "bystanders ignored\n"
     return World(
         "",
@@ -99,30 +99,30 @@ def from_around(
     high_deg: tuple[float, float],
     side: float = 0.6,
 ) -> NDArray[np.float64]:
-    """(3,) a place for a camera: on the side of -y, so far from what it looks at.
+    """(3,) position of a camera, on the side of -y.
 
     Args:
-        rng: Draws where.
-        aim: (3,) what it looks at, metres.
-        far: Metres.
-        high_deg: Least and most elevation.
-        side: Most radians to either side.
+        rng: Random generator.
+        aim: (3,) point it looks at, metres.
+        far: Distance to that point, metres.
+        high_deg: Smallest and largest elevation, degrees.
+        side: Largest azimuth to either side, radians.
     """
     turn, high = rng.uniform(-side, side), np.radians(rng.uniform(*high_deg))
     return np.asarray(aim, float) + far * bearing(float(turn), float(high))
 
 
 def bearing(turn: float, high: float) -> NDArray[np.float64]:
-    """(3,) unit, from the origin towards -y, turned to the side and raised, radians."""
+    """(3,) unit, from the origin towards -y, rotated by an azimuth and an elevation, radians."""
     return np.array([np.sin(turn) * np.cos(high), -np.cos(turn) * np.cos(high), np.sin(high)])
 
 
 def cut_short(course: Course, end_s: float) -> Course:
-    """A course of a clip that ends before the task does and in which nothing went wrong.
+    """The course of a clip that ends before the task does, without errors.
 
     Args:
-        course: As it would have gone on.
-        end_s: When the clip ends.
+        course: The complete course.
+        end_s: End of the clip.
     """
     begun = [s for s in course.stages if s.from_s < end_s]
     last = replace(begun[-1], to_s=end_s)
@@ -144,5 +144,5 @@ def spans(*rows: tuple[str, float, float] | tuple[str, float, float, str]) -> tu
 
 
 def frames_until(seconds: float) -> int:
-    """Frames of a clip that ends at a time, 15 s at most."""
+    """Number of frames of a clip that ends at a time, 15 s at most."""
     return int(min(seconds, LONGEST_S) * FPS)

@@ -39,24 +39,24 @@ from visup.render.worlds.world import SIZE, Poses, Surface, Thing, Viewpoint, Wo
 OUTCOMES = ("ok", "drop", "never", "miss", "wrong_place", "retry", "in_progress")
 GRIPPER, PART, FIXTURE, ARM, DECOY = 2, 3, 4, 5, 6
 DOUBTFUL = ("never", "miss")
-"""Outcomes of which a supervisor without a time limit may also say that the task is not over."""
+"""Outcomes for which a supervisor without a time limit may also report a task in progress."""
 
 Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PickLayout:
-    """Where things are on the table, metres.
+    """Positions on the table, metres.
 
     Attributes:
         robot: The arm.
-        part: (x, y) where the part stands at first.
-        target: (x, y) of the middle of the fixture.
-        astray: (x, y) beside the fixture, where a part that is put in the wrong place goes.
+        part: (x, y) of the part at the start.
+        target: (x, y) of the centre of the fixture.
+        astray: (x, y) beside the fixture, for a part put in the wrong place.
         half: Half the part's width.
         tall: The part's height.
         bottom: Height of the fixture's floor.
-        home: (x, y, z) where the tip waits.
+        home: (x, y, z) rest position of the tip.
     """
 
     robot: RobotDesign
@@ -71,9 +71,9 @@ class PickLayout:
 
 @dataclass(frozen=True, slots=True)
 class PickTimes:
-    """When things happen, seconds; what does not happen in a course is past its end.
+    """Times of events, seconds; past the end for those that do not happen.
 
-    `slip` and `again` are of a first try that comes to nothing; the others follow each other.
+    `slip` and `again` belong to a failed first attempt; the others follow each other.
     """
 
     begin: float
@@ -118,7 +118,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
 
 
 def random_times(rng: np.random.Generator, outcome: str) -> PickTimes:
-    """When what happens."""
+    """Times of the events."""
     begin = float(rng.uniform(0.4, 1.4))
     arrive = begin + float(rng.uniform(2.0, 3.2))
     slip = again = arrive
@@ -141,7 +141,7 @@ def random_times(rng: np.random.Generator, outcome: str) -> PickTimes:
 def tip_course(
     rng: np.random.Generator, layout: PickLayout, times: PickTimes, outcome: str, frames: int
 ) -> RobotCourse:
-    """What the arm does."""
+    """The arm's course."""
     grip = 0.45 * layout.tall
     aside = layout.part.copy()
     if outcome == "miss":
@@ -184,13 +184,13 @@ def tip_course(
 def part_poses(
     rng: np.random.Generator, layout: PickLayout, times: PickTimes, hand: Poses, outcome: str
 ) -> tuple[Poses, float]:
-    """(F, 4, 4) where the part is, and when it is dropped (past the end if it is not), seconds."""
+    """(F, 4, 4) of the part, and when it is dropped (past the end if it is not), seconds."""
     rest = posed([*layout.part, 0.0], float(rng.uniform(0, 6.3)))[0]
     frames = len(hand)
     if outcome in DOUBTFUL:
         return np.tile(rest, (frames, 1, 1)), times.end
     poses = carried(rest, hand, frame_at(times.lift), frame_at(times.release))
-    # The hand turns while it swings round; what it set down stands upright all the same.
+    # The hand rotates as the arm swings; a part set down is upright nevertheless.
     if outcome != "drop":
         return poses, times.end
     since = times.carry + float(rng.uniform(0.08, 0.2)) * (times.place - times.carry)
@@ -200,7 +200,7 @@ def part_poses(
 
 
 def _opening(layout: PickLayout, times: PickTimes, outcome: str, frames: int) -> Doubles:
-    """(F,) metres between the fingers."""
+    """(F,) distance between the fingers, metres."""
     wide, tight = 2 * layout.half + 0.05, 2 * layout.half
     keys: list[tuple[float, float]] = []
     if outcome == "retry":
@@ -253,7 +253,7 @@ def _open_box(wide: float, deep: float, high: float, colour: Colour) -> Solid:
 def _layout(
     rng: np.random.Generator, robot: RobotDesign, sizes: tuple[float, float, float], frames: int
 ) -> tuple[PickLayout, Viewpoint]:
-    """Places within reach of the arm and in view of the camera, far enough from each other."""
+    """Positions within reach of the arm and in view, far enough from each other."""
     half, tall, bottom = sizes
     for _ in range(2000):
         part, target, astray = (rng.uniform([-0.4, -0.3], [0.4, 0.2]) for _ in range(3))
@@ -290,7 +290,7 @@ def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
 def _surroundings(
     rng: np.random.Generator, layout: PickLayout, part: Solid, surface: Surface
 ) -> list[Thing]:
-    """The table, what lies about, and at times a part that looks like the right one."""
+    """The table, clutter, and sometimes a part that looks like the right one."""
     ways = clutter.corridor(layout.part, layout.target, 0.26)
     ways += clutter.corridor(layout.target, layout.astray, 0.26)
     taken = [*ways, (*layout.robot.foot, 0.2), (*layout.part, 0.2), (*layout.target, 0.2)]

@@ -1,4 +1,4 @@
-"""What is true of a pick, and the task files that users write for one."""
+"""Ground truth of a pick, and the task files that users write for one."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ PLACE_AGAIN = (
 def course_and_task(
     rng: np.random.Generator, times: PickTimes, outcome: str, drop_s: float
 ) -> tuple[Course, str, str]:
-    """What is true, the name of the task file and its text."""
+    """Ground truth, and the name and text of the task file."""
     if outcome == "retry":
         name, text = "place_again", PLACE_AGAIN
     elif rng.random() < 0.5:
@@ -77,7 +77,7 @@ def _stages(times: PickTimes, outcome: str, drop_s: float, short: bool) -> tuple
     rows.append(("grasp", t.close, t.lift))
     fails = outcome == "drop"
     if short:
-        # Without a stage for the lift the grasp goes on until the part begins to near the fixture.
+        # Without a lift stage, the grasp lasts until the part begins to approach the fixture.
         on = t.lift + 0.7 * (t.carry - t.lift)
         rows[-1] = ("grasp", t.close, on)
         rows.append(("carry", on, drop_s, "failing") if fails else ("carry", on, t.place))

@@ -1,4 +1,4 @@
-"""`walker`: a person or a legged robot walks to a place on the floor, and keeps off another."""
+"""`walker`: a person or a legged robot walks to a mark on the floor and avoids a danger area."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ OUTCOMES = ("ok", "crosses", "turns_back", "in_progress")
 WALKER, BYSTANDER = 2, 7
 HOLD_S = 1
 FLOOR_FROM = 5.0
-"""Metres from the corner that floors are measured from to the middle of the scene, both ways."""
+"""Distance from the origin of floor coordinates to the centre of the scene along both axes, metres."""
 
 Doubles = NDArray[np.float64]
 
@@ -56,12 +56,12 @@ never inside(walker, danger)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkLayout:
-    """Where one walks, metres on the floor.
+    """Positions on the floor, metres.
 
     Attributes:
-        start: (x, y).
-        mark: (x, y) of the middle of the mark.
-        danger: (x, y) of the middle of the danger area.
+        start: (x, y) of the start.
+        mark: (x, y) of the centre of the mark.
+        danger: (x, y) of the centre of the danger area.
         half: Half the side of the mark.
         danger_half: Half the side of the danger area.
     """
@@ -99,7 +99,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
 
 
 def _layout(rng: np.random.Generator, frames: int) -> tuple[WalkLayout, Viewpoint]:
-    """Start, mark and danger area in the picture, the straight way over the danger area."""
+    """Start, mark and danger area in view, with the danger area on the straight path."""
     for _ in range(2000):
         side = float(rng.choice([-1, 1]))
         start = np.array([-side * rng.uniform(1.8, 3.0), rng.uniform(-1.4, 1.4)])
@@ -109,7 +109,7 @@ def _layout(rng: np.random.Generator, frames: int) -> tuple[WalkLayout, Viewpoin
         layout = WalkLayout(start, mark, danger, float(halves[0]), float(halves[1]))
         aim = np.array([0.0, 0.0, 0.4])
         place = from_around(rng, aim, float(rng.uniform(8.0, 9.5)), (38, 68))
-        # The floor is measured once: the camera stands still.
+        # The floor is measured once, so the camera is static.
         view = steady(place, aim, float(rng.uniform(38, 44)), frames)
         corners = np.concatenate(
             [_corners(mark, layout.half), _corners(danger, layout.danger_half)]
@@ -132,12 +132,12 @@ def _zone(middle: Doubles, half: float) -> str:
 
 
 def _metres(point: Doubles) -> str:
-    """A point of the floor as a task file writes it, seen from a corner of it."""
+    """A point of the floor as a task file writes it, relative to the corner of the floor."""
     return f"({point[0] + FLOOR_FROM:.2f} m, {point[1] + FLOOR_FROM:.2f} m)"
 
 
 def _ground(view: Viewpoint, layout: WalkLayout) -> str:
-    """Where the corners of the mark and of the danger area are in the picture, and on the floor."""
+    """The corners of the mark and of the danger area in the image and on the floor."""
     corners = np.concatenate(
         [_corners(layout.mark, layout.half), _corners(layout.danger, layout.danger_half)]
     )
@@ -149,11 +149,11 @@ def _ground(view: Viewpoint, layout: WalkLayout) -> str:
 def _walk(
     rng: np.random.Generator, layout: WalkLayout, outcome: str, begin: float, frames: int
 ) -> tuple[Doubles, Doubles, float]:
-    """(F, 2) places, (F,) headings, and when the goal is reached, seconds."""
+    """(F, 2) positions, (F,) headings, and when the goal is reached, seconds."""
     t = clock(frames)
     ahead = layout.mark - layout.start
     across = np.array([-ahead[1], ahead[0]]) / np.linalg.norm(ahead)
-    # Twice as far as the curve is to pass: a quadratic curve goes half way to its middle point.
+    # Twice the distance at which to pass: a quadratic curve goes halfway to its control point.
     aside = 2 * (layout.danger_half * 1.42 + rng.uniform(0.35, 0.6))
     if outcome == "crosses":
         aside = 0.0
@@ -208,7 +208,7 @@ def _surroundings(rng: np.random.Generator, layout: WalkLayout, frames: int) -> 
         (layout.mark, layout.half, (0.2, 0.55, 0.25)),
         (layout.danger, layout.danger_half, (0.75, 0.6, 0.1)),
     ):
-        # Painted on the floor as a frame, in most places.
+        # Mostly painted on the floor as a frame.
         if rng.random() < 0.75:
             found.append(Thing("paint", _frame(half, colour), still(*middle), 0, plain))
     if rng.random() < 0.25:
@@ -228,7 +228,7 @@ def _frame(half: float, colour: Colour) -> Solid:
 def _course(
     layout: WalkLayout, way: Doubles, outcome: str, times: tuple[float, float, float]
 ) -> tuple[Course, float]:
-    """What is true, and where a clip would be cut short."""
+    """Ground truth, and where a clip would be cut short."""
     begin, arrive, end = times
     on_mark = _within(way, layout.mark, layout.half)
     entered = float(np.argmax(on_mark)) / FPS if on_mark.any() else end
@@ -246,5 +246,5 @@ def _course(
 
 
 def _within(way: Doubles, middle: Doubles, half: float) -> NDArray[np.bool_]:
-    """(F,): whether the feet stand in a square."""
+    """(F,): whether the feet are in a square."""
     return np.asarray((np.abs(way - middle) <= half).all(axis=1))

@@ -1,5 +1,5 @@
-"""What random worlds are furnished with: places of work, their light, machines, robot arms, clutter.
+"""Contents of random worlds: surroundings, light, machines, robot arms, clutter.
 
-`scenery.py` makes the place, `machines.py` and `robot.py` what works there, `clutter.py` what lies about
-and who comes by.
+`scenery.py` makes the surroundings, `machines.py` and `robot.py` the machines, `clutter.py` small things and
+passers-by.
 """

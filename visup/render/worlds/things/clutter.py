@@ -1,4 +1,4 @@
-"""Small things that lie about, decoys that look like a part, people who walk past."""
+"""Small things, decoys that look like a part, people who walk past."""
 
 from __future__ import annotations
 
@@ -70,10 +70,10 @@ def scattered(
 
     Args:
         rng: Draws kinds, sizes, colours and places.
-        count: At most so many.
-        size: Metres, of half a middling thing.
+        count: Largest number of things.
+        size: Half the size of an average thing, metres.
         area: x from, x to, y from, y to.
-        free_of: Discs (x, y, radius) in which nothing may stand.
+        free_of: Discs (x, y, radius) to keep free.
     """
     taken = list(free_of)
     found: list[Thing] = []
@@ -89,7 +89,7 @@ def scattered(
 
 
 def corridor(start: ArrayLike, end: ArrayLike, width: float) -> list[tuple[float, float, float]]:
-    """Discs (x, y, radius) that keep a straight way free."""
+    """Discs (x, y, radius) that keep a straight path free."""
     a, b = np.asarray(start, float)[:2], np.asarray(end, float)[:2]
     steps = max(int(np.linalg.norm(b - a) / (width / 2)), 1)
     points = a + np.linspace(0, 1, steps + 1)[:, None] * (b - a)
@@ -97,7 +97,7 @@ def corridor(start: ArrayLike, end: ArrayLike, width: float) -> list[tuple[float
 
 
 def random_part(rng: np.random.Generator, half: float, colour: Colour) -> tuple[Solid, float]:
-    """A part that a gripper takes, standing at z = 0, and its height, metres; `half` its half width."""
+    """A part for a gripper, standing at z = 0, and its height, metres; `half` is half its width."""
     style = rng.integers(5)
     tall = half * float(rng.uniform(1.4, 2.4))
     if style == 0:
@@ -147,10 +147,10 @@ def walking(
 
     Args:
         rng: Draws clothes.
-        way: (F, 2) where they are, metres.
+        way: (F, 2) path, metres.
         heading: (F,) radians.
-        name: Of the person.
-        label: In masks.
+        name: Name of the person.
+        label: Label in masks.
     """
     trunk, left, right = walker_solids(rng)
     steps = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
@@ -170,7 +170,7 @@ def walking(
 def passer_by(
     rng: np.random.Generator, frames: int, start: Sequence[float], end: Sequence[float], label: int
 ) -> list[Thing]:
-    """A person who walks from one point (x, y) to another and has no part in the work."""
+    """A person who walks from one point (x, y) to another, without a role in the task."""
     begin, last = sorted(rng.uniform(-0.2, 1.2, 2))
     share = (np.linspace(0, 1, frames) - begin) / max(last - begin, 0.35)
     line = np.array([start, end], float)

@@ -1,4 +1,4 @@
-"""Machines of random make: vehicles, chargers, drones. x is forward, z up, the ground at z = 0; metres."""
+"""Random machines: vehicles, chargers, drones. x is forward, z up, the ground at z = 0; metres."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def vehicle(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
 
 
 def charger(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
-    """A charging post, and how far its front stands from its origin, towards +x."""
+    """A charging post, and the distance of its front from its origin, towards +x."""
     deep, wide = float(rng.uniform(0.12, 0.22)), float(rng.uniform(0.3, 0.6))
     high = float(rng.uniform(0.7, 1.3))
     second = pick_colour(rng, bool(rng.random() < 0.5))

@@ -21,21 +21,21 @@ DARK: Colour = (0.16, 0.16, 0.18)
 
 @dataclass(frozen=True, slots=True)
 class RobotDesign:
-    """What an arm looks like, metres.
+    """The design of an arm, metres.
 
     Attributes:
         foot: (x, y) of its base on the table.
-        height: Of its shoulder.
+        height: Height of its shoulder.
         upper: Length of the first link.
-        lower: And of the second.
-        hand: From the wrist to the tip.
+        lower: Length of the second link.
+        hand: Distance from the wrist to the tip.
         thick: Radius of the links.
-        colour: Of the links.
+        colour: Colour of the links.
         joint: Colour of joints and base.
-        round: Whether links are round, or boxes.
-        fingers: Whether it has fingers, or a suction cup.
+        round: Whether links are round; else they are boxes.
+        fingers: Whether it has fingers; else it has a suction cup.
         finger: Length of a finger.
-        surface: Of all of it.
+        surface: Texture of the whole arm.
     """
 
     foot: tuple[float, float]
@@ -53,7 +53,7 @@ class RobotDesign:
 
 
 def random_robot(rng: np.random.Generator, foot: tuple[float, float], reach: float) -> RobotDesign:
-    """An arm that reaches as far as asked for, metres from its foot."""
+    """An arm with a given reach, metres from its foot."""
     upper = reach * rng.uniform(0.58, 0.68)
     colours: tuple[Colour, ...] = (
         (0.85, 0.45, 0.08),
@@ -88,12 +88,12 @@ def random_robot(rng: np.random.Generator, foot: tuple[float, float], reach: flo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotCourse:
-    """Where an arm's tip is over time.
+    """Motion of an arm's tip.
 
     Attributes:
         tip: (F, 3) world, metres.
-        opening: (F,) metres between the fingers.
-        roll: (F,) radians, of the hand about its own axis.
+        opening: (F,) distance between the fingers, metres.
+        roll: (F,) rotation of the hand about its own axis, radians.
         tilt: (F,) radians by which the hand points outwards, 0 for straight down.
     """
 
@@ -112,14 +112,14 @@ def hand_poses(design: RobotDesign, course: RobotCourse) -> Poses:
 def robot_things(
     design: RobotDesign, course: RobotCourse, name: str, label: int, arm_label: int
 ) -> list[Thing]:
-    """The arm as things: a base that rests, links, hand and fingers.
+    """The arm as things: a static base, links, hand and fingers.
 
     Args:
-        design: What it looks like.
-        course: What its tip does.
-        name: Of the hand, and of the links as well when they have the hand's label.
-        label: Of the hand in masks.
-        arm_label: Of the links: the same makes the whole arm one object.
+        design: Its design.
+        course: Motion of its tip.
+        name: Name of the hand, and of the links if they have the same label.
+        label: Label of the hand in masks.
+        arm_label: Label of the links; the hand's label makes the whole arm one object.
     """
     yaw, wrist = _wrist(design, course)
     foot = np.array([*design.foot, design.height])
@@ -156,7 +156,7 @@ def robot_things(
 
 
 def _wrist(design: RobotDesign, course: RobotCourse) -> tuple[Doubles, Doubles]:
-    """(F,) yaw of the arm and (F, 3) place of its wrist."""
+    """(F,) yaw of the arm and (F, 3) position of its wrist."""
     yaw = np.unwrap(
         np.arctan2(course.tip[:, 1] - design.foot[1], course.tip[:, 0] - design.foot[0])
     )

@@ -1,4 +1,4 @@
-"""What stands around the work: rooms, tables, halls, meadows; their light and their sky."""
+"""Surroundings: rooms, tables, halls, meadows, with light and sky."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from visup.render.worlds.world import Daylight, Heaven, Imager, Surface, Thing
 
 @dataclass(frozen=True, slots=True)
 class Scenery:
-    """A place of work: things that rest, the light on them, and the sky above."""
+    """Surroundings: static things, light and sky."""
 
     things: tuple[Thing, ...]
     light: Daylight
@@ -23,7 +23,7 @@ class Scenery:
 
 
 def pick_colour(rng: np.random.Generator, vivid: bool = True) -> Colour:
-    """A random reflectance: of a painted thing, or of a wall."""
+    """A random reflectance, of a painted thing or of a wall."""
     hue = rng.uniform(0, 6)
     wheel = np.clip(np.abs((hue + np.array([0, 4, 2])) % 6 - 3) - 1, 0, 1)
     saturation = rng.uniform(0.55, 0.95) if vivid else rng.uniform(0.0, 0.25)
@@ -33,7 +33,7 @@ def pick_colour(rng: np.random.Generator, vivid: bool = True) -> Colour:
 
 
 def unlike(rng: np.random.Generator, others: Sequence[Colour], least: float = 0.35) -> Colour:
-    """A vivid colour that is clearly another than some given ones."""
+    """A vivid colour that clearly differs from given ones."""
     for _ in range(50):
         colour = pick_colour(rng)
         if all(np.linalg.norm(np.subtract(colour, o)) > least for o in others):
@@ -80,7 +80,7 @@ def random_heaven(rng: np.random.Generator) -> Heaven:
 
 
 def random_imager(rng: np.random.Generator, light: Daylight) -> Imager:
-    """A camera whose exposure suits the light more or less."""
+    """A camera whose exposure roughly suits the light."""
     bright = float(np.mean(light.sun_colour)) * light.sun[2] + float(np.mean(light.ambient))
     return Imager(
         float(rng.uniform(0.75, 1.05) / bright),
@@ -97,12 +97,12 @@ WALLS = ("grain", "bricks", "tiles", "plain", "stripes")
 def slab(
     name: str, size: Sequence[float], at: Sequence[float], colour: Colour, surface: Surface
 ) -> Thing:
-    """A box of (x, y, z) extents; its origin, and that of its pattern, is its middle."""
+    """A box of (x, y, z) extents; the origin of its frame and of its pattern is its centre."""
     return Thing(name, box(size, (0, 0, 0), colour), still(*at), 0, surface)
 
 
 def floor(rng: np.random.Generator, level: float, side: float, patterns: Sequence[str]) -> Thing:
-    """A floor with one of some patterns, its upper face at a level."""
+    """A floor with a random pattern, its upper face at a height."""
     pattern = str(rng.choice(list(patterns)))
     colour = pick_colour(rng, vivid=False)
     size = rng.uniform(0.3, 1.2) if pattern != "wood" else rng.uniform(0.15, 0.4)
@@ -111,7 +111,7 @@ def floor(rng: np.random.Generator, level: float, side: float, patterns: Sequenc
 
 
 def wall(rng: np.random.Generator, level: float, distance: float, side: float) -> Thing:
-    """A wall across y at a distance, from a level up."""
+    """A wall perpendicular to y at a distance, from a height upwards."""
     pattern = str(rng.choice(WALLS))
     surface = Surface(
         pattern, float(rng.uniform(0.3, 0.9)), float(rng.uniform(0.05, 0.25)), seed_of(rng)
@@ -134,10 +134,10 @@ TABLES: tuple[tuple[Colour, str, float, float], ...] = (
 
 
 def tabletop(rng: np.random.Generator, width: float, depth: float) -> tuple[Thing, ...]:
-    """A table whose upper face is at z = 0, on a floor, before a wall.
+    """A table with its upper face at z = 0, on a floor, in front of a wall.
 
     Args:
-        rng: Draws what they are made of and where the wall is.
+        rng: Draws materials and the position of the wall.
         width: Metres along x.
         depth: Metres along y.
     """
