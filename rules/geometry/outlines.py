@@ -141,7 +141,8 @@ def outline_gap(a: Region, b: Region, near: float) -> float | None:
 
     Returns:
         Pixels, 0 where the masks overlap or the outlines are neighbours (1 pixel apart or less),
-        or None when it is greater than `near`.
+        or None when it is greater than `near`. What lies in a hole of the other, as a part does in the
+        box that it was put in, is as near as the rim of the hole.
     """
     if box_gap(a.bbox, b.bbox) > near:
         return None
@@ -153,9 +154,11 @@ def _gap(a: Region, b: Region, near: float) -> float | None:
     # Outlines of adjacent regions are one pixel apart.
     one, two = prepared_outline(a), prepared_outline(b)
     distance = least_distance(one.points, one.boxes, two.points, two.boxes, near + 1.0)
-    # One may also be deep inside the other.
-    if distance > 1.5 and masks_overlap(a, b):
-        return 0.0
+    # One may also be deep inside the other, or in a hole of it.
+    if distance > 1.5:
+        if masks_overlap(a, b):
+            return 0.0
+        distance = min(distance, _least_in_hole(a, b), _least_in_hole(b, a))
     gap = max(0.0, distance - 1.0)
     return gap if gap <= near else None
 
@@ -180,15 +183,24 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
 
 def _deepest_in_hole(a: Region, b: Region) -> float:
     """Greatest depth of a in a hole of b, pixels; minus infinity when it covers none."""
-    depth = prepared_outline(b).hole_depth
-    if depth is None:
-        return -np.inf
+    depths = _depths_in_hole(a, b)
+    return float(depths.max()) if len(depths) else -np.inf
+
+
+def _least_in_hole(a: Region, b: Region) -> float:
+    """Least distance of a to the rim of a hole of b that it is in, pixels; infinite when in none."""
+    depths = _depths_in_hole(a, b)
+    return float(depths.min()) if len(depths) else np.inf
+
+
+def _depths_in_hole(a: Region, b: Region) -> NDArray[np.float32]:
+    """(N,) distances to b of the pixels of a that lie in a hole of b, pixels."""
     (ax, ay, aw, ah), (bx, by, bw, bh) = a.bbox, b.bbox
     left, top = max(ax, bx), max(ay, by)
     right, bottom = min(ax + aw, bx + bw), min(ay + ah, by + bh)
-    if left >= right or top >= bottom:
-        return -np.inf
+    depth = prepared_outline(b).hole_depth if left < right and top < bottom else None
+    if depth is None:
+        return np.empty(0, dtype=np.float32)
     covers = a.mask[top - ay : bottom - ay, left - ax : right - ax]
-    within = depth[top - by : bottom - by, left - bx : right - bx]
-    deepest = float((within * covers).max())
-    return deepest if deepest > 0.0 else -np.inf
+    within = depth[top - by : bottom - by, left - bx : right - bx][covers]
+    return within[within > 0.0]

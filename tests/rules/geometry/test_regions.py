@@ -1,5 +1,7 @@
 """Geometry against dumb twins: brute force over pixels, corners and definitions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -67,6 +69,27 @@ def test_a_gap_is_told_when_it_is_near_and_is_that_of_all_points(
     overlap = least > 1.5 and shared_pixels(one, two) > 0
     gap = 0.0 if overlap else max(0.0, least - 1.0)
     assert outline_gap(one, two, near) == (pytest.approx(gap) if gap <= near else None)
+
+
+@some
+@given(st.integers(2, 20), st.tuples(*[st.integers(20, 60)] * 2), st.data())
+def test_what_lies_in_a_hole_is_as_near_as_its_rim(
+    thick: int, hole: tuple[int, int], data: st.DataObject
+) -> None:
+    """A frame, and a box anywhere in it: the least distance of their pixels."""
+    wide, high = hole
+    frame = box_region(1, (10, 10, wide + 2 * thick, high + 2 * thick))
+    assert frame is not None
+    mask = frame.mask.copy()
+    mask[thick:-thick, thick:-thick] = False
+    x, y = data.draw(st.integers(0, wide - 4)), data.draw(st.integers(0, high - 4))
+    width, height = data.draw(st.integers(2, wide - x)), data.draw(st.integers(2, high - y))
+    part = box_region(2, (10 + thick + x, 10 + thick + y, width, height))
+    assert part is not None
+    frame = replace(frame, mask=mask, area=float(mask.sum()))
+    least = min(x, y, wide - x - width, high - y - height)
+    assert outline_gap(frame, part, 200.0) == outline_gap(part, frame, 200.0)
+    assert outline_gap(frame, part, 200.0) == pytest.approx(least, abs=0.75)
 
 
 @some
