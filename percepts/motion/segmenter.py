@@ -49,6 +49,7 @@ from visup.percepts.motion.layers.background_motion import (
     empty_prevalence,
     fit_background,
 )
+from visup.percepts.motion.layers.camera_sway import CameraSway
 from visup.percepts.motion.layers.dense_labelling import (
     Labelling,
     LabelPrior,
@@ -69,7 +70,7 @@ from visup.percepts.motion.output.region_report import (
 from visup.percepts.motion.output.trace import SegmentationTrace
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.lifecycle import confirm, delete, initiate, update
+from visup.percepts.motion.tracks.lifecycle import Clarity, confirm, delete, initiate, update
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
@@ -130,6 +131,7 @@ class MotionSegmenter:
         self._camera: dict[int, AffineRate] = {}
         self._camera_fixed_until: float | None = None
         self._static = StaticCameraSegmenter()
+        self._sway = CameraSway()
         self._shadows = CastShadowFilter()
         self._foreground = no_foreground()
         self._count = self._last_key = 0
@@ -180,8 +182,10 @@ class MotionSegmenter:
         small = self._executor.submit(comparable_image, frame)
         keys = tuple(t.key for t in tracks)
         tracks = self._updated(tracks, scene, evidence, labelling)
-        wanted = looked_at(directives, tracks, scene)
-        tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, wanted)
+        ground = scene.measured[0].background.models[-1]
+        self._sway = self._sway.after(ground.shift((image.shape[1] / 2, image.shape[0] / 2)))
+        asked = Clarity(looked_at(directives, tracks, scene), self._sway.in_place)
+        tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, asked)
         self._follow_foreground(scene, shown, TrackPosterior(tracks, keys, labelling.posterior))
         regions = self._reported(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)

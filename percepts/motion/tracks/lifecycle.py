@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -21,7 +22,11 @@ from visup.percepts.motion.tracks.measurements import (
     min_region_area,
 )
 from visup.percepts.motion.tracks.merge_split import NEAR_STEPS, merged
-from visup.percepts.motion.tracks.salience import has_absorbed_background, is_salient
+from visup.percepts.motion.tracks.salience import (
+    has_absorbed_background,
+    has_left_its_place,
+    is_salient,
+)
 from visup.percepts.motion.tracks.track import PartMotion, Track, Tracks, new_track
 from visup.percepts.motion.tracks.track_fitting import moves_like
 from visup.percepts.motion.tracks.track_update import update_track
@@ -218,12 +223,26 @@ def _is_sliver(t: Track, scene: FrameMeasurements) -> bool:
     return bool(long > SLIVER * short)
 
 
+@dataclass(frozen=True, slots=True)
+class Clarity:
+    """How clearly tracks must move to be reported.
+
+    Attributes:
+        sought: Which tracks lie where cogitation asked to look: half as much will do for those.
+        in_place: Whether the camera shakes in place: nothing at rest can seem to move then, so what has left
+            its place need not last.
+    """
+
+    sought: Sequence[bool]
+    in_place: bool
+
+
 def confirm(
     tracks: Tracks,
     scene: FrameMeasurements,
     ids: IdAllocator,
     settings: MotionSettings,
-    sought: Sequence[bool],
+    asked: Clarity,
 ) -> Tracks:
     """Give public ids to tracks that have lasted and clearly move.
 
@@ -232,19 +251,23 @@ def confirm(
         scene: The frame.
         ids: Allocator of public ids.
         settings: Its `confirm_s` is how long a track must last.
-        sought: Which tracks lie inside a 'look_at' box: those need half as much.
+        asked: How clearly each must move.
     """
     out = []
-    for t, wanted in zip(tracks, sought, strict=True):
+    for t, wanted in zip(tracks, asked.sought, strict=True):
         need = 0.5 if wanted else 1.0
-        if not t.id and t.last_seen == scene.time and _is_confirmed(t, scene, settings, need):
+        if (
+            not t.id
+            and t.last_seen == scene.time
+            and _is_confirmed(t, scene, settings, need, in_place=asked.in_place)
+        ):
             t = replace(t, id=ids.new())
         out.append(t)
     return tuple(out)
 
 
 def _is_confirmed(
-    t: Track, scene: FrameMeasurements, settings: MotionSettings, need: float
+    t: Track, scene: FrameMeasurements, settings: MotionSettings, need: float, *, in_place: bool
 ) -> bool:
     """Whether to report a track: at once when its motion is clear, else once it has lasted."""
     thin = _is_thin(t, scene)
@@ -255,4 +278,5 @@ def _is_confirmed(
     if t.evidence > need * SURE and is_salient(t, scene, at_once=True, need=need):
         return True
     lasts = t.frames >= 3 and scene.time - t.initiated >= need * settings.confirm_s
-    return lasts and is_salient(t, scene, need=need)
+    far = in_place and t.evidence > need * SURE and has_left_its_place(t, scene)
+    return (lasts or far) and is_salient(t, scene, need=need)

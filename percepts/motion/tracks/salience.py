@@ -9,6 +9,7 @@ surroundings: so a track is also compared with a motion fitted to the ring aroun
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from types import MappingProxyType
 
@@ -30,6 +31,7 @@ SWING_S = 0.4
 STRAIGHT = 0.7  # net displacement as a share of path length
 EXPLAINED = 0.35  # most share of points that fit the background, over the most telling baseline
 CLEAR = 0.25  # the same for a track reported at once
+GONE_SHARE = 0.25  # share of its size that a track has gone when its place is another
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
 FOLLOW = 0.3  # weight of the newest frame in running means
 RESTS = 0.7  # share of points that fit the background when a track rests
@@ -283,6 +285,12 @@ def is_salient(
     # A track may be fed by leaf after leaf that happens to swing the same way.
     course = straight and borne is not False
     return explained < EXPLAINED / need and travelled >= need * least and course
+
+
+def has_left_its_place(t: Track, scene: FrameMeasurements) -> bool:
+    """Whether a track has gone a good part of its own size: then nothing more is learnt by waiting."""
+    area = float(scene.cells.area[t.share > 0.5].sum())
+    return float(np.hypot(*t.displacement)) >= GONE_SHARE * math.sqrt(area)
 
 
 def _is_borne_out(t: Track) -> bool | None:

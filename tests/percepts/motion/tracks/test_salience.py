@@ -11,13 +11,16 @@ from tests.percepts.motion.clips import FPS, SIZE, texture
 from visup.agent import Frame
 from visup.percepts.motion.features.motion_constraints import find_points
 from visup.percepts.motion.features.motion_constraints import track_points as follow
+from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import superpixels
 from visup.percepts.motion.features.work_image import prepare_image
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.background_motion import BackgroundMotion, empty_prevalence
 from visup.percepts.motion.segmenter import MotionSegmenter
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+from visup.percepts.motion.tracks.lifecycle import Clarity, confirm
 from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
-from visup.percepts.motion.tracks.salience import foot_point, is_salient
+from visup.percepts.motion.tracks.salience import foot_point, has_left_its_place, is_salient
 from visup.percepts.motion.tracks.track import Track
 
 WIDE = texture(1, SIZE)
@@ -100,6 +103,24 @@ def test_a_longer_baseline_must_bear_out_the_way(
     inside = np.where(at.cells.centre[:, 0] > 12, t.share, 0).astype(np.float32)
     t = replace(t, share=inside, long_baseline_course=MappingProxyType(borne))
     assert is_salient(t, at, at_once=at_once) is salient
+
+
+@pytest.mark.parametrize(("gone", "left"), [(8.0, False), (12.0, True)])
+def test_what_has_gone_a_quarter_of_its_size_has_left_its_place(gone: float, left: bool) -> None:
+    at = scene()
+    assert has_left_its_place(track(at, gone, gone, {}), at) is left
+
+
+@pytest.mark.parametrize("gone", [8.0, 14.0])
+@pytest.mark.parametrize("in_place", [False, True])
+def test_what_has_left_its_place_need_not_last_before_a_camera_that_shakes_in_place(
+    gone: float, in_place: bool
+) -> None:
+    at = scene(time=0.08)
+    young = track(at, gone, gone, {1: 0.3})
+    young = replace(young, frames=2, evidence=300.0, last_seen=at.time)
+    (t,) = confirm((young,), at, IdAllocator(), MotionSettings(), Clarity((False,), in_place))
+    assert bool(t.id) is (in_place and gone > 10)
 
 
 def test_what_fills_the_border_is_a_ground() -> None:

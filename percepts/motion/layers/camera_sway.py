@@ -1,0 +1,42 @@
+"""Whether a camera shakes in place: it moves from frame to frame, and gets nowhere.
+
+Such a camera shows no parallax: nothing that rests near it can seem to move by itself, as it does before a
+camera that travels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FADES = 0.9  # weight of how the ground went before
+SHAKES_PX = (
+    5.0  # path of the ground, over some ten frames, from which the camera shakes, working pixels
+)
+GETS_NOWHERE = (
+    0.5  # share of that path by which the ground is off after it: shaking in place 0.03 to 0.28
+)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSway:
+    """How the ground went of late; older frames fade.
+
+    Attributes:
+        net: (x, y) sum of its steps, working pixels.
+        path: Sum of their lengths.
+    """
+
+    net: tuple[float, float] = (0.0, 0.0)
+    path: float = 0.0
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the camera shakes, and gets nowhere."""
+        return self.path > SHAKES_PX and float(np.hypot(*self.net)) < GETS_NOWHERE * self.path
+
+    def after(self, step: tuple[float, float]) -> CameraSway:
+        """How it went after one more step (x, y) of the ground, working pixels."""
+        net = FADES * self.net[0] + step[0], FADES * self.net[1] + step[1]
+        return CameraSway(net, FADES * self.path + float(np.hypot(*step)))
