@@ -96,6 +96,17 @@ def test_a_task_that_expects_it_suspends_collision_course(relation: str) -> None
     assert not raised(reason(closing(), task((Expectation(relation, (2, 1)),))))
 
 
+def test_what_a_task_has_just_asked_for_is_no_danger_before_a_body_can_brake() -> None:
+    """The next stage begins while the body still comes on, as a drone does that is to keep its distance."""
+    wanted = (Expectation("converging", (2, 1)),)
+
+    def put(mind: Mind, observation: Observation) -> Outcome:
+        return task(wanted if observation.time < 3.0 else ())(mind, observation)
+
+    at = {t.mind.time for t in reason(closing(7.0), put) if t.conditions}
+    assert 5.0 <= min(at) < 6.5
+
+
 def test_what_the_task_expects_of_others_does_not_suspend_it() -> None:
     found = raised(reason(closing(), task((Expectation("converging", (2, 3)),))))
     assert ("collision_course", frozenset({1, 2})) in found
