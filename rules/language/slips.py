@@ -62,7 +62,18 @@ def _in_range(match: re.Match[str]) -> str:
     high = high if re.search(r"[a-z%]", high) else f"{high} {unit}".rstrip()
     low = f"{match['low']} {unit}".rstrip()
     within = f"{what} >= {low} and {what} <= {high}"
-    return f"not ({within})" if match["no"] else within
+    return f"not ({within})" if match["no"] else _grouped(match, within)
+
+
+_BEGINS = re.compile(r"(?:\b(?:when|unless|and|or)\s*|[:(,]\s*|^\s*)\Z", re.MULTILINE)
+_ENDS = re.compile(r"\s*(?:\Z|$|[),]|\b(?:and|or|unless|hold|say)\b)", re.MULTILINE)
+
+
+def _grouped(match: re.Match[str], both: str) -> str:
+    """Two conditions joined by `and`, in parentheses where `not`, `for 2 s` or the like is about both."""
+    begins = _BEGINS.search(match.string[: match.start()])
+    alone = begins and _ENDS.match(match.string, match.end())
+    return both if alone else f"({both})"
 
 
 SLIPS = (
@@ -176,14 +187,16 @@ SLIPS = (
         r"\bthere\s+(?:is|are|exists?)\s+(?:an?\s+|some\s+|one\s+)?(\w+)\s*(?::|with|such that|so that)",
         r"exists \1:",
     ),
-    _slip(rf"({_CALL})\s+in\s+\[?({_AMOUNT})\s*(?:\.\.|to|-)\s*({_AMOUNT})\]?", r"\1 >= \2 and \1 <= \3"),
+    _slip(rf"({_CALL})\s+in\s+\[?({_AMOUNT})\s*(?:\.\.|to|-)\s*({_AMOUNT})\]?",
+          lambda m: _grouped(m, m.expand(r"\1 >= \2 and \1 <= \3"))),
     _slip(
         rf"\b(\d+)\s+(?:out\s+)?of\s+(?:the\s+last\s+)?(\d+)\s+(?:samples|frames)\s+({_CALL})",
         r"\3 in \1 of \2 samples",
     ),
     _slip(r"\bfor\s+(\d+)\s*(?:frames|samples)\b", r"in \1 of \1 samples"),
     _slip(r"\bwithin\s+(\d+)\s*(?:frames|samples)\b", r"in 1 of \1 samples"),
-    _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})", r"\1 \2 \3 and \3 \4 \5"),
+    _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})",
+          lambda m: _grouped(m, m.expand(r"\1 \2 \3 and \3 \4 \5"))),
     _slip(r"\b(?:for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+ago\b", r"within \1 to \1 ago"),
     _slip(r"\b(?:for|within)\s+-\s*(\d)", r"for \1"),
     _slip(rf"\b(for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s*,?\s+({_CALL})", r"\3 \1 \2"),

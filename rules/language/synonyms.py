@@ -16,6 +16,7 @@ _MEANT = (
     ("close_to converging", "near close adjacent beside"),
     ("far_from apart", "far distant"),
     ("diverging", "diverge leave leaving retreat withdraw recede depart moving_apart"),
+    ("moving_clearly", "moves_clearly clearly_moving clearly_moves"),
     ("moving", "move motion"),
     ("resting not_moving", "rest still stationary stop stopped static"),
     ("seen present", "visible present appear shown detected exist"),

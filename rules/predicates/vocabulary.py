@@ -274,7 +274,7 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "lost": PredicateDefinition(_ONE, lost, "it is out of sight for no known reason"),
         "moving": PredicateDefinition(_ONE, moving, "it moves in the image"),
         "moving_clearly": PredicateDefinition(
-            _ONE, moving_clearly, "it moves, and most of its outline is free of others"
+            _ONE, moving_clearly, "it moves, and its velocity is well known"
         ),
         "came_in": PredicateDefinition(
             _ONE, certainty.came_in, "it came over the border of the image"

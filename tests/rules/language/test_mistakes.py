@@ -152,6 +152,18 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
         ("touching(a, b) in 3/5 samples", "touching(a, b) in 3 of 5 samples"),
         ("henceforth touching(a, b) [5 s]", "henceforth[5 s] touching(a, b)"),
         ("time_to_contact(a, b) < 3", "time_to_contact(a, b) < 3 s"),
+        ("gap(a, b) between 3 and 5 px", "gap(a, b) >= 3 px and gap(a, b) <= 5 px"),
+        ("not gap(a, b) between 3 px and 5 px", "not (gap(a, b) >= 3 px and gap(a, b) <= 5 px)"),
+        (
+            "gap(a, b) between 3 px and 5 px for 2 s or seen(a)",
+            "(gap(a, b) >= 3 px and gap(a, b) <= 5 px) for 2 s or seen(a)",
+        ),
+        (
+            "seen(a) and gap(a, b) in 3 px .. 5 px within 2 s",
+            "seen(a) and (gap(a, b) >= 3 px and gap(a, b) <= 5 px) within 2 s",
+        ),
+        ("3 px < gap(a, b) < 5 px for 2 s", "(3 px < gap(a, b) and gap(a, b) < 5 px) for 2 s"),
+        ("clearly_moving(a) and seen(b)", "moving_clearly(a) and seen(b)"),
     ],
 )
 def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
