@@ -133,13 +133,18 @@ class _Draft:
         seen = f"in {len(spans)} of {_runs(len(self.runs))}"
         if not spans or self._last(occurrence):
             held = self._held(occurrence) if self._last(occurrence) else 0.0
-            clause = f" for {held:g} s" if held else ""
-            course = f"({_action(item)})" if held and isinstance(item, Joint) else _action(item)
-            course = f"already {course}" if self._from_the_start(occurrence) else course
-            return f"<{name}> ::= {course}{clause}  # {seen}"
+            course = self._asked(occurrence, f" for {held:g} s" if held else "")
+            return f"<{name}> ::= {course}  # {seen}"
         took = f"{min(spans):.1f} to {max(spans):.1f} s"
-        course = f"({_action(item)})" if isinstance(item, Joint) else _action(item)
-        return f"<{name}> ::= {course} within {deadline(spans)} s  # {seen}, {took}"
+        course = self._asked(occurrence, f" within {deadline(spans)} s")
+        return f"<{name}> ::= {course}  # {seen}, {took}"
+
+    def _asked(self, occurrence: Occurrence, clause: str) -> str:
+        """What a stage asks for, with a clause of time."""
+        action, already = _action(occurrence[0]), self._from_the_start(occurrence)
+        if isinstance(occurrence[0], Joint) and (clause or already):
+            action = f"({action})"
+        return f"{'already ' if already else ''}{action}{clause}"
 
     def _last(self, occurrence: Occurrence) -> bool:
         plan = self.plan
@@ -148,7 +153,7 @@ class _Draft:
         return occurrence in leaves_of(plan)
 
     def _from_the_start(self, occurrence: Occurrence) -> bool:
-        """Whether what a run ends with was so from its start in some run, as far as one can see."""
+        """Whether what happens was so from the start of some run, as far as one can see."""
         found = [event_of(row, occurrence) for row in self.rows]
         return any(e is not None and not e.happening.begun for e in found)
 

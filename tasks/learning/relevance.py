@@ -82,9 +82,9 @@ def _beginning(met: Sequence[Collection[Meeting]]) -> set[Pair]:
 def _late(
     run: RunTrace, meetings: Sequence[Meeting], pairs: Collection[Pair]
 ) -> Iterator[CourseEvent]:
-    """Meetings that are so from the start in this run alone, where one stands before the other in the image.
+    """Meetings that are so from the start of this run, as one body stands before the other, and begin in most.
 
-    They count from when the two have come near.
+    They count from the end of the approach.
     """
     for meeting in meetings:
         begin, end = meeting.touching
@@ -223,7 +223,9 @@ def _with_joints(row: Row, groups: Sequence[Sequence[Symbol]]) -> list[CourseEve
         last = max(parts, key=lambda e: e.at)
         end = min(e.happening.end for e in parts)
         joint = CourseEvent(
-            Happening(parts[0].symbol, last.happening.begin, end),
+            Happening(
+                parts[0].symbol, last.happening.begin, end, all(e.happening.begun for e in parts)
+            ),
             last.at,
             all(e.lasts or e.symbol[0] in PARTINGS for e in parts),
             tuple(e.symbol for e in parts[1:]),

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FADES = 0.9  # weight of how the ground went before
-SHAKES_PX = (
-    5.0  # path of the ground, over some ten frames, from which the camera shakes, working pixels
-)
-GETS_NOWHERE = (
-    0.5  # share of that path by which the ground is off after it: shaking in place 0.03 to 0.28
-)
+FADES = 0.9
+"""Weight of the earlier steps in each frame: they fade over some ten frames, whatever the frame rate."""
+SHAKES_PX = 5.0
+"""Least path of the ground of a camera that shakes, working pixels."""
+GETS_NOWHERE = 0.5
+"""Share of that path below which the net motion counts as none. Shaking in place has 0.03 to 0.28, pans 0.6 to 1."""
 
 
 @dataclass(frozen=True, slots=True)

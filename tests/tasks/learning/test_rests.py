@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from visup.tasks.checks.load import parse_task
+from visup.tasks.learning.induction import learn_task
 from visup.tasks.learning.relevance import relevant
 from visup.tasks.learning.rests import LEAST_ALLOWED, REST, TIMES_SEEN, rests_of
 from visup.tasks.learning.traces import SUSTAINED_S, Happening, RunTrace, _sustained
@@ -97,6 +102,31 @@ def test_a_meeting_that_is_so_from_the_start_in_one_run_alone_is_a_stage_there_t
     touches = [next(e for e in row if e.symbol[0] == "touching") for row in rows]
     assert [t.happening.begun for t in touches] == [True] * len(sets_out) + [False]
     assert touches[-1].at == late + 4.0
+
+
+FENDER = "(touching(boat, fender) & touching(boat, pier))"
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+@pytest.mark.parametrize(
+    ("other", "begins", "asked"),
+    [
+        ("pier", (), "touching(boat, pier)"),
+        ("buoy", (9.0, 9.0, 9.0), "touching(boat, pier)"),  # another stage follows
+        ("fender", (4.0, 5.0, 6.5), FENDER),  # comes about at once: one stage asks for both
+    ],
+)
+def test_a_stage_asks_for_already_where_one_run_begins_with_it(
+    hidden: bool, other: str, begins: tuple[float, ...], asked: str
+) -> None:
+    runs = [moored(2.0), moored(3.0), moored(2.5, hidden=hidden)]
+    for k, begin in enumerate(begins):
+        more = Happening(("touching", ("boat", other)), begin, 12.0)
+        runs[k] = replace(runs[k], happenings=(*runs[k].happenings, more))
+    task = parse_task(learn_task("moor", runs).text)
+    (stage,) = [str(s) for s in task.stages if "touching(boat, pier)" in str(s)]
+    assert asked in stage
+    assert (f"already {asked}" in stage) == hidden
 
 
 def test_who_is_carried_along_is_the_same_in_all_runs() -> None:
