@@ -82,7 +82,7 @@ def _beginning(met: Sequence[Collection[Meeting]]) -> set[Pair]:
 def _late(
     run: RunTrace, meetings: Sequence[Meeting], pairs: Collection[Pair]
 ) -> Iterator[CourseEvent]:
-    """Meetings that are so from the start of this run, as one body stands before the other, and begin in most.
+    """Meetings that are so from the start of this run, where one body covers the other, and begin in most.
 
     They count from the end of the approach.
     """
