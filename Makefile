@@ -22,8 +22,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: setup
 	$(BIN)/visup demo
 
+# Each worker begins with neighbouring tests, which share fixtures, and takes over tests of the other at the end.
 test: setup
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: setup
 	@! git grep -InE '^(<{7}|>{7}|[|]{7})( |$$)' || { echo 'Conflict markers: resolve the merges named above.'; exit 1; }

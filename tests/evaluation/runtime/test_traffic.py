@@ -31,7 +31,7 @@ def test_the_same_traffic_again_is_the_same() -> None:
 
 
 def test_figures_of_a_short_run() -> None:
-    total = evaluate_traffic(0.006)["total"]
+    total = evaluate_traffic(0.003)["total"]
     assert 3000 < total["objects_per_hour"] < 4500
     assert 20 < total["journal_mb_per_hour"] < 600
     assert total["grown"] < 0.2
