@@ -15,7 +15,7 @@ FADES = 0.9
 SHAKES_PX = 5.0
 """Least path of the ground of a camera that shakes, working pixels."""
 GETS_NOWHERE = 0.5
-"""Share of that path below which the net motion counts as none: shaking in place 0.03 to 0.28, pans 0.6 to 1."""
+"""Share of that path below which the net motion counts as none: in place 0.03 to 0.28, pans 0.6 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
