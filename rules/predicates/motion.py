@@ -1,4 +1,4 @@
-"""Predicates of motion: by more than noise, and with a well-known velocity."""
+"""Motion predicates: moving by more than noise, and moving with a well-known velocity."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from visup.rules.relations.kinematics import RelationSettings
 
 STILL_SPEED = RelationSettings().still_speed
 MOVING_SIGMAS = 3.0
+"""Least speed of a moving object, in standard deviations of its velocity."""
 CLEAR = 0.005
 """Largest velocity sigma of clear motion, image diagonals per second. Measured from masks: up to 0.0047 for
 chargers that are rammed, 0.005 to 0.05 for bodies that others pass in front of."""

@@ -1,11 +1,11 @@
-"""Tasks learned from runs: what happened in good ones, in what order, how long, and what never did.
+"""Grammar induction: tasks learned from recorded runs, good and bad.
 
-Actions become strings of symbols; from these a grammar is induced by minimum description length (Lee,
-Kim and Demiris, "Learning action symbols for hierarchical grammar induction", 2012), with the order
-that all runs share kept and every other order left free, as task graphs do.
+Actions become strings of symbols, from which a grammar is induced by minimum description length (Lee,
+Kim and Demiris, "Learning action symbols for hierarchical grammar induction", 2012). The order common to
+all runs is preserved and any other order left free, as in a task graph.
 
-Read in this order: `traces.py` (a run as happenings), `meetings.py` (who meets whom, and who only comes
-along), `relevance.py` (the row of events of each run), `alignment.py` (which of several is meant), `order.py`
-(loops and order), `periods.py` (loops that keep a rhythm), `rests.py` (who must not be pushed),
+Read in this order: `traces.py` (a run as intervals), `meetings.py` (contacts, without those of carried
+objects), `relevance.py` (the event sequence of each run), `alignment.py` (removal of repeated events),
+`order.py` (loops and partial order), `periods.py` (periodic loops), `rests.py` (actors that stay at rest),
 `induction.py` (the task file), `judging.py` (a task on a run), `fitting.py`, `coverage.py`, `languages.py`.
 """

@@ -1,7 +1,7 @@
-"""Which of several in one run is the one that all runs share: rows of events laid side by side.
+"""Sequence alignment of runs: removes repeated events that not all runs share.
 
-A grasp that is lost from sight for a moment, and seen again, makes two of it in that run. The longest course
-that a run has in common with the plainest one tells which of them is meant; the others are noise.
+A grasp that is lost for a moment and detected again yields two events. The longest common subsequence with
+the shortest run tells which of them to keep; the others are noise.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ Row = Sequence[CourseEvent]
 
 
 def aligned(rows: Sequence[Row]) -> list[list[CourseEvent]]:
-    """The rows without what is there more often than in the run that has it least often, but has it.
+    """The rows with each item reduced to its lowest count over all runs, unless that is zero.
 
     Args:
-        rows: Of each run its events, in order.
+        rows: The events of each run, in order.
     """
     if not rows:
         return []
     counts = [Counter(e.item for e in row) for row in rows]
     least = {item: min(c[item] for c in counts) for item in set().union(*counts)}
-    plainest = [e.item for e in min(rows, key=len)]
-    return [_without_noise(row, plainest, least) for row in rows]
+    shortest = [e.item for e in min(rows, key=len)]
+    return [_without_noise(row, shortest, least) for row in rows]
 
 
-def _without_noise(row: Row, plainest: Sequence[Item], least: dict[Item, int]) -> list[CourseEvent]:
-    """One row in which nothing that all have is there more often than it must be."""
+def _without_noise(row: Row, shortest: Sequence[Item], least: dict[Item, int]) -> list[CourseEvent]:
+    """One row with each item that all runs have reduced to its least count."""
     items = [e.item for e in row]
-    shared = set(longest_common(items, plainest))
-    kept: set[int] = set()
+    shared = set(longest_common(items, shortest))
+    selected: set[int] = set()
     for item, count in least.items():
         places = [k for k, i in enumerate(items) if i == item]
-        # Those in common first, and of the others the earliest.
+        # Items of the common subsequence first, then the earliest.
         ranked = sorted(places, key=lambda k: (k not in shared, k))
-        kept.update(ranked[:count] if count else places)
-    return [e for k, e in enumerate(row) if k in kept]
+        selected.update(ranked[:count] if count else places)
+    return [e for k, e in enumerate(row) if k in selected]
 
 
 def longest_common(one: Sequence[Item], other: Sequence[Item]) -> list[int]:
-    """Places in the first of the longest course that both have; of several the one that begins soonest."""
+    """Indices in the first sequence of the longest common subsequence; the earliest of several."""
     best = [[0] * (len(other) + 1) for _ in range(len(one) + 1)]
     for i in reversed(range(len(one))):
         for j in reversed(range(len(other))):

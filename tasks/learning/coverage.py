@@ -1,4 +1,4 @@
-"""Which parts of a task runs have exercised, as one asks it of tests."""
+"""Stage coverage of a task by runs, analogous to test coverage."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from visup.tasks.learning.judging import JudgedRun
 
 @dataclass(frozen=True, slots=True)
 class StageCoverage:
-    """How often a stage was gone through.
+    """How often a stage was executed.
 
     Attributes:
         stage: Its name.
-        runs: How many runs there are.
-        statuses: In how many runs it ended so.
-        begun: In how many runs it was begun.
+        runs: Number of runs.
+        statuses: Number of runs by final status.
+        begun: Number of runs in which it began.
     """
 
     stage: str
@@ -30,29 +30,29 @@ class StageCoverage:
 
     @property
     def covered(self) -> bool:
-        """Whether some run saw it through."""
+        """Whether some run completed it."""
         return self.statuses.get(Status.DONE, 0) > 0
 
     @property
     def failed(self) -> int:
-        """In how many runs it failed."""
+        """Number of runs in which it failed."""
         return self.statuses.get(Status.FAILED, 0) + self.statuses.get(Status.FAILING, 0)
 
     def __str__(self) -> str:
         if not self.begun:
             return f"<{self.stage}>: never begun"
-        said = [f"done in {self.statuses.get(Status.DONE, 0)} of {self.runs}"]
-        said += [f"failed in {self.failed}"] if self.failed else []
-        said += [] if self.failed else ["never failed"]
-        return f"<{self.stage}>: {', '.join(said)}"
+        clauses = [f"done in {self.statuses.get(Status.DONE, 0)} of {self.runs}"]
+        clauses += [f"failed in {self.failed}"] if self.failed else []
+        clauses += [] if self.failed else ["never failed"]
+        return f"<{self.stage}>: {', '.join(clauses)}"
 
 
 def coverage_of(task: Task, runs: Sequence[JudgedRun]) -> list[StageCoverage]:
-    """How often each stage of a task was gone through.
+    """The coverage of each stage of a task.
 
     Args:
         task: The task.
-        runs: How it went in each.
+        runs: Its judged runs.
     """
     found = []
     for stage in stage_names(task):
@@ -66,5 +66,5 @@ def coverage_of(task: Task, runs: Sequence[JudgedRun]) -> list[StageCoverage]:
 
 
 def share_covered(stages: Sequence[StageCoverage]) -> float:
-    """The share of stages that some run saw through, 0 to 1."""
+    """The share of stages that some run completed, 0 to 1."""
     return sum(s.covered for s in stages) / len(stages) if stages else 1.0

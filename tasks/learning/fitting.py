@@ -1,4 +1,4 @@
-"""Durations of an existing task fitted to runs: each `within` and `for` of a stage, in place in its text."""
+"""Fits the durations of an existing task to runs: each `within` and `for` of a stage, edited in its text."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from visup.tasks.learning.induction import deadline
 from visup.tasks.learning.judging import JudgedRun
 
 SHORTEST_SHARE = 0.8
-"""A `for` asks for so much of the least time for which a good run kept it."""
+"""A fitted `for` is this share of the shortest duration in a good run."""
 
 
 @dataclass(frozen=True, slots=True)
 class FittedAmount:
-    """One amount that was fitted.
+    """One fitted amount.
 
     Attributes:
-        stage: The stage that says it.
-        clause: As it was written, such as `within 60 s`.
+        stage: The stage of the clause.
+        clause: The original text, such as `within 60 s`.
         new: The clause with the new amount.
-        seen: What was seen, for people.
-        span: Where the amount stands.
+        seen: The observed durations, as text.
+        span: Source span of the amount.
     """
 
     stage: str
@@ -45,17 +45,17 @@ class FittedAmount:
 
 
 def fitted_amounts(task: Task, runs: Sequence[JudgedRun]) -> list[FittedAmount]:
-    """New amounts for all clauses of stages that runs went through.
+    """New amounts for the clauses of all stages that some run completed.
 
     Args:
         task: The task.
-        runs: How it went in good runs.
+        runs: Its judged good runs.
     """
     return [f for clause in _clauses(task) if (f := _fitted(clause, runs)) is not None]
 
 
 def with_amounts(text: str, fitted: Sequence[FittedAmount]) -> str:
-    """The text of a task file with new amounts in their places; all else stays as it is."""
+    """The text of a task file with the amounts replaced and nothing else changed."""
     lines = text.split("\n")
     for change in sorted(fitted, key=lambda f: (f.span.line, f.span.column), reverse=True):
         line = lines[change.span.line - 1]
@@ -66,11 +66,11 @@ def with_amounts(text: str, fitted: Sequence[FittedAmount]) -> str:
 
 
 Clause = tuple[str, str, Number, bool]
-"""Stage, word and amount of a clause, and whether it stands around a pause, which then counts."""
+"""Stage, keyword and amount of a clause, and whether it encloses a pause, whose time then counts."""
 
 
 def _clauses(task: Task) -> Iterator[Clause]:
-    """Each clause that has a number of its own."""
+    """Each clause with a literal number of this file."""
     for stage in task.stages:
         if isinstance(stage.body, Actors):
             continue
@@ -86,14 +86,14 @@ def _clauses(task: Task) -> Iterator[Clause]:
 
 
 def _pauses(course: Course) -> bool:
-    """Whether something inside a course is paused."""
+    """Whether a course contains a pause condition."""
     return any(
         c.kind == "pauses" for x in walk(course) if isinstance(x, Conditioned) for c in x.conditions
     )
 
 
 def _took(stage: str, run: JudgedRun, *, pauses: bool) -> Iterator[float]:
-    """How long a stage took in a run, where it was done, seconds; with its pauses or without."""
+    """Duration of a stage in a run that completed it, seconds, with or without its pauses."""
     if stage in run.spans():
         begin, end = run.spans()[stage]
         yield end - begin - (0.0 if pauses else run.paused_s().get(stage, 0.0))

@@ -1,8 +1,8 @@
-"""From good runs to a task file that accepts them, each line with its evidence.
+"""Induction of a task file from good runs, each line with its evidence as a comment.
 
-What is in nearly all runs is the course; what is in some only is told and left out. The file is tried on
-every run that it was learned from: a stage by which one would be refused is taken out again. Bad
-runs add what never happened in a good one.
+Events of nearly all runs form the course; those of some runs only are reported and dropped. The file is
+validated on every run that it was learned from, and a stage that would refuse one is removed. Bad
+runs add invariants against events that never occurred in a good one.
 """
 
 from __future__ import annotations
@@ -48,26 +48,26 @@ STAGE_NAMES = {
     "apart": "part",
 }
 MARGIN = 3.0
-"""A stage may take so many times as long as it ever took in a good run."""
+"""Deadline of a stage as a multiple of its longest duration in a good run."""
 LEAST_DEADLINE_S = 10.0
 HELD_SHARE = 0.5
 LONGEST_HOLD_S = 6.0
-"""What a run ends with must hold for that share of the least time for which it did, or of this."""
+"""The last stage must hold for `HELD_SHARE` of its shortest duration, capped at `LONGEST_HOLD_S`."""
 SHARE = 0.8
-"""What is in so many of the good runs is part of the course."""
+"""Least share of good runs in which an event occurs for it to be part of the course."""
 FORBIDDEN = ("touching", "coupled")
-"""Of what happened in bad runs alone, what is forbidden."""
+"""Actions that are forbidden when they occur in bad runs only."""
 
 
 @dataclass(frozen=True)
 class LearnedTask:
-    """What was learned.
+    """A learned task.
 
     Attributes:
         text: The task file.
-        good: Verdict of each good run by it.
-        bad: Verdict of each bad run.
-        dropped: What was in the runs and is not in the file, with the reason.
+        good: Its verdict on each good run.
+        bad: Its verdict on each bad run.
+        dropped: Events of the runs that are not in the file, with the reason.
     """
 
     text: str
@@ -78,19 +78,19 @@ class LearnedTask:
 
 @dataclass
 class _Draft:
-    """A task on its way.
+    """A task during induction.
 
     Attributes:
         name: Of the task.
         plan: Its course.
-        times: Of each loop.
+        times: Least and greatest number of iterations of each loop.
         runs: Good runs.
-        rows: What each is made of.
+        rows: The events of each run.
         declared: Actors as the runs' own tasks declare them.
-        forbidden: Symbols that must never be.
-        holding: Whether what runs end with must hold for a while.
-        periods: The loops that keep a rhythm.
-        rests: Who must not be pushed about.
+        forbidden: Symbols that must never occur.
+        holding: Whether the last stage must hold for a while.
+        periods: The periodic loops.
+        rests: Actors that must not be pushed.
     """
 
     name: str
@@ -116,7 +116,7 @@ class _Draft:
         return "\n".join(lines) + "\n"
 
     def actors(self) -> list[str]:
-        """Who plays in it."""
+        """Its actors, sorted."""
         symbols = [s for o in leaves_of(self.plan) for s in _symbols(o[0])]
         return sorted({a for _, actors in (*symbols, *self.forbidden) for a in actors})
 
@@ -153,26 +153,26 @@ class _Draft:
         return occurrence in leaves_of(plan)
 
     def _from_the_start(self, occurrence: Occurrence) -> bool:
-        """Whether what happens was so from the start of some run, as far as one can see."""
+        """Whether an event held from the start of some run, as far as was observed."""
         found = [event_of(row, occurrence) for row in self.rows]
         return any(e is not None and not e.happening.begun for e in found)
 
     def _held(self, occurrence: Occurrence) -> float:
-        """How long what a run ends with must hold, seconds; 0 where it does not last to the end."""
+        """How long the last event must hold, seconds; 0 if it does not last to the end."""
         if not self.holding:
             return 0.0
         found = [event_of(row, occurrence) for row in self.rows]
-        # A meeting is over when it ends, or has lasted: nothing follows by which it would end.
+        # A meeting is complete when it ends or has lasted: no later event terminates it.
         if not all(e is not None and (e.lasts or e.symbol[0] in MEETINGS) for e in found):
             return 0.0
         shortest = min(e.happening.end - e.happening.begin for e in found if e is not None)
         return max(0.0, floor(2 * HELD_SHARE * min(shortest, LONGEST_HOLD_S)) / 2)
 
     def _spans(self, occurrence: Occurrence) -> list[float]:
-        """How long a stage took at most in each run: from what came before it to what came after.
+        """Greatest duration of a stage in each run: from the event before it to the event after it.
 
-        What is over by itself (a contact) lets the next stage begin at once, so that its time counts
-        from there.
+        A stage that completes by itself (a contact) lets the next one begin at once, so the time of the
+        next counts from there.
         """
         course = leaves_of(self.plan)
         found = []
@@ -197,19 +197,19 @@ def learn_task(
 
     Args:
         name: Of the task.
-        good: Runs in which it went well.
-        bad: Runs in which it did not.
+        good: Runs that succeeded.
+        bad: Runs that failed.
         declared: Actors as the runs' own tasks declare them, by name.
 
     Returns:
-        The file and how it judges the runs.
+        The file and its verdicts on the runs.
 
     Raises:
-        TaskError: Nothing happens in the good runs that they have in common.
+        TaskError: The good runs have no event in common.
     """
     rows = joined(relevant(good))
     folded, times = with_loops([tuple(e.item for e in row) for row in rows])
-    if not times:  # what is there more often in some runs than in others is noise then
+    if not times:  # without loops, surplus repeats in some runs are noise
         rows = aligned(rows)
         folded = [tuple(e.item for e in row) for row in rows]
     core = shared(folded, SHARE)
@@ -220,24 +220,24 @@ def learn_task(
             hint="name objects by --models, --teach or a task with actors, and record again",
         )
     seen = {o for w in folded for o in shared([w], 1.0)}
-    dropped = [f"{_said(o)}: in some runs only" for o in sorted(seen - set(core), key=repr)]
+    dropped = [f"{_text(o)}: in some runs only" for o in sorted(seen - set(core), key=repr)]
     plan = plan_of(folded, core, partial(_at_once, rows))
     periods = periods_of(times, rows)
     draft = _Draft(name, plan, times, good, rows, declared or {}, periods=periods)
-    results = _tried(draft, dropped)
-    _ask_for_rests(draft, results)
-    told = {r.name: _judge(draft, r) for r in bad}
+    results = _validated(draft, dropped)
+    _require_rests(draft, results)
+    bad_verdicts = {r.name: _judge(draft, r) for r in bad}
     for run in bad:
-        if told[run.name] is Verdict.SUCCEEDED:
+        if bad_verdicts[run.name] is Verdict.SUCCEEDED:
             _forbid(draft, run)
     if draft.forbidden:
-        told = {r.name: _judge(draft, r) for r in bad}
+        bad_verdicts = {r.name: _judge(draft, r) for r in bad}
         results = {r.name: _judge(draft, r) for r in good}
-    return LearnedTask(draft.text(), results, told, tuple(dropped))
+    return LearnedTask(draft.text(), results, bad_verdicts, tuple(dropped))
 
 
-def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
-    """The verdicts of the good runs, after all by which one is refused has been taken out."""
+def _validated(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
+    """Relax the draft until it accepts all good runs, as far as possible; returns their verdicts."""
     while True:
         task = parse_task(draft.text())
         found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
@@ -254,19 +254,19 @@ def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
         plan = without(draft.plan, blamed)
         if plan is None:
             return {name: j.verdict for name, j in found.items()}
-        dropped.append(f"{_said(blamed)}: a good run would be refused by it")
+        dropped.append(f"{_text(blamed)}: a good run would be refused by it")
         draft.plan = plan
 
 
-def _ask_for_rests(draft: _Draft, results: Mapping[str, Verdict]) -> None:
-    """Who rests in all good runs must, unless one of them would be refused by it."""
+def _require_rests(draft: _Draft, results: Mapping[str, Verdict]) -> None:
+    """Require actors at rest in all good runs to stay so, unless that changes a verdict of one."""
     draft.rests = tuple(rests_of(draft.runs, draft.actors()))
     if {r.name: _judge(draft, r) for r in draft.runs if r.minds} != dict(results):
         draft.rests = ()
 
 
 def _blamed(draft: _Draft, run: JudgedRun) -> Occurrence | None:
-    """The stage by which a run is refused: the first one that is not done."""
+    """The stage that refuses a run: the first one that is not done."""
     for occurrence, name in stage_names(draft.plan).items():
         if run.statuses.get(name) is not Status.DONE:
             return occurrence
@@ -278,18 +278,18 @@ def _judge(draft: _Draft, run: RunTrace) -> Verdict:
 
 
 def _forbid(draft: _Draft, run: RunTrace) -> None:
-    """What happened in a bad run and in no good one must never be."""
-    fine = {h.symbol for r in draft.runs for h in r.happenings}
+    """Forbid events that occurred in a bad run and in no good one."""
+    allowed = {h.symbol for r in draft.runs for h in r.happenings}
     actors = {a for r in draft.runs for h in r.happenings for a in h.symbol[1]}
     for happening in run.happenings:
         action, who = happening.symbol
-        new = happening.symbol not in fine and happening.symbol not in draft.forbidden
+        new = happening.symbol not in allowed and happening.symbol not in draft.forbidden
         if new and action in FORBIDDEN and actors.intersection(who):
             draft.forbidden.append(happening.symbol)
 
 
 def stage_names(plan: Plan) -> dict[Occurrence, str]:
-    """A name for each stage: by what happens, then by who takes part, then by number."""
+    """A unique name for each stage: its action, then its actors, then a number."""
     occurrences = leaves_of(plan)
     plain = [_plain(o[0]) for o in occurrences]
     found: dict[Occurrence, str] = {}
@@ -304,7 +304,7 @@ def stage_names(plan: Plan) -> dict[Occurrence, str]:
 
 
 def event_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> CourseEvent | None:
-    """Something that happened for the n-th time in a run, or None."""
+    """The event of an occurrence in a run, or None."""
     item, number = occurrence
     first = item
     while isinstance(first, Loop):
@@ -314,15 +314,15 @@ def event_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> CourseEvent 
 
 
 def begin_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> float | None:
-    """When something happened in a run for the n-th time, or None."""
+    """When an occurrence began in a run, seconds, or None."""
     found = event_of(row, occurrence)
     return None if found is None else found.happening.begin
 
 
 def _at_once(rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence) -> bool:
-    """Whether two things come so close in some run that their order may be chance."""
-    both = [(event_of(row, a), event_of(row, b)) for row in rows]
-    pairs = [(x, y) for x, y in both if x is not None and y is not None]
+    """Whether two occurrences are so close in some run that their order may be random."""
+    events = [(event_of(row, a), event_of(row, b)) for row in rows]
+    pairs = [(x, y) for x, y in events if x is not None and y is not None]
     if any(_pairs(x.item) & _pairs(y.item) for x, y in pairs):
         return False
     return any(abs(x.at - y.at) < AT_ONCE_S for x, y in pairs)
@@ -333,7 +333,7 @@ def _pairs(item: Item) -> set[tuple[str, ...]]:
 
 
 def deadline(spans: Sequence[float]) -> int:
-    """A time with a margin, in whole seconds: of larger ones multiples of 5."""
+    """A deadline with margin, in whole seconds; from 20 s on in multiples of 5."""
     raw = max(LEAST_DEADLINE_S, MARGIN * max(spans, default=inf))
     return ceil(raw) if raw < 20 else 5 * ceil(raw / 5)
 
@@ -372,7 +372,7 @@ def _who(item: Item) -> str:
     return "_".join(dict.fromkeys(a for _, actors in _symbols(item) for a in actors))
 
 
-def _said(occurrence: Occurrence) -> str:
+def _text(occurrence: Occurrence) -> str:
     return _action(occurrence[0])
 
 

@@ -1,4 +1,4 @@
-"""A task on a run that is kept: its verdict, and how each stage went."""
+"""Offline judging of a recorded run by a task: the verdict and the status of each stage."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from visup.tasks.supervision.supervise import MEMORY, finish, task_reasoner
 
 @dataclass(frozen=True, slots=True)
 class JudgedRun:
-    """How a task went in a run.
+    """The result of a task on a run.
 
     Attributes:
         verdict: At the end.
-        events: What was told of it.
-        statuses: How each stage stood at the end.
+        events: Reported events of the task.
+        statuses: Final status of each stage.
     """
 
     verdict: Verdict
@@ -25,7 +25,7 @@ class JudgedRun:
     statuses: Mapping[str, Status]
 
     def spans(self) -> Mapping[str, tuple[float, float]]:
-        """When each stage that was done began and ended, seconds."""
+        """Begin and end of each completed stage, seconds."""
         begun: dict[str, float] = {}
         found: dict[str, tuple[float, float]] = {}
         for event in self.events:
@@ -39,7 +39,7 @@ class JudgedRun:
         return found
 
     def paused_s(self) -> Mapping[str, float]:
-        """For how long the work on each stage was paused before it was done, seconds."""
+        """Total paused time of each stage, seconds."""
         since: dict[str, float] = {}
         found: dict[str, float] = {}
         for event in self.events:
@@ -52,11 +52,11 @@ class JudgedRun:
 
 
 def judged(task: Task, minds: Sequence[Mind]) -> JudgedRun:
-    """A task followed through what was believed in a run, whatever tasks were followed then.
+    """Supervise a task over the recorded minds of a run, whatever tasks were supervised then.
 
     Args:
-        task: Checked.
-        minds: In the order of time.
+        task: A checked task.
+        minds: In chronological order.
     """
     reasoner = task_reasoner([task])
     memory, events = MEMORY.default, list[Event]()

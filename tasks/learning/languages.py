@@ -1,8 +1,7 @@
-"""How two tasks differ: by the courses that they allow, not by how they are written.
+"""Language comparison of two tasks: by the courses that they accept, not by their text.
 
-Both automata are made deterministic side by side; the shortest course that one allows and the other
-does not is the difference, told in words. What is no matter of courses (times, conditions, actors and so on)
-is compared by what it says.
+Both automata are determinised in a product construction; the shortest course accepted by only one of them is
+the difference, rendered in words. Everything else (times, conditions, actors and so on) is compared as text.
 """
 
 from __future__ import annotations
@@ -19,23 +18,23 @@ from visup.tasks.grammar.structure import key_text
 C = TypeVar("C")
 
 MOST_STATES = 4_000
-"""Tasks with more are compared up to so many."""
+"""Larger product automata are compared up to this many states only."""
 
 Label = frozenset[tuple[str, frozenset[str]]]
-"""What begins together: each action with its actors."""
+"""Actions that begin together, each with its actors."""
 Course = tuple[Label, ...]
 Nodes = frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
 class TaskDifference:
-    """How two tasks differ.
+    """The difference between two tasks.
 
     Attributes:
-        only_first: The shortest course that only the first allows, or None.
-        only_second: The shortest that only the second allows, or None.
-        other: What else differs, a clause each.
-        whole: Whether all courses were compared, and not those up to some length.
+        only_first: The shortest course that only the first accepts, or None.
+        only_second: The shortest that only the second accepts, or None.
+        other: Other differences, a clause each.
+        whole: Whether all courses were compared, not only those up to some length.
     """
 
     only_first: Course | None
@@ -50,15 +49,15 @@ class TaskDifference:
         """The difference in words.
 
         Args:
-            first: What the first task is called.
-            second: What the second is called.
+            first: Name of the first task.
+            second: Name of the second.
         """
         for course, one, two in (
             (self.only_first, first, second),
             (self.only_second, second, first),
         ):
             if course is not None:
-                yield f"only {one} allows: {told(course)}; {two} does not"
+                yield f"only {one} allows: {course_text(course)}; {two} does not"
         if self.only_first is None and self.only_second is None:
             yield "both allow the same courses" + (
                 "" if self.whole else ", as far as they were compared"
@@ -72,18 +71,18 @@ class _Pair(NamedTuple):
 
 
 def difference(first: Task, second: Task) -> TaskDifference:
-    """How two tasks differ.
+    """The difference between two tasks.
 
     Args:
-        first: Checked.
-        second: Checked.
+        first: A checked task.
+        second: A checked task.
     """
     only_first, only_second, whole = _courses(Automaton(first), Automaton(second))
     return TaskDifference(only_first, only_second, tuple(_other(first, second)), whole)
 
 
 def _courses(one: Automaton, two: Automaton) -> tuple[Course | None, Course | None, bool]:
-    """The shortest course of each that the other does not allow; whether all were compared."""
+    """The shortest course of each that the other does not accept; whether all were compared."""
     start = _Pair(frozenset([START]), frozenset([START]))
     todo: list[tuple[_Pair, Course]] = [(start, ())]
     seen = {start}
@@ -94,9 +93,9 @@ def _courses(one: Automaton, two: Automaton) -> tuple[Course | None, Course | No
         for side in (0, 1):
             if ends[side] and not ends[1 - side] and found[side] is None:
                 found[side] = course
-        ways = _ways(one, pair.first), _ways(two, pair.second)
-        for label in sorted({*ways[0], *ways[1]}, key=told_label):
-            new = _Pair(ways[0].get(label, NOWHERE), ways[1].get(label, NOWHERE))
+        successors = _successors(one, pair.first), _successors(two, pair.second)
+        for label in sorted({*successors[0], *successors[1]}, key=label_text):
+            new = _Pair(successors[0].get(label, NOWHERE), successors[1].get(label, NOWHERE))
             if new not in seen:
                 seen.add(new)
                 todo.append((new, (*course, label)))
@@ -104,16 +103,16 @@ def _courses(one: Automaton, two: Automaton) -> tuple[Course | None, Course | No
 
 
 START = -2
-"""In place of a node: nothing has begun."""
+"""Stands for a node: nothing has begun."""
 NOWHERE: Nodes = frozenset()
 
 
-def _ways(automaton: Automaton, nodes: Nodes) -> dict[Label, Nodes]:
-    """What may begin next, and where that leads."""
+def _successors(automaton: Automaton, nodes: Nodes) -> dict[Label, Nodes]:
+    """Successor node sets by label."""
     found: dict[Label, set[int]] = {}
     for label, target in _begun(automaton, nodes):
         found.setdefault(label, set()).add(target)
-    return {label: _closed(automaton, targets) for label, targets in found.items()}
+    return {label: _epsilon_closure(automaton, targets) for label, targets in found.items()}
 
 
 def _begun(automaton: Automaton, nodes: Nodes) -> Iterator[tuple[Label, int]]:
@@ -127,8 +126,8 @@ def _begun(automaton: Automaton, nodes: Nodes) -> Iterator[tuple[Label, int]]:
                 yield _label(tuple(steps[k] for k in transition.begun)), transition.target
 
 
-def _closed(automaton: Automaton, nodes: set[int]) -> Nodes:
-    """With all nodes that are come to without that anything begins."""
+def _epsilon_closure(automaton: Automaton, nodes: set[int]) -> Nodes:
+    """The closure of some nodes under transitions that begin no step (epsilon closure)."""
     todo, found = list(nodes), set(nodes)
     while todo:
         for transition in automaton.transitions(todo.pop()):
@@ -140,7 +139,7 @@ def _closed(automaton: Automaton, nodes: set[int]) -> Nodes:
 
 
 def _ends(automaton: Automaton, nodes: Nodes) -> bool:
-    """Whether the course may be over at one of some nodes."""
+    """Whether a set of nodes is accepting."""
     over = START in nodes and any(n == END for n, _ in automaton.start)
     return over or END in nodes
 
@@ -149,15 +148,15 @@ def _label(steps: tuple[TaskStep, ...]) -> Label:
     return frozenset((s.action, frozenset(s.actors)) for s in steps)
 
 
-def told(course: Course) -> str:
+def course_text(course: Course) -> str:
     """A course in words: `converging(arm, satellite), then coupled(arm, satellite)`."""
     if not course:
         return "nothing at all"
-    return ", then ".join(map(told_label, course))
+    return ", then ".join(map(label_text, course))
 
 
-def told_label(label: Label) -> str:
-    """What begins together in words."""
+def label_text(label: Label) -> str:
+    """A label in words."""
     return " & ".join(sorted(key_text(action, sorted(who)) for action, who in label))
 
 
@@ -179,14 +178,14 @@ def _declared(task: Task) -> set[str]:
 
 
 def _times(task: Task) -> set[str]:
-    """Each clause with what it stands behind."""
+    """Each time clause with the course that it qualifies."""
     return {f"`{c}`" for c in _all(task, Timed)}
 
 
 def _conditions(task: Task) -> set[str]:
-    """Each stage condition with what it stands behind, and what may have been so already."""
-    said = (f"`{c.item} {told}`" for c in _all(task, Conditioned) for told in c.conditions)
-    return {*said, *(f"`{c}`" for c in _all(task, Already))}
+    """Each stage condition with the course that it qualifies, and each `already`."""
+    found = (f"`{c.item} {each}`" for c in _all(task, Conditioned) for each in c.conditions)
+    return {*found, *(f"`{c}`" for c in _all(task, Already))}
 
 
 def _places(task: Task) -> set[str]:
@@ -207,4 +206,4 @@ OTHER: tuple[tuple[str, Callable[[Task], set[str]]], ...] = (
     ("actors", _declared),
     ("places", _places),
 )
-"""What differs besides courses, and how it is said."""
+"""Other aspects that are compared, by name."""

@@ -1,4 +1,4 @@
-"""Who meets whom in a run, and who only comes along with what another carries."""
+"""Meetings (contacts and couplings) between actors of a run, without those of merely carried objects."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Span
 Pair = tuple[str, ...]
 MEETINGS = ("touching", "coupled")
 LET_GO_S = 1.0
-"""What is carried meets others no longer than so long after it was let go."""
+"""A meeting of a carried object ends at most this long after its release, seconds."""
 MOSTLY = 0.5
-"""A pair only comes along where its meetings do in more than that share of the runs."""
+"""A pair counts as carried along when its meetings do in more than this share of the runs."""
 CLOSE_S = 2.0
-"""Relations are judged with delays: what ends or begins so much earlier may be the same matter."""
+"""Tolerance for detection delays of relations, seconds: changes closer than this may belong together."""
 MUCH_LESS = 0.9
-"""Pairs whose meetings differ by less are told apart by who rests."""
+"""Pairs whose durations have a ratio above this are ranked by who rests."""
 CARRIED_S = 0.5
-"""So long two that are coupled must be on the move together for one to carry the other."""
+"""Least time that coupled actors must move together for one to carry the other, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """Two that are together for a while.
+    """An interval in which two actors are in contact.
 
     Attributes:
-        pair: Who.
-        touching: Their first to last touch.
+        pair: The actors.
+        touching: First to last contact.
         coupled: First to last coupling, or None when they only touch.
-        begun: Whether it was seen to begin, and was not so from the start.
-        carries: Whether they are on the move together while they are coupled.
+        begun: Whether its beginning was observed, not there from the start.
+        carries: Whether they move together while coupled.
     """
 
     pair: Pair
@@ -41,14 +41,14 @@ class Meeting:
     carries: bool = False
 
     def spell(self, action: str) -> Span | None:
-        """From when to when, as one of the two."""
+        """The interval of the coupling or of the contact."""
         return self.coupled if action == "coupled" else self.touching
 
 
 def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
-    """Pairs that touch: in the fewest runs, or for much less long, first; then those that move most.
+    """Pairs in contact, ascending by number of runs, then by duration; near ties: most motion first.
 
-    What is put on a thing that rests meets that thing, and not what was put on it before.
+    An object placed on a resting one meets that one, not another placed there before.
     """
     seconds: dict[Pair, list[float]] = {}
     for run in runs:
@@ -72,26 +72,27 @@ def pairs_by_weight(runs: Sequence[RunTrace]) -> list[Pair]:
 
 
 def meetings_of(runs: Sequence[RunTrace], pairs: Sequence[Pair]) -> list[list[Meeting]]:
-    """All meetings of each run but those of what is only carried along.
+    """The meetings of each run, without those of objects that are merely carried along.
 
-    A pair is carried along in all runs or in none: which of two ends first when one lets go is chance.
+    A pair is carried along in all runs or in none, since the order in which meetings end at a release is
+    random.
 
     Args:
         runs: The runs.
-        pairs: All pairs; of several that meet through each other the first one is let be.
+        pairs: All pairs; of several that meet through each other the first is dropped.
     """
     real = [_meetings(run) for run in runs]
     for pair in pairs:
         meet = sum(any(m.pair == pair for m in row) for row in real)
         along = sum(any(m.pair == pair and _carried(m, row, 1) for m in row) for row in real)
         if along > MOSTLY * meet:
-            # Nearly so in the others, then, is so in them too.
+            # In the other runs a looser tolerance is then enough.
             real = [[m for m in r if m.pair != pair or not _carried(m, r, 2)] for r in real]
     return real
 
 
 def _meetings(run: RunTrace) -> list[Meeting]:
-    """What happens between the same two with short breaks is one meeting."""
+    """Contacts of the same pair, separated by short breaks only, merged into one meeting."""
     found: list[list[Happening]] = []
     for h in run.happenings:
         if h.symbol[0] not in MEETINGS:
@@ -118,7 +119,7 @@ def _meeting(spells: Sequence[Happening], run: RunTrace) -> Meeting:
 
 
 def _together_s(run: RunTrace, pair: Pair, spell: Span) -> float:
-    """For how long in a while both of a pair were on the move, seconds."""
+    """How long both of a pair moved within an interval, seconds."""
     one, other = (run.moves.get(name, ()) for name in pair)
     return sum(
         max(0.0, min(b, d, spell[1]) - max(a, c, spell[0])) for a, b in one for c, d in other
@@ -126,10 +127,10 @@ def _together_s(run: RunTrace, pair: Pair, spell: Span) -> float:
 
 
 def _carried(meeting: Meeting, meetings: Sequence[Meeting], slack: int) -> bool:
-    """Whether two meet only through a third thing, which one carries and which meets the other.
+    """Whether two meet only through a third object, which one carries and which meets the other.
 
-    The meeting ends as soon as what is carried is let go, or so many times `LET_GO_S` later. In the image
-    it may begin long before, where one stands before the other.
+    The meeting ends at the release of the carried object, or up to `slack` times `LET_GO_S` later. In the
+    image it may begin long before, where one overlaps the other.
     """
     begin, end = meeting.touching
     overlap = [m for m in meetings if m.touching[0] <= end and m.touching[1] >= begin]

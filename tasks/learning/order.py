@@ -1,7 +1,7 @@
-"""From strings of symbols to a course: what repeats is a loop, what all runs order is a sequence.
+"""Induction of a plan from symbol strings: loops from repeats, sequences from the common partial order.
 
-A loop is made where it shortens the description of all runs together. Two things of which either
-comes first in some run are free in their order.
+A loop is introduced where it shortens the total description of all runs. Two items are unordered when
+either comes first in some run.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ MOST_FREE = 6
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """What is done several times in a row: the symbols of one time."""
+    """A repeated block: the symbols of one iteration."""
 
     body: tuple[Item, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """What begins about the same time and then goes on together: each asked for beside the others."""
+    """Symbols that begin at about the same time and overlap: a conjunction."""
 
     parts: tuple[Symbol, ...]
 
@@ -37,28 +37,28 @@ Word = tuple[Item, ...]
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One after the other."""
+    """Parts in sequence."""
 
     parts: tuple[Plan, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """Each once, in any order."""
+    """Parts once each, in any order."""
 
     parts: tuple[Plan, ...]
 
 
 Occurrence = tuple[Item, int]
-"""The n-th time of a symbol or loop in a run, from 0."""
+"""The n-th occurrence of a symbol or loop in a run, from 0."""
 Plan = Occurrence | Series | Free
 
 
 def with_loops(words: Sequence[Word]) -> tuple[list[Word], dict[Loop, tuple[int, int]]]:
-    """The words with tandem repeats as loops, while that shortens them all together.
+    """Fold tandem repeats into loops, greedily, while the total description length decreases.
 
     Returns:
-        The words, and how often at least and at most each loop was gone through.
+        The words, and the least and greatest number of iterations of each loop.
     """
     found, times = list(words), dict[Loop, tuple[int, int]]()
     while True:
@@ -82,7 +82,7 @@ def _candidates(words: Sequence[Word]) -> set[Word]:
 
 
 def _gain(words: Sequence[Word], block: Word) -> int:
-    """How many symbols fewer it takes to write all words and the loop."""
+    """Symbols saved by writing all words with the loop, less the loop itself."""
     saved = sum(n * len(block) - 1 for w in words for n in _repeats(w, block))
     return saved - (len(block) + 1)
 
@@ -114,17 +114,17 @@ def _folded(word: Word, block: Word, loop: Loop) -> Word:
 
 
 def numbered(word: Word) -> list[Occurrence]:
-    """Each symbol with how often it stood in the word before."""
-    seen: dict[Item, int] = {}
+    """Each symbol with the number of its earlier occurrences in the word."""
+    counts: dict[Item, int] = {}
     found = []
     for item in word:
-        found.append((item, seen.get(item, 0)))
-        seen[item] = seen.get(item, 0) + 1
+        found.append((item, counts.get(item, 0)))
+        counts[item] = counts.get(item, 0) + 1
     return found
 
 
 def shared(words: Sequence[Word], share: float) -> list[Occurrence]:
-    """What stands in so many of the words at least, in the order of its mean place."""
+    """Occurrences in at least this share of the words, by mean relative position."""
     places: dict[Occurrence, list[float]] = {}
     for word in words:
         for place, occurrence in enumerate(numbered(word)):
@@ -138,18 +138,18 @@ def plan_of(
     core: Sequence[Occurrence],
     at_once: Callable[[Occurrence, Occurrence], bool] = lambda a, b: False,
 ) -> Plan:
-    """The course that all words share: in sequence what all order alike, else free.
+    """The plan common to all words: in sequence where all agree on the order, else free.
 
     Args:
         words: The runs.
-        core: What is in them all.
-        at_once: Whether two things come so close that their order may be chance.
+        core: The occurrences of the plan.
+        at_once: Whether two occurrences are so close in time that their order may be random.
     """
     ranks = [{o: k for k, o in enumerate(numbered(w))} for w in words]
 
     def before(a: Occurrence, b: Occurrence) -> bool:
-        both = [r for r in ranks if a in r and b in r]
-        return bool(both) and all(r[a] < r[b] for r in both) and not at_once(a, b)
+        common = [r for r in ranks if a in r and b in r]
+        return bool(common) and all(r[a] < r[b] for r in common) and not at_once(a, b)
 
     return _plan(list(core), before)
 
@@ -167,14 +167,14 @@ def _plan(items: list[Occurrence], before: Callable[[Occurrence, Occurrence], bo
     groups = _components(items, before)
     if len(groups) > 1:
         return Free(tuple(_plan(g, before) for g in groups[:MOST_FREE]))
-    # Ordered in part only: as on average, which is what most runs do.
+    # A partial order that does not decompose: fall back to the mean order, which most runs follow.
     return Series(tuple(items))
 
 
 def _components(
     items: list[Occurrence], before: Callable[[Occurrence, Occurrence], bool]
 ) -> list[list[Occurrence]]:
-    """Groups such that nothing of one is ordered with anything of another."""
+    """Connected components of the order relation: no item is ordered with one of another group."""
     group: dict[Occurrence, int] = {o: k for k, o in enumerate(items)}
     for a, b in combinations(items, 2):
         if before(a, b) or before(b, a):
@@ -184,14 +184,14 @@ def _components(
 
 
 def leaves_of(plan: Plan) -> list[Occurrence]:
-    """The occurrences of a plan, in its order."""
+    """The occurrences of a plan, in order."""
     if isinstance(plan, Series | Free):
         return [o for p in plan.parts for o in leaves_of(p)]
     return [plan]
 
 
 def without(plan: Plan, dropped: Occurrence) -> Plan | None:
-    """The plan without one of its occurrences; None when nothing is left."""
+    """The plan without one of its occurrences; None if that leaves it empty."""
     if not isinstance(plan, Series | Free):
         return None if plan == dropped else plan
     parts = tuple(p for part in plan.parts if (p := without(part, dropped)) is not None)

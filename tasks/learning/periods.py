@@ -1,7 +1,7 @@
-"""What repeats in time: loops of one kind of meeting that keep a rhythm, though how often differs.
+"""Periodic loops: one kind of meeting repeated at a regular period, though a varying number of times.
 
-How often a wiper touches the glass is chance, that it does so every two to four seconds is not: then the
-rhythm is what the runs have in common, and describes them all with two numbers.
+How often a wiper touches the glass is random, but that it does so every two to four seconds is not. The
+period is then common to the runs and describes all of them with two numbers.
 """
 
 from __future__ import annotations
@@ -16,23 +16,22 @@ from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import Symbol
 
 LEAST_BEATS = 4
-"""Fewer in a run keep no rhythm that could be told from chance."""
+"""Fewer repetitions in a run cannot be told from chance."""
 STEADIEST, EVEN = 0.25, 2.0
-"""The longest time from one to the next is at most so many times the shortest; of shorter steps than so many
-seconds nothing is told."""
+"""Shortest period that is accepted, seconds, and greatest ratio of the longest to the shortest one."""
 MARGIN = 1.5
-"""The next one may come so many times as late as ever in a good run, or as early."""
+"""Factor by which a period may exceed the extremes of the good runs, either way."""
 
 Period = tuple[float, float]
-"""The least and the greatest time from one beginning to the next, seconds."""
+"""Shortest and longest time from one beginning to the next, seconds."""
 
 
 def periods_of(times: Times, rows: Sequence[Sequence[CourseEvent]]) -> dict[Loop, Period]:
-    """The loops that keep a rhythm, with their periods as they were in the runs.
+    """The periodic loops, with their periods in the runs.
 
     Args:
-        times: Of each loop, how often it was gone through.
-        rows: What each run is made of.
+        times: Least and greatest number of iterations of each loop.
+        rows: The events of each run.
     """
     found: dict[Loop, Period] = {}
     for loop, (least, most) in times.items():
@@ -47,7 +46,7 @@ def periods_of(times: Times, rows: Sequence[Sequence[CourseEvent]]) -> dict[Loop
 
 
 def beat_of(loop: Loop) -> Symbol | None:
-    """The meeting of which a loop is made: one, of one pair, with what leads to it and its end; else None."""
+    """The meeting of a loop that is one meeting of one pair, with its approach and end; else None."""
     symbols = [s for s in loop.body if isinstance(s, tuple)]
     meetings = [s for s in symbols if s[0] in MEETINGS]
     alone = len(symbols) == len(loop.body) and len({s[1] for s in symbols}) == 1
@@ -55,19 +54,17 @@ def beat_of(loop: Loop) -> Symbol | None:
 
 
 def with_margin(period: Period) -> Period:
-    """A period with a margin, in half seconds."""
+    """A period widened by the margin, in half seconds."""
     least, most = period[0] / MARGIN, period[1] * MARGIN
     return floor(2 * least) / 2, ceil(2 * most) / 2
 
 
 def course_of(loop: Loop, period: Period) -> str:
-    """What a stage asks for that keeps a rhythm, with how it was in the runs."""
+    """The body of a periodic stage, with the observed period as a comment."""
     least, most = with_margin(period)
-    said = f"{least:g} s to {most:g} s" if least else f"{most:g} s"
+    bounds = f"{least:g} s to {most:g} s" if least else f"{most:g} s"
     action, actors = beat_of(loop) or ("", ())
-    return (
-        f"{action}({', '.join(actors)}) every {said}  # every {period[0]:.1f} to {period[1]:.1f} s"
-    )
+    return f"{action}({', '.join(actors)}) every {bounds}  # every {period[0]:.1f} to {period[1]:.1f} s"
 
 
 def _steps(row: Sequence[CourseEvent], beat: Symbol) -> list[float]:

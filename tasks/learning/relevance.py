@@ -1,7 +1,7 @@
-"""What a run is made of: meetings, what leads to them, and partings; not what only comes along.
+"""Selection of the relevant events of each run: meetings, approaches that lead to them, and partings.
 
-A camera sees more than was meant: what is carried meets what it is carried past, outlines touch where one
-body stands before another. What is left is one row of happenings for each run, alike in all.
+A camera observes incidental contacts as well: carried objects touch those they pass, and outlines touch where
+one body overlaps another. The result is one event sequence for each run, comparable between runs.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from visup.tasks.learning.order import Item, Joint
 from visup.tasks.learning.traces import Happening, RunTrace, Symbol
 
 ENDED_S = 0.3
-"""A meeting that ends so long before the run does has ended, and is not cut off."""
+"""A meeting that ends this long before the run has ended by itself, seconds; later ones are cut off."""
 
 
 @dataclass(frozen=True, slots=True)
 class CourseEvent:
-    """A happening in the row of a run.
+    """An event in the sequence of a run.
 
     Attributes:
-        happening: What, from when to when.
-        at: Seconds by which it is ordered: an approach comes with its meeting.
-        lasts: Whether it goes on to the end of the run.
-        beside: What happens with it.
+        happening: Its symbol and interval.
+        at: Time by which it is ordered, seconds: an approach has that of its meeting.
+        lasts: Whether it lasts to the end of the run.
+        beside: Symbols of simultaneous events joined with it.
     """
 
     happening: Happening
@@ -36,21 +36,21 @@ class CourseEvent:
 
     @property
     def symbol(self) -> Symbol:
-        """What happens; the first of several."""
+        """The symbol; the first of several."""
         return self.happening.symbol
 
     @property
     def item(self) -> Item:
-        """What happens."""
+        """The symbol, or the joint of several."""
         return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
 
 
 def relevant(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
-    """What each run is made of, in order.
+    """The relevant events of each run, in order.
 
-    A touch that becomes a coupling is that coupling, where it does so in all runs; else both are touches.
-    What is coupled to the same thing moves and meets as that does. An approach counts when it leads to a
-    meeting, a parting when it ends one. Where nobody ever meets all counts.
+    A contact that becomes a coupling in all runs is that coupling; otherwise both are contacts. Objects
+    coupled to the same one move and meet as it does. An approach counts when it leads to a meeting, a
+    parting when it ends one. If nobody ever meets, all events count.
     """
     met = meetings_of(runs, pairs_by_weight(runs))
     if not any(met):
@@ -73,7 +73,7 @@ def _shared_pairs(met: Sequence[Collection[Meeting]]) -> set[Pair]:
 
 
 def _beginning(met: Sequence[Collection[Meeting]]) -> set[Pair]:
-    """Pairs that are seen to meet in most of the runs in which they are together."""
+    """Pairs whose meeting is observed to begin in more than half of the runs in which they meet."""
     together = Counter(pair for rows in met for pair in {m.pair for m in rows})
     begun = Counter(pair for rows in met for pair in {m.pair for m in rows if m.begun})
     return {pair for pair, runs in begun.items() if 2 * runs > together[pair]}
@@ -82,7 +82,7 @@ def _beginning(met: Sequence[Collection[Meeting]]) -> set[Pair]:
 def _late(
     run: RunTrace, meetings: Sequence[Meeting], pairs: Collection[Pair]
 ) -> Iterator[CourseEvent]:
-    """Meetings that are so from the start of this run, where one body covers the other, and begin in most.
+    """Meetings present from the start of this run, by overlap in the image, that begin in most runs.
 
     They count from the end of the approach.
     """
@@ -102,7 +102,7 @@ def _late(
 def _towards(
     run: RunTrace, rows: Sequence[Meeting], pairs: Collection[Pair]
 ) -> Iterator[CourseEvent]:
-    """Approaches whose meeting is not seen in this run, as when one goes into the other and is hidden."""
+    """Approaches whose meeting is not observed in this run, as when one enters the other and is hidden."""
     met = {m.pair for m in rows}
     for pair in pairs:
         found = [h for h in run.happenings if h.symbol == ("converging", pair)]
@@ -114,9 +114,9 @@ _RANK = {"converging": 0, "touching": 1, "coupled": 1, "apart": 2, "decoupled": 
 
 
 def _words(met: Sequence[Collection[Meeting]]) -> dict[Pair, str]:
-    """How each pair meets: coupled where one carries the other in every run in which they meet.
+    """The action of each pair: coupled if one carries the other in every run in which they meet.
 
-    Of two that rest against each other it is chance whether they are taken to be coupled.
+    Whether two bodies at rest against each other are detected as coupled is random.
     """
     pairs = {m.pair for rows in met for m in rows}
     return {
@@ -141,7 +141,7 @@ def _events(
             continue
         begin, end = spell
         lasts = end > run.end - ENDED_S
-        if meeting.begun:  # a stage is done by what comes about in it
+        if meeting.begun:  # a stage is completed by a change within it
             approach = _approach(run, pair, meeting.touching[0], begin)
             if approach is not None and not _held_elsewhere(meeting, begin, meetings):
                 yield CourseEvent(approach, begin)
@@ -152,19 +152,19 @@ def _events(
 
 
 def _parts(run: RunTrace, pair: Pair, end: float) -> bool:
-    """Whether two go apart when their contact ends: that of two at rest only ceases to be seen."""
+    """Whether two separate when their contact ends: that of bodies at rest merely ceases to be detected."""
     parting = (h for h in run.happenings if h.symbol == ("diverging", pair))
     return any(h.begin <= end + CLOSE_S and h.end >= end - CLOSE_S for h in parting)
 
 
 def _held_elsewhere(meeting: Meeting, at: float, meetings: Sequence[Meeting]) -> bool:
-    """Whether a third holds one of two when they meet: how it is carried there is no stage."""
+    """Whether a third actor holds one of two when they meet: carrying it there is no stage."""
     others = (m.coupled for m in meetings if set(m.pair) & set(meeting.pair) and m is not meeting)
     return any(spell is not None and spell[0] < at <= spell[1] + CLOSE_S for spell in others)
 
 
 def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happening | None:
-    """The last time that they draw nearer before they meet."""
+    """The last approach of a pair before it meets."""
     found = [
         h
         for h in run.happenings
@@ -174,15 +174,15 @@ def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happenin
 
 
 AT_ONCE_S = 0.3
-"""Relations are judged with delays: what comes closer together than so may be seen in either order."""
+"""Detection delay, seconds: events closer together than this may be detected in either order."""
 
 Row = Sequence[CourseEvent]
 
 
 def joined(rows: Sequence[Row]) -> list[list[CourseEvent]]:
-    """Rows in which what comes about at once, and goes on together in all runs, is one event.
+    """Rows with events that begin at once, and overlap in all runs, merged into joint events.
 
-    Which of the two is seen first is chance, so that no order of theirs is asked for.
+    Which of them is detected first is random, so their order is not required.
     """
     once = [{e.symbol: e for e in row if _single(e, row)} for row in rows]
     shared = sorted(set.intersection(*(set(events) for events in once))) if once else []
@@ -203,7 +203,7 @@ def _single(event: CourseEvent, row: Row) -> bool:
 
 
 def _together(once: Sequence[Mapping[Symbol, CourseEvent]], a: Symbol, b: Symbol) -> bool:
-    """Whether two come at once in some run, and go on together for a while in all."""
+    """Whether two events begin at once in some run and overlap in all."""
     if a[1] == b[1]:
         return False
     pairs = [(events[a], events[b]) for events in once]
@@ -216,7 +216,7 @@ def _overlap(a: Happening, b: Happening) -> float:
 
 
 def _with_joints(row: Row, groups: Sequence[Sequence[Symbol]]) -> list[CourseEvent]:
-    """A row with each group in the place of its last one."""
+    """A row with each group replaced by a joint event at the position of its last member."""
     found = list(row)
     for group in groups:
         parts = sorted((e for e in found if e.symbol in group), key=lambda e: group.index(e.symbol))

@@ -1,7 +1,7 @@
-"""Who rests in all good runs: what then must not be pushed about.
+"""Actors that stay at rest in all good runs, and the invariant that they must not be pushed.
 
-What rests seems to move where something passes before it or is put on it, so that *moving* is true at times;
-its velocity is not well known then, as that of what is pushed is.
+A resting body appears to move when another passes in front of it or is placed on it, so *moving* holds at
+times; but its velocity is then uncertain, whereas that of a pushed body is well known.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from math import ceil
 from visup.tasks.learning.traces import SUSTAINED_S, RunTrace
 
 REST = 0.02
-"""Who never moves faster rests, image diagonals a second."""
+"""Greatest speed of an actor at rest, image diagonals per second."""
 LEAST_ALLOWED = 0.04
-"""No slower motion is forbidden, image diagonals a second. By masks, of 40 things at rest in good worlds of
-fresh seeds none clearly moved faster than .01; of 15 that were rammed one moved at .05, one at
+"""Lowest limit of the invariant, image diagonals per second. From masks, of 40 objects at rest in good worlds
+of fresh seeds none clearly moved faster than .01; of 15 that were rammed one moved at .05, one at
 .08 and all others at .1 or more."""
 TIMES_SEEN = 4.0
-"""Nor any that is not so many times as fast as what was seen in a good run."""
+"""The limit is also at least this many times the greatest speed in a good run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """An actor that rests in all good runs.
+    """An actor at rest in all good runs.
 
     Attributes:
-        actor: Who.
-        seen: How fast it clearly moved at most, px/s.
-        allowed: How fast it may, px/s.
+        actor: Its name.
+        seen: Greatest speed of clear motion, px/s.
+        allowed: Speed limit, px/s.
     """
 
     actor: str
@@ -37,21 +37,21 @@ class Rest:
     allowed: int
 
     def invariant(self, runs: str) -> str:
-        """The line of a task file that asks for it.
+        """The invariant as a line of a task file.
 
         Args:
-            runs: How many runs tell of it, in words.
+            runs: Number of supporting runs, in words.
         """
         fast = f"speed({self.actor}) > {self.allowed} px/s and moving_clearly({self.actor})"
         return f"never {fast} for {SUSTAINED_S:g} s  # in {runs} at most {self.seen:.0f} px/s"
 
 
 def rests_of(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[Rest]:
-    """Those of some actors that rest in all runs, in the order of the alphabet.
+    """The actors at rest in all runs, in alphabetical order.
 
     Args:
-        runs: Good ones.
-        actors: Who plays in the task.
+        runs: Good runs.
+        actors: The actors of the task.
     """
     diagonal = min(run.diagonal for run in runs)
     for actor in sorted(actors):

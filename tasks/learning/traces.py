@@ -1,4 +1,4 @@
-"""A run as happenings: which actions held between whom, from when to when."""
+"""A run as intervals: which actions held between which actors, and when."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from visup.tasks.verification.observe import RelationLookup
 
 Span = tuple[float, float]
 Symbol = tuple[str, tuple[str, ...]]
-"""An action and its actors, the actors of a pair in the order of the alphabet."""
+"""An action and its actors, those of a pair in alphabetical order."""
 
 OF_PAIRS = ("converging", "diverging", "touching", "coupled")
 BREAK_S = 1.0
-"""What ceases for less long goes on: relations flicker."""
+"""Shorter gaps, seconds, are bridged: relations flicker."""
 SUSTAINED_S = 0.2
-"""As fast as somebody moves for so long, it does move; an outline may jump."""
+"""A speed counts when it is sustained for this long, seconds; an outline may jump."""
 LEAST_S = {"converging": 0.6, "diverging": 0.6, "touching": 0.2, "coupled": 0.4, "decoupled": 0.2}
-"""What lasts less long is noise."""
+"""Shorter intervals, seconds, are noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """Something that held for a while.
+    """An interval in which an action held.
 
     Attributes:
-        symbol: What.
+        symbol: The action and its actors.
         begin: Seconds.
         end: Seconds.
-        begun: Whether it was seen to begin, and was not so from the start; of contacts.
+        begun: Whether its beginning was observed; False for contacts present from the start.
     """
 
     symbol: Symbol
@@ -46,18 +46,18 @@ class Happening:
 
 @dataclass(frozen=True)
 class RunTrace:
-    """A run, as it is learned from.
+    """A run as input of learning.
 
     Attributes:
         name: Of the run, for messages.
-        happenings: In the order of their begins.
-        begin: Seconds of its first moment.
-        end: Seconds of its last.
-        minds: What was believed, moment by moment.
-        always: Actors that were in the scene from their first sight to the end.
-        moved_s: For how long each moved, seconds.
-        moves: When each moved, from when to when, seconds.
-        fastest: How fast each clearly moved at most, for `SUSTAINED_S`, px/s.
+        happenings: Sorted by begin.
+        begin: Time of its first step, seconds.
+        end: Time of its last step, seconds.
+        minds: The mental model at each step.
+        always: Actors that stayed in the scene from first detection to the end.
+        moved_s: Total time of motion of each actor, seconds.
+        moves: Intervals of motion of each actor, seconds.
+        fastest: Greatest speed of clear motion of each actor, sustained for `SUSTAINED_S`, px/s.
         diagonal: Of the image, pixels.
     """
 
@@ -74,21 +74,21 @@ class RunTrace:
 
 
 def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
-    """The happenings of a run.
+    """The trace of a run.
 
     Args:
         name: Of the run.
-        minds: What was believed, in the order of time.
+        minds: The mental model at each step, in chronological order.
     """
-    kept = tuple(minds)
+    history = tuple(minds)
     spells: dict[Symbol, list[list[float]]] = {}
     always: set[Symbol] = set()
     gone: set[str] = set()
     named: set[str] = set()
     moved: dict[str, list[Span]] = {}
     speeds: dict[str, list[tuple[float, float]]] = {}
-    before = kept[0].time if kept else 0.0
-    for mind in kept:
+    before = history[0].time if history else 0.0
+    for mind in history:
         names = names_of(mind)
         for actor, speed, moves in _motions(mind, names):
             if moves:
@@ -98,12 +98,12 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         before = mind.time
         named |= set(names.values())
         gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
-        for symbol, truth in _held(mind, names):
+        for symbol, truth in _relations(mind, names):
             if symbol[0] == "touching" and truth is Truth.TRUE and symbol not in spells:
                 always.add(symbol)
             if truth is not Truth.UNKNOWN:
                 _note(spells.setdefault(symbol, []), truth, mind.time)
-    begin, end = (kept[0].time, kept[-1].time) if kept else (0.0, 0.0)
+    begin, end = (history[0].time, history[-1].time) if history else (0.0, 0.0)
     found = [h for s, rows in spells.items() for h in _happenings(s, rows, end, s not in always)]
     found += [p for h in found if (p := _parted(h, end)) is not None]
     return RunTrace(
@@ -111,19 +111,19 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         tuple(sorted(found, key=lambda h: (h.begin, h.symbol))),
         begin,
         end,
-        kept,
+        history,
         frozenset(named - gone),
         {actor: sum(b - a for a, b in spans) for actor, spans in moved.items()},
         {actor: _merged(spans) for actor, spans in moved.items()},
         {actor: _sustained(row) for actor, row in speeds.items()},
-        image_diagonal(kept[0].frame_size) if kept else 0.0,
+        image_diagonal(history[0].frame_size) if history else 0.0,
     )
 
 
 def _motions(mind: Mind, names: dict[int, str]) -> Iterator[tuple[str, float | None, bool]]:
-    """Of each object its speed, px/s, where it is seen, and whether that counts as moving.
+    """Name, speed in px/s (None if not visible) and whether it is moving, of each object.
 
-    The speed is 0 where it does not clearly move: then the body rests, or is covered in part.
+    The speed is 0 without clear motion: then the body rests or is partly occluded.
     """
     facts = Snapshot(mind)
     codes, clear, speeds = moving(facts), moving_clearly(facts), facts.one("speed")
@@ -135,7 +135,7 @@ def _motions(mind: Mind, names: dict[int, str]) -> Iterator[tuple[str, float | N
 
 
 def _merged(spans: Sequence[Span]) -> tuple[Span, ...]:
-    """Spans in order, with those that follow each other at once as one."""
+    """Spans in order, adjacent ones merged."""
     found: list[Span] = []
     for begin, end in spans:
         follows = bool(found) and begin <= found[-1][1]
@@ -144,7 +144,7 @@ def _merged(spans: Sequence[Span]) -> tuple[Span, ...]:
 
 
 def _sustained(speeds: Sequence[tuple[float, float]]) -> float:
-    """The highest speed that was kept up for `SUSTAINED_S`, px/s, of times and speeds."""
+    """The highest speed sustained for `SUSTAINED_S`, px/s, from (time, speed) samples."""
     long, most, begin = SUSTAINED_S - 1e-9, 0.0, 0
     for end, (now, _) in enumerate(speeds):
         while begin < end and now - speeds[begin + 1][0] >= long:
@@ -155,7 +155,7 @@ def _sustained(speeds: Sequence[tuple[float, float]]) -> float:
 
 
 def names_of(mind: Mind) -> dict[int, str]:
-    """Objects by the actor that each plays or the model that it is believed to be, one for a name."""
+    """The name (actor or believed model) of each confirmed object, one object per name."""
     found: dict[str, int] = {}
     for number in sorted(mind.objects):
         name = believed_name(mind, number)
@@ -164,7 +164,7 @@ def names_of(mind: Mind) -> dict[int, str]:
     return {i: n for n, i in found.items()}
 
 
-def _held(mind: Mind, names: dict[int, str]) -> Iterator[tuple[Symbol, Truth]]:
+def _relations(mind: Mind, names: dict[int, str]) -> Iterator[tuple[Symbol, Truth]]:
     relations = RelationLookup(mind)
     ordered = sorted(names, key=names.__getitem__)
     for a, b in combinations(ordered, 2):
@@ -173,7 +173,7 @@ def _held(mind: Mind, names: dict[int, str]) -> Iterator[tuple[Symbol, Truth]]:
 
 
 def _note(rows: list[list[float]], truth: Truth, now: float) -> None:
-    """Rows of begin and end; one that goes on has no end yet."""
+    """Update [begin, end] rows; an open interval has no end yet."""
     going = bool(rows) and len(rows[-1]) == 1
     if truth is Truth.TRUE and not going:
         if rows and now - rows[-1][1] < BREAK_S:
@@ -187,7 +187,7 @@ def _note(rows: list[list[float]], truth: Truth, now: float) -> None:
 def _happenings(
     symbol: Symbol, rows: list[list[float]], end: float, begun: bool
 ) -> Iterator[Happening]:
-    """Of the rows of what is so, each that lasts; the first was so from the start unless it has begun."""
+    """The intervals of a symbol that are long enough; `begun` applies to the first, later ones have begun."""
     for number, row in enumerate(rows):
         begin, until = row[0], row[1] if len(row) > 1 else end
         if until - begin >= LEAST_S[symbol[0]]:
@@ -195,7 +195,7 @@ def _happenings(
 
 
 def _parted(coupling: Happening, end: float) -> Happening | None:
-    """That a coupling came to its end."""
+    """The end of a coupling as an interval of its own."""
     if coupling.symbol[0] != "coupled" or end - coupling.end < LEAST_S["decoupled"]:
         return None
     return Happening(("decoupled", coupling.symbol[1]), coupling.end, end)

@@ -1,4 +1,4 @@
-"""State of facts from step to step: how long they have held, how often, when they paused work."""
+"""State of facts carried from step to step: since when they hold, their rhythm, and pauses."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Kept:
 
     Attributes:
         time: Seconds of that moment, or None before the first.
-        lasting: Since when what is no plain relation of the mind has been true, by key.
-        beats: Of what is to happen again and again when it did, by key.
-        pauses: When work was paused.
+        lasting: Since when each fact that is no plain relation of the mind has been true, by key.
+        beats: Occurrences of periodic facts, by key.
+        pauses: All pauses so far.
     """
 
     time: float | None = None

@@ -1,4 +1,4 @@
-"""What is seen of one action at one moment."""
+"""Observation of one action at one moment: the relations for and against it."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
 
 CARRIED_SPEED = 0.005
-"""Speed from which on two that are coupled move together, image diagonals per second."""
+"""Least speed at which coupled objects count as moving together, image diagonals per second."""
 
 RADIAL_SHARE = 0.45
-"""Two draw nearer or apart where their distance changes at no less than this share of their relative speed;
-that of a body that flies round another one does at up to 0.4 of it."""
+"""Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
+flies round another it reaches 0.4."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActionObservation:
-    """What is seen of an action between its actors.
+    """The observation of an action between its actors.
 
     Attributes:
         holds: Whether the action holds.
         held_by: A true relation by which it holds, or None.
-        helps: A true relation by which it holds or comes nearer, or None.
+        helps: A true relation by which it holds or progresses, or None.
         entry: A true relation by which it begins, or None.
-        contrary: A true relation that says that it fails, or None.
-        stern: Whether the contrary counts although the action holds: the course itself says so.
-        over: Whether what its course says of its end is seen; None when the course says nothing.
-        observed: Whether anything at all is known about it; False while an actor is not found
-            or its object is hidden.
-        round: Whether its entry is that two draw nearer or apart of which one goes round the other.
-        paused: Whether the work on it is paused: then nothing is seen of it.
+        contrary: A true relation by which it fails, or None.
+        decisive: Whether the contrary counts even while the action holds, because the course states it.
+        over: Whether the end condition of its course holds; None when the course has none.
+        observed: Whether anything is known about it; False while an actor is not found or its object
+            is hidden.
+        round: Whether its entry is a trend between two of which one goes round the other.
+        paused: Whether the work on it is paused: then there is no observation of it.
         pauses: All pauses of the task so far.
-        absent: Whether an actor of it is spare, and there is no object for it: then it is nobody's turn.
+        absent: Whether one of its actors is optional and has no object: then the step is not due.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -76,13 +76,13 @@ UNOBSERVED = ActionObservation()
 
 
 class RelationLookup:
-    """All relations of a mind at one moment, found by name and objects.
+    """All relations of a mind at one moment, by name and objects.
 
     Args:
         mind: The mind.
-        looks: Words and keys that are not plain relations of the mind (see `task_vocabulary`).
-        before: What was kept of the moment before.
-        rhythms: What is to happen again and again, by key.
+        looks: Evaluators of facts that are no plain relations of the mind (see `task_vocabulary`).
+        before: The state of the previous moment.
+        rhythms: Periodic facts, by key.
     """
 
     def __init__(
@@ -93,27 +93,27 @@ class RelationLookup:
         rhythms: Mapping[str, Rhythm] = NO_RHYTHMS,
     ) -> None:
         self._mind = mind
-        self._looks = looks
+        self._evaluators = looks
         self._rhythms = rhythms
-        self._looked_at = mind.time if before.time is None else before.time
+        self._previous_time = mind.time if before.time is None else before.time
         self._before = dict(before.lasting)
         self._beats_before = dict(before.beats)
         self._beats: dict[str, tuple[Beats, Truth]] = {}
-        self._looked: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._evaluated: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
-        self._judged: set[str] = set()
+        self._queried: set[str] = set()
         self._after: dict[str, float] = {}
 
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
         """The relation of that name between these objects; one of unknown truth when there is none.
 
-        `decoupled`, `apart`, `on`, `present` and `gone` follow from what else is believed unless some
-        rule gives them itself.
+        `decoupled`, `apart`, `on`, `present` and `gone` are derived from other beliefs unless a rule
+        states them.
         """
-        if name in self._looks:
-            return self._look(name, objects)
+        if name in self._evaluators:
+            return self._evaluate(name, objects)
         if name in self._rhythms:
-            return self._in_time(self._rhythms[name], name, objects)
+            return self._rhythm_relation(self._rhythms[name], name, objects)
         found = self._found.get((name, objects))
         if found is None:
             found = self._found[name, objects] = self._given_or_derived(name, objects)
@@ -141,16 +141,16 @@ class RelationLookup:
         return passing is not None and passing.truth is Truth.TRUE
 
     def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:
-        """Whether of two that draw nearer or apart one rather goes round the other; unknown is no."""
+        """Whether a trend is rather one going round the other; False if unknown."""
         now, pair = kinematics(self._mind), (objects[0], objects[1])
         rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
         return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
 
     def explains_away(self, trend: str, action: str, objects: tuple[int, ...]) -> bool:
-        """Whether a trend speaks against an action only in appearance.
+        """Whether a trend contradicts an action only in appearance.
 
-        Who passes over or round another draws away from it a little; and of two that have met, fingers that
-        close or a body that turns move the outlines, while the bodies are in contact.
+        A body that passes over or round another recedes from it a little; and after two have met, closing
+        fingers or a rotating body move the outlines while the bodies stay in contact.
         """
         if trend not in TRENDS:
             return False
@@ -166,53 +166,53 @@ class RelationLookup:
     def _facts(self) -> Snapshot:
         return Snapshot(self._mind)
 
-    def _look(self, name: str, objects: tuple[int, ...]) -> Relation:
+    def _evaluate(self, name: str, objects: tuple[int, ...]) -> Relation:
         key = (name, objects)
-        if key not in self._looked:
-            truth = self._looks[name](self._facts, objects)
-            self._looked[key] = self.lasting(name, objects, truth)
-        return self._looked[key]
+        if key not in self._evaluated:
+            truth = self._evaluators[name](self._facts, objects)
+            self._evaluated[key] = self.lasting(name, objects, truth)
+        return self._evaluated[key]
 
     def lasting(self, name: str, objects: tuple[int, ...], truth: Truth) -> Relation:
         """A relation of that truth, with the time since when it has been true without a break.
 
-        While it cannot be observed the time is kept: not seen is not "no".
+        While it is not observed that time is retained: unknown is not false.
         """
         key = f"{name} {objects}"
-        self._judged.add(key)
+        self._queried.add(key)
         since = self._before.get(key, self._mind.time)
         if truth is Truth.TRUE or (truth is Truth.UNKNOWN and key in self._before):
             self._after[key] = since
         return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
 
     def kept(self, pauses: PauseRecord, carry: bool) -> Kept:
-        """The state to keep of this moment.
+        """The state of this moment, for the next.
 
         Args:
-            pauses: When work was paused.
-            carry: Whether what nobody asked for is kept as it was before.
+            pauses: All pauses so far.
+            carry: Whether facts that were not queried retain their previous state.
         """
         lasting, beats = self._after, {key: b for key, (b, _) in self._beats.items()}
         if carry:
-            unasked = {k: s for k, s in self._before.items() if k not in self._judged}
+            unasked = {k: s for k, s in self._before.items() if k not in self._queried}
             lasting, beats = unasked | lasting, self._beats_before | beats
         return Kept(self.time, tuple(lasting.items()), tuple(beats.items()), pauses)
 
-    def _in_time(self, rhythm: Rhythm, name: str, objects: tuple[int, ...]) -> Relation:
-        """Whether what is to happen again and again keeps time, or does not."""
+    def _rhythm_relation(self, rhythm: Rhythm, name: str, objects: tuple[int, ...]) -> Relation:
+        """Whether a periodic fact keeps its rhythm, or is late."""
         key = f"{rhythm.key} {objects}"
         if key not in self._beats:
             held_by = self.first_true(rhythm.holds, objects)
             known = held_by is not None or self.known(rhythm.holds, objects)
             truth = truth_if(held_by is not None) if known else Truth.UNKNOWN
             since = self.time if held_by is None else held_by.since
-            moment = self._looked_at, self.time
+            moment = self._previous_time, self.time
             before = self._beats_before.get(key)
             self._beats[key] = heard(before, truth, since, moment, rhythm.period), truth
         beats, truth = self._beats[key]
-        told = truth_if(beats.late if rhythm.late else beats.keeps)
-        told = told if truth is not Truth.UNKNOWN else truth
-        return Relation(name, objects, told, beats.since)
+        result = truth_if(beats.late if rhythm.late else beats.keeps)
+        result = result if truth is not Truth.UNKNOWN else truth
+        return Relation(name, objects, result, beats.since)
 
     def first_true(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
         """The first of some relations that is true, or None."""
@@ -223,13 +223,13 @@ class RelationLookup:
         return None
 
     def first_given(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
-        """The first of some relations that a rule gives as true, none of them merely derived.
+        """The first of some relations that a rule states as true, not merely derived ones.
 
-        Two objects that are not coupled yet are `decoupled` in the derived sense, and no failure.
+        Objects that are not coupled yet are `decoupled` in the derived sense, which is no failure.
         """
         for name in names:
             relation = self._mind.relation(name, *objects)
-            if name in self._looks or name in self._rhythms:
+            if name in self._evaluators or name in self._rhythms:
                 relation = self.find(name, objects)
             if relation is not None and relation.truth is Truth.TRUE:
                 return relation
@@ -243,15 +243,15 @@ class RelationLookup:
 def observe(
     meaning: ActionDefinition, objects: tuple[int | None, ...], relations: RelationLookup
 ) -> ActionObservation:
-    """What is seen of an action.
+    """The observation of an action.
 
     Args:
         meaning: The action.
-        objects: Ids of the objects that play its actors; None for one that is not found.
-        relations: What holds now.
+        objects: Ids of the objects bound to its actors; None for one that is not found.
+        relations: The current relations.
 
     Returns:
-        The sighting; `UNOBSERVED` when an actor is not found.
+        The observation; `UNOBSERVED` when an actor is not found.
     """
     ids = tuple(o for o in objects if o is not None)
     if len(ids) < len(objects):
@@ -276,7 +276,7 @@ def observe(
 
 
 def _not_true(meaning: ActionDefinition, ids: tuple[int, ...], relations: RelationLookup) -> Truth:
-    """False when any of the relations by which an action holds is known: none of them is true."""
+    """False when any relation by which the action holds is known, as none of them is true; else unknown."""
     return Truth.FALSE if relations.known(meaning.holds, ids) else Truth.UNKNOWN
 
 
@@ -284,7 +284,7 @@ Derive = Callable[[Mind, RelationLookup, tuple[int, ...]], Relation | None]
 
 
 def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
-    """Coupled when the mind says so where no relation of that name is kept."""
+    """Coupled according to the mind's couplings, when it has no relation of that name."""
     if mind.relation("coupled", *ids) is not None:
         return None  # it is in doubt
     pair = tuple(sorted(ids))
@@ -300,7 +300,7 @@ def _moving_together(
     mind: Mind, relations: RelationLookup, ids: tuple[int, ...]
 ) -> Relation | None:
     """Moving together when they are coupled and on the move, however much one of them sways."""
-    # Where one is cut by the border, or hidden, it moves as the other does.
+    # One that is cut by the border, or hidden, moves as the other does.
     speeds = [kinematics(mind).one("speed", i) for i in ids]
     slower = min((speed for speed in speeds if not math.isnan(speed)), default=0.0)
     moves = slower > CARRIED_SPEED * image_diagonal(mind.frame_size)
@@ -313,7 +313,7 @@ def _moving_together(
 
 
 def _in_contact(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
-    """In contact, where nobody judges that by itself: touching."""
+    """In contact means touching, unless a rule states it."""
     if mind.relation("in_contact", *ids) is not None:
         return None
     return replace(relations.find("touching", ids), name="in_contact")
@@ -324,7 +324,7 @@ def _apart(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relat
 
 
 def _on(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
-    """The first one touches the second, and its middle stands above it: up is up in the image."""
+    """The first touches the second and its centre is above it in the image."""
     touching = relations.find("touching", ids)
     first, second = mind.objects.get(ids[0]), mind.objects.get(ids[1])
     if touching.truth is Truth.UNKNOWN or first is None or second is None:

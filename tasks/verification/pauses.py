@@ -1,7 +1,7 @@
-"""When work is paused, and how long something has lasted without its pauses.
+"""Pauses of work, and elapsed time without them.
 
-Times stay those of the recording, so that what is told of them is true. What counts is how much time there
-was for work between two of them: the times in which a pause condition held are left out.
+Times stay those of the recording, so that reports of them are correct. Durations are working time: the
+spans in which a pause condition held are left out.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from visup.agent.model.fast_replace import replace
 from visup.tasks.grammar.nodes import StageCondition
 
 MOST_SPANS = 64
-"""So many pauses of one condition are kept apart; of more the two oldest count as one of both lengths."""
+"""Most pauses stored for one condition; beyond that the two oldest are merged, with their lengths added."""
 
 Span = tuple[float, float]
-"""From the last moment of work to the last one of the pause, seconds."""
+"""From the last moment of work to the last moment of the pause, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +26,10 @@ class Pause:
 
     Attributes:
         condition: The condition.
-        spans: When work was paused by it, in order.
-        paused: Whether it is now.
-        since: Since when what pauses it has been so, where it does now.
-        known: When that was last observed, seconds.
+        spans: Pauses caused by it, in order.
+        paused: Whether it pauses work now.
+        since: Since when the condition holds, if it pauses now, seconds.
+        known: When it was last observed, seconds.
     """
 
     condition: StageCondition
@@ -39,13 +39,13 @@ class Pause:
     known: float = 0.0
 
     def noted(self, seen: Relation, before: float, now: float, patience: float) -> Pause:
-        """The same with what is seen now.
+        """The pause updated with an observation.
 
         Args:
             seen: Whether the condition holds, and since when.
-            before: When it was looked at last, seconds.
+            before: Time of the previous update, seconds.
             now: Seconds.
-            patience: A condition that is not observed pauses for so long as it did, seconds.
+            patience: How long a pause continues while its condition is not observed, seconds.
         """
         if seen.truth is Truth.UNKNOWN:
             paused, since, known = (
@@ -77,7 +77,7 @@ class PauseRecord:
         now: float,
         patience: float,
     ) -> PauseRecord:
-        """The record with what is seen of some conditions now; see `Pause.noted`."""
+        """The record updated with observations of some conditions; see `Pause.noted`."""
         if not conditions:
             return self
         known = {p.condition: p for p in self.pauses}
@@ -85,12 +85,12 @@ class PauseRecord:
         return PauseRecord(tuple([p.noted(seen(c), before, now, patience) for c, p in each]))
 
     def now(self, conditions: Sequence[StageCondition]) -> Pause | None:
-        """The pause of one of some conditions that is going on, the longest first; or None."""
+        """The longest current pause of some conditions, or None."""
         paused = (p for p in self._of(conditions) if p.paused)
         return min(paused, key=lambda p: p.spans[-1][0], default=None)
 
     def elapsed(self, conditions: Sequence[StageCondition], since: float, now: float) -> float:
-        """Seconds of work from one time to another: those in which none of the conditions paused it."""
+        """Working time between two times: the seconds in which none of the conditions paused it."""
         spans = [s for p in self._of(conditions) for s in p.spans]
         lost = (min(end, now) - max(start, since) for start, end in _joined(spans))
         return now - since - sum(x for x in lost if x > 0.0)
@@ -110,7 +110,7 @@ def _bounded(spans: tuple[Span, ...]) -> tuple[Span, ...]:
 
 
 def _joined(spans: Sequence[Span]) -> Iterator[Span]:
-    """Spans that overlap as one, so that no time is counted twice."""
+    """Overlapping spans made disjoint, so that no time is counted twice."""
     reached = float("-inf")
     for start, end in sorted(spans):
         if end > reached:

@@ -1,8 +1,7 @@
-"""Relations of actors as reported, and until when: an incompatible one is reported to begin no sooner.
+"""Reported relations of actors with their end times: an incompatible one is never reported to begin sooner.
 
-Relations are detected late and dated back, so two incompatible ones may overlap by some tenths of a
-second. Each is correct by itself, but reported together they contradict each other. The first report
-prevails.
+Relations are detected late and backdated, so two incompatible ones may overlap by some tenths of a second.
+Each is correct by itself, but reported together they contradict each other. The first report prevails.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 ReportedRelations = tuple[tuple[tuple[str, ...], str, float], ...]
-"""Actors in alphabetical order, a relation, and until when it was reported to hold between them, seconds."""
+"""Actors in alphabetical order, a relation, and the time until which it was reported, seconds."""
 
 _JOINED = frozenset({"coupled", "held_by", "moving_together"})
 _EXCLUDED: Mapping[str, frozenset[str]] = MappingProxyType(
@@ -32,13 +31,13 @@ def excludes(first: str, second: str) -> bool:
 
 
 def with_reported(
-    told: ReportedRelations, actors: Iterable[str], relation: str, until: float
+    reported: ReportedRelations, actors: Iterable[str], relation: str, until: float
 ) -> ReportedRelations:
     """The reports so far, with a relation reported to hold until a time."""
     who = tuple(sorted(actors))
-    same = [t for t in told if t[:2] == (who, relation)]
+    same = [t for t in reported if t[:2] == (who, relation)]
     until = max((until, *(t[2] for t in same)))
-    return (*(t for t in told if t not in same), (who, relation, until))
+    return (*(t for t in reported if t not in same), (who, relation, until))
 
 
 def joined(parts: Iterable[ReportedRelations]) -> ReportedRelations:
@@ -50,8 +49,8 @@ def joined(parts: Iterable[ReportedRelations]) -> ReportedRelations:
 
 
 def since_reported(
-    told: ReportedRelations, actors: Iterable[str], relation: str, since: float
+    reported: ReportedRelations, actors: Iterable[str], relation: str, since: float
 ) -> float:
-    """Since when a relation is reported to hold, given since when it is known to, seconds."""
+    """The begin at which to report a relation, given the one that is known, seconds."""
     who = tuple(sorted(actors))
-    return max((since, *(t[2] for t in told if t[0] == who and excludes(t[1], relation))))
+    return max((since, *(t[2] for t in reported if t[0] == who and excludes(t[1], relation))))

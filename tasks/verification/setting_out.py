@@ -1,8 +1,8 @@
-"""Who sets out: bodies that begin to move, as a whole or by a part, and not with the whole picture.
+"""Motion onset: bodies that begin to move, as a whole or in part, relative to the camera's motion.
 
-A body of links moves by its tip long before it moves as a whole: the middle of an arm hardly does while
-its hand is on the way. How far an outline reaches to each side tells of both. What all bodies do
-alike is the camera's doing: each is compared with the median of the others.
+The tip of an articulated body moves long before the whole: the centre of an arm hardly moves while its hand
+approaches. The support of the outline in each direction shows both. Motion common to all bodies is due to
+the camera, so each is compared with the median of the others.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.relations.samples import SampleWindow
 
 LAG_S = 0.4
-"""Over how long an outline must have changed its reach."""
+"""Interval over which the change of an outline is measured, seconds."""
 
 REACH = 0.012
-"""By how much it must have, image diagonals. In rendered worlds of ten kinds outlines change by at most 0.009
-before anything moves, and a robot's by 0.03 within 0.6 s after it sets out."""
+"""Least change of an outline's extent, image diagonals. In rendered worlds of ten kinds outlines change by at
+most 0.009 before anything moves, and a robot's by 0.03 within 0.6 s after it sets out."""
 
 FARTHER = 2.0
-"""A body that moves slowly moves by itself where it has come so many times as far as another: a camera that
-sways moves all alike, but for parallax."""
+"""A slow body moves by itself when it has come this many times as far as another: a swaying camera moves all
+bodies alike, but for parallax."""
 
 MOVING_SIGMAS = 3.0
-"""By how many standard deviations a body must move to be seen to."""
+"""Least speed of a moving body, in standard deviations of its velocity."""
 
 Marks = NDArray[np.bool_]
 
 
 def setting_out(mind: Mind) -> frozenset[int]:
-    """Ids of the bodies that move by themselves now, or of which a part does."""
+    """Ids of the bodies that move by themselves now, as a whole or in part."""
     diagonal = image_diagonal(mind.frame_size)
     now, window = kinematics(mind), sample_window(mind)
     if window.ids != now.ids or not len(window.times):
@@ -46,19 +46,19 @@ def setting_out(mind: Mind) -> frozenset[int]:
 
 
 def moving(now: Kinematics, still: float) -> Marks:
-    """(M,) the bodies that move faster than `still`, pixels per second, and than noise makes them."""
+    """(M,) bool: the bodies that move faster than `still`, pixels per second, and than noise explains."""
     with np.errstate(invalid="ignore"):
         return np.asarray(now.speed > np.maximum(still, MOVING_SIGMAS * now.velocity_sigma))
 
 
 def farther_than_others(window: SampleWindow) -> Marks:
-    """Bodies whose outlines have changed their reach well more than that of some other body has.
+    """Bodies whose outlines have changed their extent much more than that of some other body.
 
     Args:
         window: The last samples.
 
     Returns:
-        (M,) of all bodies of the window; also of one that is alone.
+        (M,) bool over the bodies of the window; True for a single one.
     """
     reach, free = window.steady_support, window.free
     most = np.where(free, reach, -np.inf).max(axis=0)
@@ -73,14 +73,14 @@ def farther_than_others(window: SampleWindow) -> Marks:
 
 
 def reaching_out(window: SampleWindow, limit: float) -> Marks:
-    """Bodies whose outlines have just changed how far they reach, and otherwise than the rest.
+    """Bodies whose outlines have just changed their extent, differently from the others.
 
     Args:
         window: The last samples.
-        limit: By how much, pixels.
+        limit: Least change, pixels.
 
     Returns:
-        (M,) of all bodies of the window.
+        (M,) bool over the bodies of the window.
     """
     times = window.times
     if times[-1] - times[0] < LAG_S - 1e-6:
@@ -95,7 +95,7 @@ def reaching_out(window: SampleWindow, limit: float) -> Marks:
 
 
 def _of_others(values: Floats) -> Floats:
-    """(M, K) medians of the same values of all others; 0 where nobody else's is known."""
+    """(M, K) medians of the values of all other bodies; 0 where no other is known."""
     found = np.zeros_like(values)
     for i in range(len(values)):
         others = np.delete(values, i, axis=0)

@@ -1,4 +1,4 @@
-"""How patient, how forgiving and how sure supervision is."""
+"""Settings of task supervision: time constants, tolerances and thresholds."""
 
 from __future__ import annotations
 
@@ -10,32 +10,31 @@ class TaskSettings:
     """Settings of task supervision; times in seconds.
 
     Attributes:
-        bind_at: An object may play an actor when this share of its votes is for the actor's models.
-        keep_bonus: What is added to the strength of a pair that is already bound, so that bindings
-            do not flicker.
-        switch_s: Another object must be the better match for so long before an actor, whose object
-            is still there, changes hands.
-        enter_s: A relation must be true so long before it counts as the entry to a stage.
-        contact_s: A contact that ended no longer ago still counts as the entry to a stage.
-        contrary_s: The contrary of an action must hold so long before a begun stage fails.
+        bind_at: Least share of an object's votes for an actor's models for it to be bound to the actor.
+        keep_bonus: Added to the strength of an existing binding, so that bindings do not flicker.
+        switch_s: How long another object must be the better match before an actor whose object is still
+            there is bound to it.
+        enter_s: How long a relation must be true before it counts as the entry to a stage.
+        contact_s: A contact that ended at most this long ago still counts as the entry to a stage.
+        contrary_s: How long the contrary of an action must hold before a begun stage fails.
         contrary_early_s: The same for a stage that has not begun yet.
-        recover_s: A failing stage must make progress so long before it counts as recovered.
+        recover_s: How long a failing stage must make progress before it counts as recovered.
         recover_share: The same as a share of the time for which it has been failing; the longer one counts.
-        stalled_s: A begun stage without progress for so long is stalled.
-        unseen_s: A stage whose actors were not observed for so long is unknown.
-        gap_s: A break of a `for` shorter than this is forgiven.
-        failed_s: A stage that has been failing for so long has failed; it must then make progress for
+        stalled_s: A begun stage without progress for this long is stalled.
+        unseen_s: A stage whose actors were not observed for this long is unknown.
+        gap_s: A shorter break of a `for` is tolerated.
+        failed_s: A stage that has been failing for this long has failed; it must then make progress for
             as long to count as recovered.
-        early_s: What a stage asks for and was so before its turn may stay so for so long, before that
-            speaks against the course: who picks a part up from a tray may put it back on the tray.
-        regret_s: A task that is done may be undone by contrary evidence for so long.
-        unexplained_s: An object that no actor explains must be there so long to be named.
-        scenery_s: What nobody knows and was in view so soon after the start belongs to the scene, as the
-            rest of a machine does of which a part alone is known.
-        familiar: An object whose best identity has at least this share is taken to be identified.
-        acquainted_s: Seconds for which an object must have been in the scene before it is taken for something
-            other than an actor that is still looked for.
-        most_courses: How many courses of a task are followed side by side.
+        early_s: How long a relation that held before its stage may still hold in it before it contradicts
+            the course: a part picked up from a tray may be put back on the tray.
+        regret_s: How long contrary evidence can still undo a completed task.
+        unexplained_s: How long an object that no actor explains must be present to be reported.
+        scenery_s: An unidentified object that came into view this soon after the start belongs to the scene,
+            as does the rest of a machine of which only a part is known.
+        familiar: Least share of an object's best identity for it to count as identified.
+        acquainted_s: How long an object must have been in the scene before it is taken for something other
+            than an actor that is still sought.
+        most_courses: Most hypotheses of a task that are tracked in parallel.
     """
 
     bind_at: float = 0.1

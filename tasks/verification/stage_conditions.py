@@ -1,4 +1,4 @@
-"""What a course says of the beginning, end, progress and failure of its steps, as it is seen."""
+"""Evaluation of stage conditions: beginning, end, progress and failure of steps as stated by the course."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ConditionEvaluator:
     Attributes:
         task: The task.
         holds: Whether an action holds now.
-        relations: What holds now.
+        relations: The current relations.
     """
 
     task: Task
@@ -41,7 +41,7 @@ class ConditionEvaluator:
     relations: RelationLookup
 
     def truth(self, condition: Formula, worked: Worked = _passed) -> Truth:
-        """Whether a condition holds; unknown when what decides it was not observed."""
+        """Whether a condition holds; unknown when the facts that decide it were not observed."""
         match condition:
             case Action() | Comparison():
                 return self.holds(*fact_key(self.task, condition))
@@ -69,21 +69,21 @@ class ConditionEvaluator:
         return found if held else replace(found, truth=Truth.FALSE)
 
     def apply(self, step: TaskStep, seen: ActionObservation) -> ActionObservation:
-        """A sighting with what the course itself says of the step in place of what its action says."""
+        """An observation in which conditions of the course override those of the action."""
         worked = partial(seen.elapsed, step)
-        for sign in step.conditions:
-            seen = self._apply(sign, seen, worked)
+        for condition in step.conditions:
+            seen = self._apply(condition, seen, worked)
         return seen
 
     def _apply(
-        self, sign: StageCondition, seen: ActionObservation, worked: Worked
+        self, condition: StageCondition, seen: ActionObservation, worked: Worked
     ) -> ActionObservation:
-        if sign.kind == "pauses":
+        if condition.kind == "pauses":
             return seen
-        found = self.relation(sign.condition, sign.lasting, worked)
+        found = self.relation(condition.condition, condition.lasting, worked)
         known = seen.observed or found.truth is not Truth.UNKNOWN
         true = found if found.truth is Truth.TRUE else None
-        match sign.kind:
+        match condition.kind:
             case "begins":
                 return replace(seen, entry=true, observed=known)
             case "ends":

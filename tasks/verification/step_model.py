@@ -1,4 +1,4 @@
-"""What supervision makes of one step: its phase, and how well what is seen fits it."""
+"""Observation model of one step: its phase, and the likelihood of observations."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over
 
 @dataclass(frozen=True)
 class StepModel:
-    """The steps of a task as they are monitored.
+    """The observation model of the steps of a task.
 
     Attributes:
-        actions: Meanings of actions.
-        settings: Patience.
+        actions: Action definitions by name.
+        settings: Time constants.
         hmm: The probabilities of the model.
     """
 
@@ -33,7 +33,7 @@ class StepModel:
     def looked_at(
         self, leaf: Leaf[StepMonitor], seen: ActionObservation, moment: Moment, done: bool
     ) -> Leaf[StepMonitor]:
-        """A step with what is seen of it in its monitor; `done` when the task is. A pause shows nothing."""
+        """A step with its monitor updated, unless work is paused; `done` when the task is."""
         if seen.paused:
             return leaf
         # A `within` no longer matters once the task is done.
@@ -43,13 +43,13 @@ class StepModel:
         return replace(leaf, payload=monitor)
 
     def fit(self, leaf: Leaf[StepMonitor], seen: ActionObservation, done: bool, dt: float) -> float:
-        """How well `dt` seconds of what is seen fit a step; 1 at best, and in a pause."""
+        """Likelihood of `dt` seconds of an observation, relative to the best: at most 1, and 1 in a pause."""
         if seen.paused:
             return 1.0
         if not seen.observed:
             return self.hmm.fit(ActionStatus.UNKNOWN, 1.0, dt)
         if leaf.payload.status in BAD and not done:
-            # That it fails was paid for when it began to: from then on its contrary is what is to be seen.
+            # The onset of failure was penalised already; from then on its contrary is expected.
             return math.exp(-self.hmm.recover * dt)
         if seen.contrary is not None and _counts(seen):
             return self.hmm.fit(ActionStatus.CONTRARY, seen.contrary.confidence, dt)
@@ -64,7 +64,7 @@ class StepModel:
         return over(leaf.payload, leaf.step, self.actions[leaf.step.action])
 
     def phase(self, leaf: Leaf[StepMonitor]) -> int:
-        """The phase in which `StageHmm` has a step."""
+        """The phase of a step in `StageHmm`."""
         monitor, whole = leaf.payload, self.hmm.count(leaf.step)
         if monitor.status in BAD:
             return whole + (1 if monitor.status is Status.FAILING else 2)

@@ -1,4 +1,4 @@
-"""Verification of one step under way: its status, from what is seen of it over time."""
+"""Runtime monitor of one active step: its status from observations over time."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from visup.tasks.verification.settings import TaskSettings
 BAD = (Status.FAILING, Status.FAILED)
 
 Worked = Callable[[float, float], float]
-"""Seconds from one time to another in which work was not paused."""
+"""Working time between two times, without pauses, seconds."""
 
 
 class Moment(NamedTuple):
-    """When something is seen.
+    """The time of an observation.
 
     Attributes:
         now: Seconds.
-        dt: Seconds since the last time.
+        dt: Seconds since the last one.
     """
 
     now: float
@@ -40,38 +40,38 @@ class StepMonitor:
 
     Attributes:
         entered: When the step was entered.
-        turn: What was true before this shows nothing: the stage before it asked for the same, or had not
-            begun then.
-        status: How it stands.
-        since: Since when it stands so.
-        begun: When it was first seen to hold or to come nearer, or None.
-        first_since: Since when the relation was true by which it was, or None.
+        turn: Relations that became true before this are no evidence: the previous stage required the same,
+            or had not begun then.
+        status: Current status.
+        since: Since when it has that status.
+        begun: When it was first observed to hold or progress, or None.
+        first_since: Since when the relation of that first observation was true, or None.
         held: Whether it ever held.
         held_s: How long it has held without a break.
         broken_since: Since when it has not held, or None.
-        fulfilled: Whether it has held for as long as it must.
-        helped_by: Name of the relation by which it last held or came nearer, or None.
+        fulfilled: Whether it has held for as long as required.
+        helped_by: Name of the relation by which it last held or progressed, or None.
         helped_since: Since when that relation was true, or None.
-        helped_at: When it last held or came nearer, or None.
-        better_since: Since when it holds or comes nearer without a break, or None.
+        helped_at: When it last held or progressed, or None.
+        better_since: Since when it holds or progresses without a break, or None.
         contrary: Name of the contrary relation that is true now, or None.
         contrary_since: Since when.
         fault: The contrary by which it last failed, or None.
-        fault_since: Since when that was so.
-        late: Whether a `within` ran out before the step was over; there is no way back from that.
-        missed: That `within`; None where it is the greatest delay that ran out.
-        ceased: Whether it once held and then was seen not to.
+        fault_since: Since when that was true.
+        late: Whether a `within` expired before the step was over, which is final.
+        missed: That `within`; None if the greatest delay expired.
+        ceased: Whether it held once and was then observed not to.
         unseen_since: Since when nothing is known about it, or None.
-        denied: Whether what the course says of its end was last seen not to hold.
-        opened: Whether what the course says of its beginning was seen (see `StageCondition`).
-        confidence: Of the last sighting, 0 to 1.
-        early: Whether it had been so since before its turn, and has not ceased to be since: what a
-            stage asks for must happen in it.
-        parted_s: How long it has been seen not to be so, since its turn.
-        after: When what comes before it was over; of what the task begins with, when that was.
-        hasty_s: How long after that it began, where its course asks for a longer delay; else None.
+        denied: Whether the end condition of the course was last observed not to hold.
+        opened: Whether the begin condition of the course was observed (see `StageCondition`).
+        confidence: Of the last observation, 0 to 1.
+        early: Whether it has held since before its turn without a break: a stage requires a change
+            within it.
+        parted_s: How long it has been observed not to hold since its turn.
+        after: When the previous step was over; for the first step, the start.
+        hasty_s: Delay after which it began, if the course requires a longer one; else None.
         fulfilled_at: When it was first fulfilled, or None.
-        told: What was told of it and of what came before it: what excludes that is told to begin no sooner.
+        told: Reported relations of it and of earlier steps; incompatible ones are reported to begin later.
     """
 
     entered: float
@@ -108,7 +108,7 @@ class StepMonitor:
 
     @property
     def begun_anew(self) -> bool:
-        """Whether what first showed that it holds or comes nearer came about in its turn."""
+        """Whether the relation by which it first held or progressed became true in its turn."""
         return self.first_since is not None and self.first_since >= self.turn
 
 
@@ -128,37 +128,37 @@ def update(
     """Update the monitor of a step with one observation.
 
     Args:
-        monitor: What was kept.
+        monitor: The previous state.
         step: The step.
         meaning: Its action.
-        seen: What is seen of it now.
-        moment: When that is.
-        settings: Patience.
+        seen: The observation.
+        moment: Its time.
+        settings: Time constants.
 
     Returns:
-        What is kept now, with the new status.
+        The new state, with the new status.
     """
     now = moment.now
     if step.condition("begins") is not None and not monitor.opened:
-        # Until it begins, nothing that is seen speaks for or against it.
+        # Until it begins, no observation counts for or against it.
         monitor = replace(monitor, opened=seen.entry is not None)
         if not monitor.opened:
             seen = replace(UNOBSERVED, observed=seen.observed, pauses=seen.pauses)
     if step.delay is not None:
-        monitor = _note_haste(monitor, step, seen)
+        monitor = _mark_hasty(monitor, step, seen)
     worked = partial(seen.elapsed, step)
     if monitor.early:
-        monitor, seen = _not_yet(monitor, seen, moment, settings, worked)
+        monitor, seen = _disregard_early(monitor, seen, moment, settings, worked)
     noted = _note_progress(monitor, step, meaning, seen, moment, settings)
     noted = _note_contrary(noted, seen, now)
     noted = _note_lateness(noted, step, meaning, seen, now)
     status = _status(noted, seen, now, settings, worked)
     if status is noted.status:
         return noted
-    noted = _note_told(noted, step, status, now)
+    noted = _note_reported(noted, step, status, now)
     if status is not Status.FAILING:
         return replace(noted, status=status, since=now)
-    # What had been reached is lost; the step fails since the contrary began, not since it was sure.
+    # Progress is lost; the failure is dated from the onset of the contrary, not from its confirmation.
     since = now if noted.contrary_since is None else noted.contrary_since
     return replace(
         noted,
@@ -171,7 +171,7 @@ def update(
     )
 
 
-def _note_told(monitor: StepMonitor, step: TaskStep, status: Status, now: float) -> StepMonitor:
+def _note_reported(monitor: StepMonitor, step: TaskStep, status: Status, now: float) -> StepMonitor:
     """Record a reported change of status, with the relation that caused it."""
     by = monitor.helped_by if status is Status.PROGRESSING else None
     by = monitor.contrary if status in BAD else by
@@ -187,7 +187,7 @@ def _note_lateness(
     seen: ActionObservation,
     now: float,
 ) -> StepMonitor:
-    """A `within` that has run out, or the greatest delay: there is no way back from that."""
+    """Record an expired `within` or greatest delay, which is final."""
     if monitor.late:
         return monitor
     missed = None if over(monitor, step, meaning) else overdue(step, seen, now)
@@ -197,8 +197,8 @@ def _note_lateness(
     return replace(monitor, late=True, missed=missed) if late else monitor
 
 
-def _note_haste(monitor: StepMonitor, step: TaskStep, seen: ActionObservation) -> StepMonitor:
-    """Disregard what begins sooner than its delay allows, until it begins again."""
+def _mark_hasty(monitor: StepMonitor, step: TaskStep, seen: ActionObservation) -> StepMonitor:
+    """Mark an action that begins before its least delay as early: it must begin again."""
     if monitor.held or monitor.early or seen.held_by is None or seen.holds is not Truth.TRUE:
         return monitor
     passed = seen.elapsed(step, monitor.after, seen.held_by.since)
@@ -206,14 +206,14 @@ def _note_haste(monitor: StepMonitor, step: TaskStep, seen: ActionObservation) -
     return replace(monitor, early=True, hasty_s=passed) if hasty else monitor
 
 
-def _not_yet(
+def _disregard_early(
     monitor: StepMonitor,
     seen: ActionObservation,
     moment: Moment,
     settings: TaskSettings,
     worked: Worked,
 ) -> tuple[StepMonitor, ActionObservation]:
-    """Disregard what held before its turn, until it has ceased; after a while it is a failure."""
+    """Disregard an action that held before its turn, until it has ceased; after a while that is a failure."""
     if not seen.observed:
         return monitor, seen
     if seen.holds is not Truth.TRUE:
@@ -231,12 +231,12 @@ def _not_yet(
 
 def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> bool:
     """Whether a step is over by itself, whatever comes next."""
-    told = step.hold_s is not None or step.condition("ends") is not None
-    return monitor.fulfilled and (not meaning.lasts or told)
+    explicit = step.hold_s is not None or step.condition("ends") is not None
+    return monitor.fulfilled and (not meaning.lasts or explicit)
 
 
 def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadline | None:
-    """The first `within` around the step that has run out, or None; it does not run in pauses around it."""
+    """The first expired `within` around the step, or None; it is suspended in pauses around it."""
 
     def left(due: RunningDeadline) -> float:
         if not due.pauses:
@@ -256,21 +256,21 @@ def _note_progress(
 ) -> StepMonitor:
     now, dt = moment
     if not seen.observed:
-        # Not seen is not "no": what was reached stays, the clocks stand still.
+        # Unobserved is not false: progress is retained and the clocks stand still.
         return replace(monitor, unseen_since=_first(monitor.unseen_since, now), better_since=None)
     held, broken, ceased = monitor.held_s, monitor.broken_since, monitor.ceased
     if seen.holds is Truth.TRUE:
         held, broken = held + dt, None
         if step.hold_s is None and seen.held_by is not None:
-            # What held already when the step began need not hold for as long once more.
+            # Time for which it held before the step began counts too.
             held = max(held, seen.elapsed(step, seen.held_by.since, now))
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
         if seen.elapsed(step, broken, now) >= settings.gap_s:
             held, ceased = 0.0, ceased or monitor.fulfilled
     helping = seen.helps is not None
-    must = meaning.hold_s if step.hold_s is None else step.hold_s
-    complete = held >= must - 1e-9
+    required = meaning.hold_s if step.hold_s is None else step.hold_s
+    complete = held >= required - 1e-9
     if seen.over is not None:
         complete = seen.over is Truth.TRUE and (complete or step.hold_s is None)
     return replace(
@@ -296,7 +296,7 @@ def _note_progress(
 
 
 def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
-    """A contrary counts from when it was true within this step; holding outweighs it."""
+    """Record a contrary, from its onset within this step; holding outweighs it."""
     if not seen.observed:
         return monitor
     if seen.contrary is None or (seen.holds is Truth.TRUE and not seen.decisive):
@@ -336,7 +336,7 @@ def _status(
 def _status_unseen(
     monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked
 ) -> Status:
-    """A failing stage stays so while it is not seen; any other becomes unknown after a while."""
+    """A failing stage stays so while unobserved; a begun one becomes unknown after a while."""
     lasting = monitor.status in (Status.FAILING, Status.FAILED, Status.ACTIVE)
     unseen = monitor.unseen_since
     long = unseen is not None and worked(unseen, now) >= settings.unseen_s
@@ -357,13 +357,13 @@ def _long_failing(monitor: StepMonitor, now: float, settings: TaskSettings, work
 
 
 def _recovered(monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked) -> bool:
-    """What has long failed must go well for longer; for good, for as long as that took."""
+    """A longer failure needs longer progress to recover; a failed stage needs `failed_s`."""
     if monitor.better_since is None:
         return False
     lasted = worked(monitor.since, monitor.better_since)
-    must = max(settings.recover_s, settings.recover_share * lasted)
-    must = settings.failed_s if monitor.status is Status.FAILED else must
-    return worked(monitor.better_since, now) >= must
+    required = max(settings.recover_s, settings.recover_share * lasted)
+    required = settings.failed_s if monitor.status is Status.FAILED else required
+    return worked(monitor.better_since, now) >= required
 
 
 def _first(earlier: float | None, now: float) -> float:

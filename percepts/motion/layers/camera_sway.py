@@ -1,7 +1,7 @@
-"""Whether a camera shakes in place: it moves from frame to frame, and gets nowhere.
+"""Detects a camera that shakes in place: it moves from frame to frame without net displacement.
 
-Such a camera shows no parallax: nothing that rests near it can seem to move by itself, as it does before a
-camera that travels.
+Such a camera shows no parallax: near objects at rest do not appear to move by themselves, as they do before a
+travelling camera.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ FADES = 0.9
 SHAKES_PX = 5.0
 """Least path of the ground of a camera that shakes, working pixels."""
 GETS_NOWHERE = 0.5
-"""Share of that path below which the net motion counts as none: in place 0.03 to 0.28, pans 0.6 to 1."""
+"""Share of that path below which net motion counts as none: shaking in place 0.03 to 0.28, pans 0.6 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraSway:
-    """How the ground went of late; older frames fade.
+    """Recent motion of the ground, exponentially weighted.
 
     Attributes:
         net: (x, y) sum of its steps, working pixels.
-        path: Sum of their lengths.
+        path: Sum of their lengths, working pixels.
     """
 
     net: tuple[float, float] = (0.0, 0.0)
@@ -32,10 +32,10 @@ class CameraSway:
 
     @property
     def in_place(self) -> bool:
-        """Whether the camera shakes, and gets nowhere."""
+        """Whether the camera shakes without net displacement."""
         return self.path > SHAKES_PX and float(np.hypot(*self.net)) < GETS_NOWHERE * self.path
 
     def after(self, step: tuple[float, float]) -> CameraSway:
-        """How it went after one more step (x, y) of the ground, working pixels."""
+        """The sway after one more step (x, y) of the ground, working pixels."""
         net = FADES * self.net[0] + step[0], FADES * self.net[1] + step[1]
         return CameraSway(net, FADES * self.path + float(np.hypot(*step)))

@@ -1,4 +1,4 @@
-"""Passes over all pixels of the background model, compiled; `background_model` says what they mean."""
+"""Compiled loops of `background_model`: per-pixel distances, shadows, foreground and update."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Mask = NDArray[np.bool_]
 
 
 class BackgroundPlanes(NamedTuple):
-    """What is known of each pixel: the fields of `Picture`, in its order."""
+    """The fields of `BackgroundModel`, in order."""
 
     mean: Floats
     variance: Floats
@@ -24,14 +24,14 @@ class BackgroundPlanes(NamedTuple):
 
 
 class ShadowLimits(NamedTuple):
-    """How a shadow differs from what it lies on.
+    """Limits within which a pixel is a shadow or reflection on the background.
 
     Attributes:
-        darkest: Least brightness, as a share of that at rest.
-        brightest: Most brightness, of reflected light.
-        hue: How far colour may differ, as a share of brightness.
-        noise: Squared grey levels by which it may differ as well.
-        least: Squared brightness at rest below which nothing can be told.
+        darkest: Least brightness, as a share of the background's.
+        brightest: Greatest brightness, of reflected light.
+        hue: Greatest difference of colour, as a share of brightness.
+        noise: Further squared difference that is tolerated, squared grey levels.
+        least: Squared background brightness below which a pixel is too dark to decide.
     """
 
     darkest: float
@@ -42,17 +42,17 @@ class ShadowLimits(NamedTuple):
 
 
 class LearningRates(NamedTuple):
-    """How fast is learnt.
+    """Learning rates and limits of the update.
 
     Attributes:
         seconds: Since the last image.
         settle: Least weight of an image.
         restless: Weight of an image for the variance.
-        fits: Squared distance below which a pixel shows the rest.
-        rare: Squared distance beyond which it tells no more of how restless it is.
+        fits: Squared distance, in variances, below which a pixel shows the background.
+        rare: Squared distance at which its effect on the variance is clipped.
         least: Least variance.
-        most: Largest variance.
-        alike: Squared distance, over three channels, of a tone seen again.
+        most: Greatest variance.
+        alike: Squared distance, over three channels, below which two tones are the same.
     """
 
     seconds: float
@@ -67,7 +67,7 @@ class LearningRates(NamedTuple):
 
 @compiled
 def normalised_distances(image: Floats, mean: Floats, variance: Floats, most: float) -> Floats:
-    """Squared distance of each pixel to the rest in standard deviations, at most `most`, (h, w)."""
+    """Squared distance of each pixel to the background, in variances, at most `most`, (h, w)."""
     height, width = variance.shape
     out = np.empty((height, width), np.float32)
     for y in range(height):
@@ -82,13 +82,13 @@ def normalised_distances(image: Floats, mean: Floats, variance: Floats, most: fl
 
 @compiled
 def _is_shadow(image: Floats, mean: Floats, y: int, x: int, shade: ShadowLimits) -> bool:
-    """Whether a pixel differs from the rest in brightness, and not in hue."""
+    """Whether a pixel differs from the background in brightness but not in hue."""
     power, common, own = 1.0, 0.0, 0.0
     for i in range(3):
         here, now = float(mean[y, x, i]), float(image[y, x, i])
         power, common, own = power + here * here, common + now * here, own + now * now
     bright = common / power
-    # What is left of the tone after the rest, as bright as it is seen, is taken from it.
+    # Squared residual of the tone after the background, scaled to its brightness, is subtracted.
     hue = own - 2 * bright * common + bright * bright * (power - 1)
     same = hue < shade.hue * shade.hue * power + shade.noise
     return same and shade.darkest < bright < shade.brightest and power > shade.least
@@ -96,7 +96,7 @@ def _is_shadow(image: Floats, mean: Floats, y: int, x: int, shade: ShadowLimits)
 
 @compiled
 def shadow_pixels(image: Floats, mean: Floats, shade: ShadowLimits) -> Mask:
-    """Where an image differs from the rest in brightness, and not in hue, (h, w)."""
+    """Where an image differs from the background in brightness but not in hue, (h, w)."""
     height, width = mean.shape[:2]
     out = np.empty((height, width), np.bool_)
     for y in range(height):
@@ -109,7 +109,7 @@ def shadow_pixels(image: Floats, mean: Floats, shade: ShadowLimits) -> Mask:
 def foreground_pixels(
     off: Floats, image: Floats, mean: Floats, seen_s: Floats, shade: ShadowLimits, least: float
 ) -> Mask:
-    """Which pixels are further off than `least`, known, and no shadow or reflection, (h, w)."""
+    """Pixels further than `least` from a known background, without shadows and reflections, (h, w)."""
     height, width = off.shape
     out = np.zeros((height, width), np.bool_)
     for y in range(height):
@@ -123,14 +123,14 @@ def foreground_pixels(
 def pixels_near_sure_ones(
     labels: NDArray[np.int32], off: Floats, out_of: Mask, count: int, least: float
 ) -> Mask:
-    """Which pixels are in a component that somewhere goes beyond `least`.
+    """Hysteresis thresholding: the pixels of components that somewhere exceed `least`.
 
     Args:
         labels: (h, w) number of the component of each pixel, 0 for none.
-        off: (h, w) float32, how far each is off.
-        out_of: (h, w), which of them count.
-        count: How many components, with none.
-        least: What one of its pixels must go beyond.
+        off: (h, w) float32, squared distance of each pixel.
+        out_of: (h, w), foreground pixels.
+        count: Number of components, including 0.
+        least: High threshold that one pixel of a component must exceed.
     """
     height, width = labels.shape
     sure = np.zeros(count, np.bool_)
@@ -150,14 +150,14 @@ def pixels_near_sure_ones(
 def update_planes(
     known: BackgroundPlanes, image: Floats, moving: Mask, gone: Mask, pace: LearningRates
 ) -> BackgroundPlanes:
-    """What is known of each pixel after one more (h, w, 3) image.
+    """The background model after one more (h, w, 3) image.
 
     Args:
-        known: Before that.
+        known: The previous model.
         image: The image.
-        moving: (h, w) where objects are told: there the rest is not easily given up.
-        gone: (h, w) where something that was taken for the rest has left.
-        pace: How fast is learnt.
+        moving: (h, w) where objects are reported: there the background is replaced less easily.
+        gone: (h, w) where an object that was part of the background has left.
+        pace: Learning rates.
     """
     height, width = moving.shape
     mean, other = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
@@ -181,7 +181,7 @@ def update_planes(
                 now, old, before = image[y, x, i], known.mean[y, x, i], known.other[y, x, i]
                 mean[y, x, i] = old + weight * (now - old)
                 other[y, x, i] = before + step * (now - before)
-            # Leaves and water go far and come back; one object that passes weighs little.
+            # Leaves and water vary strongly and return; a single passing object has little effect.
             if not moves:
                 spread += pace.restless * (min(off, pace.rare) - 1) * spread
             enough = (3 * seen if moves else min(seen, 20.0)) + 0.2

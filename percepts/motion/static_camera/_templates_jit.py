@@ -1,4 +1,4 @@
-"""The search for a template, compiled."""
+"""Compiled loop of `templates`: the search for the best shift."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
-MOST = 60.0  # grey levels by which a pixel may speak against a shift
+MOST = 60.0  # greatest cost of a pixel, grey levels
 
 
 @compiled
@@ -23,19 +23,19 @@ def best_shift(
     reach: int,
     step: int,
 ) -> tuple[float, int, int]:
-    """The shift at which a template costs least.
+    """The shift of a template with the least cost.
 
     Args:
         image: (h, w, 3) float32.
         free: (h, w) float32, how far each pixel is free for the template, 0 to 1.
         shape: (m, n) bool template.
-        tone: (m, n, 3) float32, what was seen there.
-        corner: (x, y) of the template before it is shifted.
-        reach: Most pixels that it is shifted along either axis.
-        step: One in so many of its rows and columns is compared.
+        tone: (m, n, 3) float32, its tones.
+        corner: (x, y) of the unshifted template.
+        reach: Greatest shift along either axis, pixels.
+        step: Stride of the compared rows and columns.
 
     Returns:
-        The cost, grey levels, and the shift (x, y); the first of those that cost the same.
+        The cost, grey levels, and the shift (x, y); the first one of equal costs.
     """
     height, width = free.shape
     best, best_x, best_y = np.inf, 0, 0

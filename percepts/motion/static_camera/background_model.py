@@ -1,10 +1,10 @@
-"""A background model, pixel by pixel, for a camera that is static.
+"""A per-pixel background model for a static camera.
 
-Each pixel keeps the tone that it shows at rest with its variance, and a candidate: the tone that it
-shows instead of late. A candidate that has been seen longer than what is taken for the background takes
-its place, so that what stood there as the video began, and leaves, is not taken for an object for
-ever. (After Stauffer and Grimson, Adaptive background mixture models, 1999, with two modes; shadows
-after Horprasert, Harwood, Davis, A statistical approach for robust background subtraction, 1999.)
+Each pixel has a background tone with its variance, and a candidate: the tone that it has shown instead
+recently. A candidate that has been seen longer than the background replaces it, so that an object which
+stood there when the video began, and leaves, does not remain foreground for ever. (After Stauffer and
+Grimson, Adaptive background mixture models, 1999, with two modes; shadows after Horprasert, Harwood,
+Davis, A statistical approach for robust background subtraction, 1999.)
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from visup.percepts.motion.static_camera._background_model_jit import (
 
 Mask = NDArray[np.bool_]
 NOISE = 4.0  # least standard deviation that is assumed, grey levels
-FAR = 3.0  # standard deviations at which a pixel surely shows something else
-NEAR = 2.2  # the same for one beside a sure one
-SETTLE_S = 8.0  # time constant of what is learnt, seconds
-RESTLESS_S = 8.0  # the same of the variance
-SHADE = 0.6  # least brightness in a shadow, as a share of that at rest
-HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
-RARE = 10.0  # squared distance beyond which a pixel tells no more of how restless it is
-EVEN = 0.03  # change of exposure that is none
-LIT = 1.12  # brightness in reflected light
+FAR = 3.0  # standard deviations beyond which a pixel is certainly foreground (high threshold)
+NEAR = 2.2  # the same for pixels connected to such a one (low threshold)
+SETTLE_S = 8.0  # time constant of the mean, seconds
+RESTLESS_S = 8.0  # time constant of the variance, seconds
+SHADE = 0.6  # least brightness in a shadow, as a share of the background's
+HUE = 0.055  # greatest difference of colour in a shadow, as a share of brightness
+RARE = 10.0  # squared distance, in variances, at which a pixel's effect on the variance is clipped
+EVEN = 0.03  # relative change of exposure that is ignored
+LIT = 1.12  # greatest brightness in reflected light, as a share of the background's
 CAST = ShadowLimits(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
-    """What is known of the background.
+    """State of the background model.
 
     Attributes:
-        mean: (h, w, 3) float32, tone at rest, grey levels.
+        mean: (h, w, 3) float32, background tone, grey levels.
         variance: (h, w) float32, of one channel.
-        seen_s: (h, w) float32, for how long that tone was seen, seconds; 0 where the background is unknown.
-        other: (h, w, 3) float32, the tone that is seen instead.
-        other_s: (h, w) float32, for how long.
+        seen_s: (h, w) float32, how long that tone was seen, seconds; 0 where the background is unknown.
+        other: (h, w, 3) float32, tone of the candidate, grey levels.
+        other_s: (h, w) float32, how long it was seen, seconds.
     """
 
     mean: Floats
@@ -62,18 +62,18 @@ class BackgroundModel:
 
 
 def initial_model(image: Floats) -> BackgroundModel:
-    """The background after one (h, w, 3) image."""
+    """The model after a single (h, w, 3) image."""
     bare = np.zeros(image.shape[:2], np.float32)
     return BackgroundModel(image, bare + NOISE**2, bare + 0.01, image, bare)
 
 
 def with_unknown(background: BackgroundModel, where: Mask) -> BackgroundModel:
-    """The background without what it shows in some places: an object may have stood there."""
+    """The background, unknown in some places where an object may have stood."""
     return replace(background, seen_s=np.where(where, 0, background.seen_s).astype(np.float32))
 
 
 def with_revealed(background: BackgroundModel, image: Floats, bare: Mask) -> BackgroundModel:
-    """The background with what is seen of an image where it was unknown and nothing hides the background."""
+    """The background, initialised from an image where it was unknown and no object hides it."""
     new = bare & (background.seen_s <= 0)
     if not new.any():
         return background
@@ -85,12 +85,12 @@ def with_revealed(background: BackgroundModel, image: Floats, bare: Mask) -> Bac
 
 
 def shadow_mask(background: BackgroundModel, image: Floats) -> Mask:
-    """Where an image differs as a shadow or a reflection does: in brightness, not in hue."""
+    """Where an image differs in brightness but not in hue, as in shadows and reflections."""
     return shadow_pixels(image, background.mean, CAST)
 
 
 def foreground_mask(background: BackgroundModel, image: Floats) -> Mask:
-    """Which pixels show something else than the background, (h, w) bool; where that is unknown, none."""
+    """Foreground pixels, (h, w) bool; False where the background is unknown."""
     far = normalised_distances(image, background.mean, background.variance, 100.0)
     off = np.asarray(cv2.GaussianBlur(far, (3, 3), 0.8), dtype=np.float32)
     out = foreground_pixels(off, image, background.mean, background.seen_s, CAST, NEAR**2)
@@ -109,11 +109,11 @@ def update_background(
     """The background after one more image.
 
     Args:
-        background: As known.
+        background: The previous model.
         image: (h, w, 3) float32.
-        moving: (h, w) bool, where objects are reported: there the background is not easily given up.
+        moving: (h, w) bool, where objects are reported: there the background is replaced less easily.
         seconds: Since the last image.
-        gone: (h, w) bool, where something that was taken for the background has left: it is forgotten.
+        gone: (h, w) bool, where an object that was part of the background has left: it is forgotten.
 
     Returns:
         The new background.
@@ -145,7 +145,7 @@ def edge_strength(image: Floats, box: tuple[int, int, int, int]) -> Floats:
 
 
 def match_exposure(background: BackgroundModel, image: Floats) -> BackgroundModel:
-    """The background as it would look at the exposure of an image, after the median change of tone."""
+    """The background at the exposure of an image, estimated as the median ratio of tones."""
     step = 4
     rest, now = background.mean[::step, ::step], image[::step, ::step]
     ratio = np.median((now + 1.0) / (rest + 1.0), axis=(0, 1))

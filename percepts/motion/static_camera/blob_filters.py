@@ -1,4 +1,4 @@
-"""Which blobs are objects: neither what has not left its place, nor limbs, nor ghosts."""
+"""Filters for blobs that are no objects: unmoved ones, limbs, shadows and ghosts."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera.background_model import edge_strength
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, crop
 
-LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
-LEAST_GONE = 3.0  # pixels that a side must have gone before an object is reported
+LIMB = 0.35  # largest area of a limb, as a share of its object
+LEAST_GONE = 3.0  # least displacement of a side before an object is reported, pixels
 LEAST_SHARE = 0.25  # the same as a share of its size
-FOLLOWED = 0.5  # how far the opposite side must have gone too, as a share
-STRAIGHT = 0.6  # net way as a share of the way
-DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of that at rest
-EVENLY = 1.5  # how much brighter, relative to the background, the brightest part of a shadow may be
-SAME_HUE = 0.035  # how far colour may differ in it, as a share of brightness
-GHOST = 0.6  # edges in the image, as a share of those at background, below which nothing is there
-FRAGMENT = 0.2  # gap between a part and its object, as a share of its length
+FOLLOWED = 0.5  # least displacement of the opposite side, as a share
+STRAIGHT = 0.6  # least net displacement as a share of the path length
+DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of the background's
+EVENLY = 1.5  # greatest ratio of the relative brightness of a shadow's brightest and darkest parts
+SAME_HUE = 0.035  # greatest difference of colour in a shadow, as a share of brightness
+GHOST = 0.6  # edge strength in the image, as a share of the background's, below which it is a ghost
+FRAGMENT = 0.2  # largest gap between a part and its object, as a share of the object's length
 
 
 def is_salient_blob(s: BlobTrack) -> bool:
-    """Whether a side of an object's box has left its place and kept a course while it did.
+    """Whether a side of an object's box has moved away on a fairly straight path.
 
-    The opposite side must have followed it, unless the border of the image cuts the object. Shadows do so
-    too, and are none.
+    The opposite side must have followed, unless the image border cuts the object. Shadows do so too and are
+    excluded.
     """
     if s.shadow:
         return False
@@ -34,14 +34,14 @@ def is_salient_blob(s: BlobTrack) -> bool:
     least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
     left = (gone > least) & (gone > STRAIGHT * s.path_length)
     if not s.cut:
-        # What stays and only grows or shrinks, as a shadow on a thing at background, moves one side alone.
-        ways = s.sides - s.initial_sides
-        left = left & (np.roll(ways, 2) * np.sign(ways) >= FOLLOWED * gone)
+        # A blob that merely grows or shrinks, as a shadow on an object at rest, moves one side only.
+        shifts = s.sides - s.initial_sides
+        left = left & (np.roll(shifts, 2) * np.sign(shifts) >= FOLLOWED * gone)
     return s.frames >= 3 and bool(left.any())
 
 
 def merge_parts(known: BlobTracks) -> BlobTracks:
-    """Give small parts that were initiated beside an object, and go with it, to that object."""
+    """Merge small parts that were initiated beside an object, and move with it, into that object."""
     out = list(known)
     for s in known:
         if s.visible is None:
@@ -84,9 +84,9 @@ def _with_part(host: BlobTrack, s: BlobTrack) -> BlobTrack:
 
 
 def is_deep_shadow(s: BlobTrack, image: Floats, background: Floats) -> bool:
-    """Whether an outline shows the background, dimmed by one factor all over: what is cast, not what casts.
+    """Whether an outline shows the background dimmed by a uniform factor: a cast shadow.
 
-    Objects differ from what they hide by more in one place than in another.
+    The ratio of an object to the background that it hides varies more from place to place.
 
     Args:
         s: The object.
@@ -107,10 +107,10 @@ def is_deep_shadow(s: BlobTrack, image: Floats, background: Floats) -> bool:
 
 
 def is_ghost(s: BlobTrack, now: Floats, background: Floats) -> bool:
-    """Whether an outline has its edges in the background model: it shows where something left.
+    """Whether an outline has its edges in the background model: an object has left there.
 
-    A shadow dims the edges of what it falls on, and nothing has left; what is so thin that it has
-    no inside is not surely one.
+    A shadow also dims the edges that it falls on, so shadows are no ghosts; but one too thin to have an
+    interior is not certain to be a shadow.
 
     Args:
         s: The object.

@@ -1,4 +1,4 @@
-"""A blob that is followed before a static background, and what one frame shows of it."""
+"""Records of blob tracking: the track of one object, and the foreground blobs of one frame."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ TONES = 6  # bins of each channel in a histogram
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlobTrack:
-    """One object.
+    """The track of one object.
 
     Attributes:
-        key: Number in order of birth.
+        key: Number in order of initiation.
         id: Public number, 0 until reported.
         initiated: Seconds.
         last_seen: Seconds when last visible.
-        frames: In how many frames it was visible.
+        frames: Number of frames in which it was visible.
         corner: (x, y) of the template, pixels.
         velocity: (vx, vy), pixels per second.
         shape: (h, w) bool, template: its silhouette when it last stood alone.
-        tone: (h, w, 3) float32, what was seen there.
+        tone: (h, w, 3) float32, its tones, grey levels.
         histogram: (TONES ** 3,) float32 of its tones, sums to 1.
-        initial_sides: (4,) sides of its box at birth: left, top, right, bottom.
-        path_length: (4,) how far each side went since, to and fro, pixels.
-        isolated_frames: In how many frames it was seen apart from others.
+        initial_sides: (4,) sides of its box at initiation: left, top, right, bottom.
+        path_length: (4,) path length of each side since then, pixels.
+        isolated_frames: Number of frames in which it shared no blob.
         visible: Its visible pixels as (box, mask within it); None when hidden.
         merged: Whether it shares a blob with others.
-        cut: Whether the border of the image cuts it, or did: then it is no limb of another.
-        split_px: How far it went since it was last seen in one piece, pixels.
-        shadow: Whether it looks as a deep shadow does; known of what has no public id.
+        cut: Whether the image border cuts it, or ever did: then it is no limb of another.
+        split_px: Displacement since it was last seen in one piece, pixels.
+        shadow: Whether it looks like a deep shadow; evaluated only without a public id.
     """
 
     key: int
@@ -74,7 +74,7 @@ class BlobTrack:
         return np.array([x, y, x + w, y + h], dtype=np.float32)
 
     def displacement(self) -> Floats:
-        """(4,) distance of each side from where it was at birth, pixels."""
+        """(4,) distance of each side from its position at initiation, pixels."""
         return np.asarray(np.abs(self.sides - self.initial_sides), dtype=np.float32)
 
 
@@ -83,7 +83,7 @@ BlobTracks = tuple[BlobTrack, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foreground:
-    """What one frame shows.
+    """The foreground of one frame.
 
     Attributes:
         image: (h, w, 3) float32.
@@ -103,7 +103,7 @@ class Foreground:
 def find_blobs(
     image: Floats, change: Mask, least: float, time: float, seconds: float
 ) -> Foreground:
-    """Blobs of change that are no specks, with small gaps closed and holes filled."""
+    """Foreground blobs of at least `least` pixels, with small gaps closed and holes filled."""
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 5))
     closed = cv2.morphologyEx(change.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
@@ -118,7 +118,7 @@ def find_blobs(
 def template_window(
     s: BlobTrack, shape: tuple[int, int], dx: int = 0, dy: int = 0
 ) -> tuple[Box, Box]:
-    """Where the template lies in the image and which part of it, both as (x0, y0, x1, y1)."""
+    """The window of a template in the image, and in the template itself, both (x0, y0, x1, y1)."""
     x, y = round(s.corner[0]) + dx, round(s.corner[1]) + dy
     h, w = s.shape.shape
     x0, y0, x1, y1 = max(x, 0), max(y, 0), min(x + w, shape[1]), min(y + h, shape[0])

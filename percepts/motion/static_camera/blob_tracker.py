@@ -1,9 +1,8 @@
-"""Objects before a static background, each followed by its blob.
+"""Multi-object tracking of foreground blobs before a static background.
 
-While the camera is static, what differs from the background falls into blobs. One blob may
-show several objects and one object several blobs: each object keeps a template of its silhouette
-and tones from when it stood alone, which says what part of a common blob is its own, and where it
-is while others hide it.
+One blob may show several objects and one object several blobs. Each object has a template of its
+silhouette and tones from when it was last isolated, which tells its part of a shared blob, and where it is
+while others occlude it.
 """
 
 from __future__ import annotations
@@ -36,26 +35,26 @@ from visup.percepts.motion.static_camera.bodies import (
 )
 from visup.percepts.motion.static_camera.templates import best_template_shift, split_blob
 
-CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
-VISIBLE = 0.2  # share of its template below which an object is hidden
-FRAGMENT = 0.2  # gap between fragments of one object, as a share of its length
+CLAIM = 0.25  # least overlap for a claim, as a share of the smaller of object and blob
+VISIBLE = 0.2  # visible share of its template below which an object is hidden
+FRAGMENT = 0.2  # largest gap between fragments of one object, as a share of its length
 FOLLOW = 0.35  # weight of a newly measured velocity
-APART = 2  # frames apart from others after which an object is one of its own
-PASSED = 0.6  # lengths that an object goes in pieces before they are taken for several objects
-PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an object
-GROWN = 1.3  # how much more than its template is seen of an object that has come into view
+APART = 2  # isolated frames after which a track is an object of its own
+PASSED = 0.6  # displacement in pieces, in lengths, after which they are several objects
+PIECE = 0.35  # least area of a piece that may be an object, as a share of the largest
+GROWN = 1.3  # visible area, in areas of its template, of an object that has come into view
 
 
 def track_blobs(known: BlobTracks, view: Foreground, last_key: int) -> tuple[BlobTracks, int]:
-    """Bring objects to the next frame, and add those that are new.
+    """Update the tracks with a frame, and initiate new ones.
 
     Args:
-        known: Those of the frame before.
-        view: The frame.
-        last_key: The greatest key given so far.
+        known: Tracks of the previous frame.
+        view: The foreground of the frame.
+        last_key: The greatest key assigned so far.
 
     Returns:
-        All objects, hidden ones too; the greatest key given.
+        All tracks, including hidden ones; the greatest key assigned.
     """
     ahead = [_predicted(s, view.seconds) for s in known]
     slender = body_width(ahead)
@@ -94,7 +93,7 @@ def _predicted(s: BlobTrack, seconds: float) -> BlobTrack:
 
 
 def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
-    """The blobs that each object claims by where it is expected; else the nearest free one."""
+    """The blobs that each object claims by its prediction; otherwise a free one by assignment."""
     areas = np.bincount(view.labels.ravel(), minlength=view.count + 1)
     claims: list[list[int]] = []
     for s in ahead:
@@ -107,7 +106,7 @@ def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
 
 
 def _claimants(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[BlobTrack]) -> list[int]:
-    """Those who share a blob: what was never seen apart is no object of its own."""
+    """The objects that share a blob; tracks never isolated are no objects of their own."""
     all_ = [i for i, c in enumerate(claims) if blob in c]
     known = [i for i in all_ if ahead[i].isolated_frames >= APART]
     return known or all_[:1]
@@ -116,13 +115,13 @@ def _claimants(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[BlobT
 def _assign_unclaimed(
     ahead: Sequence[BlobTrack], view: Foreground, claims: list[list[int]], areas: NDArray[np.int64]
 ) -> None:
-    """Let objects that claim nothing have the free blobs nearby, all in all at the least cost."""
+    """Assign nearby free blobs to objects without a claim, at the least total cost."""
     free = sorted(set(range(1, view.count + 1)) - {b for c in claims for b in c})
     lost = [i for i, c in enumerate(claims) if not c]
     if not free or not lost:
         return
     cost = np.full((len(lost), len(free)), 1e3)
-    looks = [_blob_appearance(view.labels == b, view) for b in free]
+    appearances = [_blob_appearance(view.labels == b, view) for b in free]
     for row, i in enumerate(lost):
         s = ahead[i]
         size = float(np.hypot(*s.shape.shape))
@@ -130,7 +129,7 @@ def _assign_unclaimed(
         allowed = (
             0.6 * size + 0.5 * float(np.hypot(*s.velocity)) * waited + 0.2 * size * min(waited, 3)
         )
-        for col, (b, (centre, histogram)) in enumerate(zip(free, looks, strict=True)):
+        for col, (b, (centre, histogram)) in enumerate(zip(free, appearances, strict=True)):
             far = np.hypot(centre[0] - s.centre[0], centre[1] - s.centre[1]) / allowed
             unlike = 1 - float(np.sqrt(histogram * s.histogram).sum())
             ratio = areas[b] / max(np.count_nonzero(s.shape), 1)
@@ -159,7 +158,7 @@ def _merged_parts(
     order = sorted(parts, key=lambda m: -int(np.count_nonzero(m)))
     whole, others = order[0], []
     reach = max(3, round(FRAGMENT * max(s.shape.shape)))
-    # What rests before an object parts it for as long as it takes to pass, and no longer.
+    # A static occluder splits an object only for as long as it takes to pass.
     two = s.split_px > PASSED * max(s.shape.shape)
     for part in order[1:]:
         bodies = s.split_px > 0 and are_bodies(whole, part, slender)
@@ -214,15 +213,15 @@ def _updated(
     *,
     pieces: bool,
 ) -> BlobTrack:
-    """An object after what is seen of it in a frame.
+    """A track updated with its pixels in a frame.
 
     Args:
-        s: As predicted.
-        before: As it was in the frame before.
+        s: The predicted track.
+        before: The track of the previous frame.
         mask: Its pixels; None when it is hidden.
         alone: Whether it shares no blob.
-        view: The frame.
-        pieces: Whether it is seen in several large pieces.
+        view: The foreground of the frame.
+        pieces: Whether it is visible in several large pieces.
     """
     full = np.count_nonzero(s.shape)
     if mask is None or np.count_nonzero(mask) < VISIBLE * full:
@@ -247,7 +246,7 @@ def _updated(
 
 
 def _shifted(s: BlobTrack, mask: Mask, view: Foreground) -> BlobTrack:
-    """An object partly hidden: only the shift of its template tells where it is."""
+    """Update of a partly hidden object, from the shift of its template alone."""
     _, dx, dy = best_template_shift(s, mask.astype(np.float32), view)
     gain = 0.3 * FOLLOW
     corner = (s.corner[0] + dx, s.corner[1] + dy)
@@ -261,7 +260,7 @@ def _shifted(s: BlobTrack, mask: Mask, view: Foreground) -> BlobTrack:
 def _measured_anew(
     s: BlobTrack, before: BlobTrack, box: Box, shape: Mask, view: Foreground
 ) -> BlobTrack:
-    """An object seen whole: its box, velocity, template and tones are what is seen."""
+    """Update of a wholly visible object: box, velocity, template and tones are measured anew."""
     elapsed = max(view.time - before.last_seen, view.seconds, 1e-3)
     old = before.centre
     new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)

@@ -1,7 +1,7 @@
-"""People who walk side by side in one blob: taken apart where heads part, by how wide a body is.
+"""Splits a blob of people who walk side by side, at the notches between their heads.
 
-A blob as wide as two or three upright bodies, with a notch from above between them, is cut there. How wide a
-body is for its height follows from those that were followed by themselves, and from what people are.
+A blob as wide as two or three upright bodies, with a notch from above between them, is cut there. The width
+of a body relative to its height is estimated from isolated tracks and a prior for people.
 """
 
 from __future__ import annotations
@@ -24,28 +24,25 @@ from visup.percepts.motion.static_camera.blob_track import (
     template_window,
 )
 
-SLENDER = 0.4  # width of a body as a share of its height, where nothing else is known
-UPRIGHT = 0.65  # the same, at most
-KNOWN_FRAMES = 5  # frames after which a body that stood alone tells how wide bodies are
-WIDE = 1.6  # bodies' widths from which a blob may hold two
+SLENDER = 0.4  # prior for the width of a body, as a share of its height
+UPRIGHT = 0.65  # greatest width of a body, as a share of its height
+KNOWN_FRAMES = 5  # isolated frames after which a track is used to estimate the width of bodies
+WIDE = 1.6  # least width of a blob of two bodies, in widths of a body
 MOST = 3  # bodies in one blob
-APART = 2  # frames apart from others after which one is known by itself
-THIN_PX = 4  # a body that is less wide is a speck
-NOTCH = (
-    0.86  # height of the outline between two bodies, as a share of the lower: shoulders are at 0.82
-)
-ALIKE = 0.6  # height of the lower of two bodies, as a share of the higher
-WHOLE = 0.6  # width of a piece, as a share of a body's, that is more than half of one
-AROUND = 0.3  # how far from even shares bodies may part, as a share of a body's width
+APART = 2  # isolated frames after which a track is an object of its own
+THIN_PX = 4  # least width of a body, pixels
+NOTCH = 0.86  # greatest height of the notch, as a share of the lower body: shoulders are at 0.82
+ALIKE = 0.6  # least height of the lower of two bodies, as a share of the higher
+WHOLE = 0.6  # least width of a piece that counts as a body, as a share of a body's width
+AROUND = 0.3  # search range of a cut around equal shares, as a share of a body's width
 
 
 def with_bodies_apart(view: Foreground, tracks: Sequence[BlobTrack], slender: float) -> Foreground:
-    """A frame in which each body of those that walk side by side is a blob of its own.
+    """The foreground with the bodies of people side by side as separate blobs.
 
     Args:
-        view: The frame.
-        tracks: What is followed, where it is expected in this frame; blobs that two of them share are left to
-            their templates.
+        view: The foreground of a frame.
+        tracks: Tracks predicted to this frame; blobs shared by two of them are left to template matching.
         slender: Width of a body as a share of its height.
     """
     labels, count = view.labels, view.count
@@ -65,7 +62,7 @@ def with_bodies_apart(view: Foreground, tracks: Sequence[BlobTrack], slender: fl
 
 
 def body_width(tracks: Sequence[BlobTrack]) -> float:
-    """Width of a body as a share of its height: the median of those that stand alone, and of people."""
+    """Width of a body as a share of its height: the median of isolated tracks and the prior."""
     alone = [
         s.shape.shape[1] / s.shape.shape[0]
         for s in tracks
@@ -75,7 +72,7 @@ def body_width(tracks: Sequence[BlobTrack]) -> float:
 
 
 def parting_columns(mask: Mask, slender: float) -> tuple[int, ...]:
-    """The columns at which the second and further bodies of a blob begin; none where it is one.
+    """The columns at which the second and further bodies of a blob begin; empty for a single body.
 
     Args:
         mask: (h, w) bool, the blob in its box.
@@ -103,7 +100,7 @@ def parting_columns(mask: Mask, slender: float) -> tuple[int, ...]:
 
 
 def are_bodies(a: Mask, b: Mask, slender: float) -> bool:
-    """Whether two pieces of an outline are bodies side by side, and no halves of one behind a post.
+    """Whether two pieces of an outline are bodies side by side, not halves of one behind a post.
 
     Args:
         a: (h, w) bool.
@@ -117,14 +114,14 @@ def are_bodies(a: Mask, b: Mask, slender: float) -> bool:
 
 
 def _heights(mask: Mask) -> NDArray[np.int64]:
-    """How high above the lowest row of the box each column of a blob begins, pixels, smoothed over three."""
+    """Height of each column of a blob above the bottom of its box, pixels, median of three columns."""
     rows = mask.shape[0]
     tops = np.where(mask.any(axis=0), rows - mask.argmax(axis=0), 0)
     return np.asarray(np.median([np.roll(tops, 1), tops, np.roll(tops, -1)], axis=0), np.int64)
 
 
 def _shared(blob: int, labels: Labels, tracks: Sequence[BlobTrack]) -> int:
-    """How many that were seen apart are expected in a blob."""
+    """How many tracks of objects of their own are predicted in a blob."""
     count = 0
     for s in tracks:
         at, own = template_window(s, labels.shape)

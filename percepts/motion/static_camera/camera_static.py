@@ -8,21 +8,21 @@ from visup.percepts.motion.layers.affine import STILL, Affine, distances
 from visup.percepts.motion.layers.dominant_motion import BALANCE_GRID
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
-TELLS = 16.0  # information, 1 / pixels squared, of a point that would show a motion
-FITS = 9.0  # squared distance within which a point rests
-SPREAD = 0.5  # share of the view in which points must be seen to rest
-RESTS = 0.85  # share of those parts that rest when the camera is static
-MOVES = 0.6  # the same below which the camera moves
+TELLS = 16.0  # least information of a point that would reveal motion, 1 / pixels squared
+FITS = 9.0  # squared Mahalanobis distance up to which a point fits a static camera
+SPREAD = 0.5  # least share of the grid cells that must hold such points
+RESTS = 0.85  # least share of those cells that fit when the camera is static
+MOVES = 0.6  # share of those cells below which the camera moves
 
 
 def is_camera_static(scene: FrameMeasurements) -> bool | None:
-    """Whether the camera is seen to be static: all over the view, away from objects, nothing moves.
+    """Whether the camera is static: points across the whole view, outside of objects, are at rest.
 
     Args:
-        scene: A frame as measured.
+        scene: Measurements of a frame.
 
     Returns:
-        None when too little structure is seen to tell, or the view is divided.
+        None when there is too little structure to tell, or the evidence is mixed.
     """
     shares = [_still_share(scene, i) for i in range(len(scene.measured))]
     if any(s is not None and s < MOVES for s in shares):

@@ -1,9 +1,9 @@
-"""A static camera: what moves is seen pixel by pixel, by background subtraction.
+"""Segmentation before a static camera, by background subtraction.
 
-Layers of motion need no still camera and know slow things from the first frame on; but small and
-thin things have too few constraints for them. Where the camera is seen to be static, blobs of
-the foreground are reported instead, and of the layers' regions those that subtraction does not show:
-what was there, and slow, when the background model was begun.
+Motion layers need no static camera and detect slow objects from the first frame on, but small and thin
+objects give them too few constraints. While the camera is static, foreground blobs are reported instead,
+together with the layer regions that subtraction does not show: slow objects that were present when the
+background model was initialised.
 """
 
 from __future__ import annotations
@@ -44,18 +44,18 @@ from visup.percepts.motion.static_camera.track_fusion import (
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
-REST_S = 1.0  # how long the camera must be static before the background is believed, seconds
-LONGEST_S = 4.0  # most seconds of standing still that make up for times when too little is seen
-FLOODED = 0.6  # share of the image that no change of what is seen in it explains
-MANY_CELLS = 15  # superpixels of a region whose outline the layers know well
-YOUNG_S = 0.3  # how long what was never reported is missed, seconds
-SIZE = 768  # longer side of the background, pixels
-KNOWN = 0.6  # share of a region that differs from the background when that shows what lies behind
-START_S = (
-    2.4  # age of the background up to which it may show what has only begun to be reported, seconds
+REST_S = 1.0  # how long the camera must be static before the background is used, seconds
+LONGEST_S = (
+    4.0  # most time at rest, seconds, that is credited against frames with too little structure
 )
-STRIDE_PX, MOST_STRIDES = 4.0, 32
-HALO = 7  # pixels: a region's outline may be off by half as much
+FLOODED = 0.6  # foreground share of the image above which the view itself has changed
+MANY_CELLS = 15  # least superpixels of a region whose outline the layers know well
+YOUNG_S = 0.3  # how long a track that was never reported is continued while missed, seconds
+SIZE = 768  # longer side of the background, pixels
+KNOWN = 0.6  # least foreground share of a region when the background shows what lies behind it
+START_S = 2.4  # age of the background up to which it may contain a newly reported object, seconds
+STRIDE_PX, MOST_STRIDES = 4.0, 32  # step of a swept mask, background pixels, and most steps
+HALO = 7  # dilation of regions, pixels: an outline may be off by half as much
 
 
 class StaticCameraSegmenter:
@@ -85,15 +85,15 @@ class StaticCameraSegmenter:
         settings: MotionSettings,
         evidence: MotionEvidence,
     ) -> tuple[Region, ...]:
-        """What is to be reported of a frame.
+        """The regions to report for a frame.
 
         Args:
             frame: The frame.
-            scene: As measured.
-            regions: Those of the layers of motion.
-            ids: Gives public ids.
-            settings: Gives how long objects are remembered.
-            evidence: Which points are seen to move by themselves.
+            scene: Its measurements.
+            regions: Regions of the motion layers.
+            ids: Allocates public ids.
+            settings: Settings of the segmenter.
+            evidence: Points with independent motion.
 
         Returns:
             Regions by id: those of the layers unless the camera is static.
@@ -119,7 +119,7 @@ class StaticCameraSegmenter:
         fresh: Sequence[Region],
         settings: MotionSettings,
     ) -> Foreground | None:
-        """What differs from the background; None while the camera moves or none is known."""
+        """The foreground; None while the camera moves or there is no background yet."""
         if not self._is_static(is_camera_static(scene), scene.seconds):
             return None
         image = _prepare(frame)
@@ -134,7 +134,7 @@ class StaticCameraSegmenter:
     def _reveal(
         self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
     ) -> None:
-        """Forget what a region hid since the background was begun, and look where none hides it now."""
+        """Mark the background that regions hid since initialisation unknown; fill in what is uncovered."""
         assert self._background is not None
         background, shape = self._background, image.shape[:2]
         age = frame.time - self._since
@@ -144,13 +144,13 @@ class StaticCameraSegmenter:
                 here = region_mask([r], frame.size, shape)
                 if change[here].mean() < KNOWN:
                     background = with_unknown(background, here & ~change)
-                was = swept_mask(here, r, age, shape[1] / frame.size[0])
-                background = with_unknown(background, was & ~here & change)
+                swept = swept_mask(here, r, age, shape[1] / frame.size[0])
+                background = with_unknown(background, swept & ~here & change)
         reported = region_mask(regions, frame.size, shape)
         self._background = with_revealed(background, image, ~reported)
 
     def _is_static(self, static: bool | None, seconds: float) -> bool:
-        """Whether the camera is static, as far as is known; else all is forgotten."""
+        """Whether the camera is static, as far as known; otherwise the state is reset."""
         step = seconds if static else -seconds
         self._static_s = min(max(self._static_s + step, 0.0), LONGEST_S)
         if static is False or self._static_s <= 0:
@@ -160,7 +160,7 @@ class StaticCameraSegmenter:
     def _track_blobs(
         self, image: Floats, now: float, settings: MotionSettings
     ) -> Foreground | None:
-        """Follow the blobs into a frame, and learn from it; None when it shows another view."""
+        """Track blobs and update the background; None when the frame shows another view."""
         assert self._background is not None
         seconds = max(now - self._time, 1e-3)
         self._time = now
@@ -179,9 +179,9 @@ class StaticCameraSegmenter:
         ghosts = [s for s in known if is_ghost(s, image, background.mean)]
         known = tuple(s for s in known if s not in ghosts)
         reported = blob_mask([s for s in known if s.id], change.shape)
-        held = (cv2.dilate(reported.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
+        protected = (cv2.dilate(reported.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
         self._background = update_background(
-            background, image, held, seconds, blob_mask(ghosts, change.shape)
+            background, image, protected, seconds, blob_mask(ghosts, change.shape)
         )
         self._tracks = tuple(
             s
@@ -203,7 +203,7 @@ def _prepare(frame: Frame) -> Floats:
 
 
 def region_mask(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
-    """(h, w) bool: the pixels of the background that some regions may hide.
+    """(h, w) bool: the background pixels that some regions may hide.
 
     Args:
         regions: In frame pixels.
@@ -230,19 +230,19 @@ def region_mask(regions: Sequence[Region], size: tuple[int, int], shape: tuple[i
 
 
 def swept_mask(here: Mask, region: Region, seconds: float, scale: float) -> Mask:
-    """Where a region was during the last seconds if it moved as it does now, (h, w) bool.
+    """The area that a region swept during the last seconds at its current velocity, (h, w) bool.
 
     Args:
         here: (h, w) bool, where it is.
         region: Gives the velocity, frame pixels per second.
         seconds: How far back.
-        scale: Pixels of the background per frame pixel.
+        scale: Background pixels per frame pixel.
     """
-    way = -np.asarray(region.velocity) * seconds * scale
-    steps = int(np.clip(np.ceil(np.hypot(*way) / STRIDE_PX), 1, MOST_STRIDES))
+    path = -np.asarray(region.velocity) * seconds * scale
+    steps = int(np.clip(np.ceil(np.hypot(*path) / STRIDE_PX), 1, MOST_STRIDES))
     out = here.copy()
     for k in range(1, steps + 1):
-        dx, dy = way * k / steps
+        dx, dy = path * k / steps
         matrix = np.array([[1, 0, dx], [0, 1, dy]])
         moved = cv2.warpAffine(
             here.view(np.uint8), matrix, here.shape[::-1], flags=cv2.INTER_NEAREST
@@ -252,7 +252,7 @@ def swept_mask(here: Mask, region: Region, seconds: float, scale: float) -> Mask
 
 
 def blob_mask(known: Sequence[BlobTrack], shape: tuple[int, int]) -> Mask:
-    """(h, w) bool: what is visible of some objects."""
+    """(h, w) bool: the visible pixels of some objects."""
     out = np.zeros(shape, dtype=bool)
     for s in known:
         if s.visible is not None:

@@ -1,6 +1,6 @@
-"""What part of a common blob is whose, and where an object is that others hide in part.
+"""Template matching: divides a shared blob among its objects, and locates partly occluded ones.
 
-Each object brings the template of its silhouette and tones from when it stood alone.
+The template of an object is its silhouette and tones from when it was last isolated.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from visup.percepts.motion.static_camera.blob_track import (
     template_window,
 )
 
-SEARCH = 3  # pixels around the prediction in which a template is sought
-ENOUGH = 1200  # pixels of a template that are compared, about
-TAKEN = 0.3  # how far a pixel that another object shows still speaks for one behind it
+SEARCH = 3  # least search range around the prediction, pixels
+ENOUGH = 1200  # approximate number of template pixels that are compared
+TAKEN = 0.3  # weight of a pixel that a nearer object has claimed
 
 
 def split_blob(
     blob: int, rivals: Sequence[tuple[int, BlobTrack]], view: Foreground
 ) -> list[tuple[int, Mask]]:
-    """What part of a blob each of its claimants has.
+    """Divide a blob among its claimants.
 
     Args:
         blob: Its number.
         rivals: The claimants, each with a number.
-        view: The frame.
+        view: The foreground of the frame.
 
     Returns:
         For each claimant its number and an (h, w) mask.
@@ -59,7 +59,7 @@ def split_blob(
 def _placed_templates(
     rivals: Sequence[BlobTrack], blob: Mask, view: Foreground
 ) -> list[tuple[int, int, int]]:
-    """Number and shift of each object in a blob; the best seen first, the others beside it."""
+    """Number and shift of each object in a blob, best fit first; later ones avoid its pixels."""
     free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
     while left:
         fits = [(best_template_shift(rivals[n], free, view), n) for n in left]
@@ -77,12 +77,12 @@ def best_template_shift(s: BlobTrack, blob: Floats, view: Foreground) -> tuple[f
     Args:
         s: The object.
         blob: (h, w) float32, how far each pixel is free for it, 0 to 1.
-        view: The frame.
+        view: The foreground of the frame.
 
     Returns:
         The cost, grey levels, and the shift (x, y), whole pixels.
     """
-    # A large template says enough by some of its pixels.
+    # Large templates are subsampled.
     step = max(1, int(np.sqrt(np.count_nonzero(s.shape) / ENOUGH)))
     reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
     corner = round(s.corner[0]), round(s.corner[1])
@@ -93,7 +93,7 @@ def best_template_shift(s: BlobTrack, blob: Floats, view: Foreground) -> tuple[f
 def _pixel_costs(
     s: BlobTrack, dx: int, dy: int, xs: NDArray[np.int64], ys: NDArray[np.int64], tones: Floats
 ) -> Floats:
-    """How little each of N pixels looks like a part of an object, (N,) float32."""
+    """Cost of assigning each of N pixels to an object, grey levels, (N,) float32."""
     pad = 30
     outer = cv2.copyMakeBorder(
         (~s.shape).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1

@@ -1,6 +1,6 @@
-"""What is reported while the camera is static: blobs and regions of the layers, each object once.
+"""Track fusion while the camera is static: blobs and layer regions reported once per object.
 
-An object that both have found is reported as its blob, under the id under which it was reported first.
+An object found by both is reported as its blob, under the id under which it was reported first.
 """
 
 from __future__ import annotations
@@ -19,24 +19,20 @@ from visup.percepts.motion.static_camera.blob_filters import is_salient_blob
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, Foreground
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-KNOWN = 0.4  # share of a region that differs from the background when subtraction shows it
-COMMON = 0.5  # share of the smaller that two outlines of one object have in common
-WHOLE = 0.6  # intersection over union at which an object is seen whole by subtraction
-MAIN = 0.4  # share of a region that a blob must fill to take its id: limbs do not
-MISSED = (
-    0.15  # share of what tells of a region's motion that lies where subtraction shows no change
-)
-LARGE = (
-    4.0  # how much larger a region must be than one known well, for subtraction to miss parts of it
-)
-RECENT = 0.9  # weight of what was known of that before
-BESIDE = 5  # pixels: points lie on edges, half of them outside of the blob
-LEAST_AREA = 0.0005  # share of the image that an object must fill when it is first reported
+KNOWN = 0.4  # least foreground share of a region that subtraction shows
+COMMON = 0.5  # least overlap of two outlines of one object, as a share of the smaller
+WHOLE = 0.6  # intersection over union above which subtraction shows an object whole
+MAIN = 0.4  # least share of a region that a blob must fill to take its id: limbs do not
+MISSED = 0.15  # share of a region's motion evidence outside of the foreground, above which parts are missed
+LARGE = 4.0  # least area, in areas of a well-known region, at which subtraction may miss parts
+RECENT = 0.9  # weight of previous evidence per frame
+BESIDE = 5  # tolerance, pixels: points lie on edges, half of them outside of the blob
+LEAST_AREA = 0.0005  # least area of an object when first reported, as a share of the image
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEvidence:
-    """Points that are seen to move by themselves.
+    """Points with independent motion.
 
     Attributes:
         xy: (N, 2) float32, frame pixels.
@@ -49,12 +45,12 @@ class MotionEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FusionFrame:
-    """What one frame gives besides blobs and regions.
+    """Inputs of the fusion of one frame besides blobs and regions.
 
     Attributes:
         size: (width, height) of the frame.
-        foreground: What differs from the background.
-        evidence: Which points are seen to move by themselves.
+        foreground: Its foreground.
+        evidence: Points with independent motion.
         well_known_area: Area from which the layers know an outline well, frame pixels.
     """
 
@@ -65,7 +61,7 @@ class FusionFrame:
 
 
 class TrackFusion:
-    """Under which ids objects are reported; one per video."""
+    """Fuses blobs and layer regions, and assigns public ids; one per video."""
 
     def __init__(self) -> None:
         self._last: dict[int, float] = {}  # when a region of the layers was last seen
@@ -77,16 +73,16 @@ class TrackFusion:
         self._missed_evidence: dict[int, tuple[float, float]] = {}  # of a region: missed, all
 
     def knows(self, number: int) -> bool:
-        """Whether a region of the layers was seen of late."""
+        """Whether a region of the layers was seen recently."""
         return number in self._last
 
     def note(self, regions: Sequence[Region], now: float, memory_s: float) -> None:
-        """Remember which regions of the layers live, and forget those that never come back.
+        """Record the current regions of the layers, and forget expired ones.
 
         Args:
             regions: Those of a frame, each with its own id.
             now: Seconds.
-            memory_s: How long the layers remember what is occluded, seconds.
+            memory_s: How long the layers remember occluded regions, seconds.
         """
         self._last |= {r.id: now for r in regions}
         gone = {i for i, last in self._last.items() if now - last > memory_s}
@@ -104,11 +100,11 @@ class TrackFusion:
 
         Args:
             regions: Those of the layers, each with its own id.
-            ids: Gives new ids.
+            ids: Allocates new ids.
             well_known_area: Area from which the layers know an outline well, frame pixels.
 
         Returns:
-            The same by public id.
+            The same regions under their public ids, sorted by id.
         """
         self._shown |= {r.id for r in regions}
         self._old |= {r.id for r in regions if r.area >= well_known_area}
@@ -126,17 +122,17 @@ class TrackFusion:
         """Report each object once, as its blob or as its region of the layers.
 
         Args:
-            frame: What it shows.
-            blobs: Those that are followed; salient ones are given ids.
+            frame: Inputs of the frame.
+            blobs: Blob tracks; salient ones are given ids.
             regions: Those of the layers, each with its own id.
-            ids: Gives new ids.
+            ids: Allocates new ids.
 
         Returns:
             Regions by public id; the blobs with theirs.
         """
         seen = _visible_regions(blobs, frame)
         numbered = {s.id: seen[s.key] for s in blobs if s.id and s.key in seen}
-        # Small ones are seen better by subtraction: people who go together, with their shadows.
+        # Subtraction resolves small regions better: people walking together, with their shadows.
         large = [r for r in regions if r.area >= LARGE * frame.well_known_area]
         missed = self._missed(large, tuple(numbered.values()), frame)
         older, heirs = self._older(regions, seen, missed)
@@ -169,7 +165,7 @@ class TrackFusion:
         frame: FusionFrame,
         ids: IdAllocator,
     ) -> tuple[Region, ...]:
-        """What is reported of blobs, with the regions that subtraction does not show as well."""
+        """The reported blobs, with the regions that subtraction shows less well or not at all."""
         out, labels = blobs, frame.foreground.labels
         change = cv2.resize(
             (labels > 0).view(np.uint8), frame.size, interpolation=cv2.INTER_NEAREST
@@ -178,7 +174,7 @@ class TrackFusion:
             x, y, w, h = r.bbox
             if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
                 self._note_alias(r, out)
-                # What is small and was reported stays so until a blob of it is.
+                # A small region that was reported stays so until its blob is reported.
                 small = r.id in self._shown and r.area < frame.well_known_area
                 if not small or any(common_pixels(s, r) for s in out):
                     continue
@@ -191,7 +187,7 @@ class TrackFusion:
         return self._alias.get(r.id, r.id)
 
     def _public_id(self, r: Region, taken: Collection[int], ids: IdAllocator) -> int:
-        """The id under which a region is reported: as before, else its own, else a new one for good."""
+        """The id under which a region is reported: as before, else its own, else a new permanent one."""
         for number in (self._known_id(r), r.id):
             if number not in taken:
                 return number
@@ -206,16 +202,16 @@ class TrackFusion:
         regions: Sequence[Region],
         numbered: Mapping[int, Region],
     ) -> bool:
-        """Whether a blob is an object to be reported: large enough, salient, and no part of another."""
+        """Whether a blob is a new object: large enough, salient, and no part of another."""
         large = own.area >= LEAST_AREA * (frame.size[0] * frame.size[1])
         return large and is_salient_blob(s) and not self._is_part(own, regions, numbered)
 
     def _missed(
         self, regions: Sequence[Region], seen: Sequence[Region], frame: FusionFrame
     ) -> set[int]:
-        """Regions of which subtraction misses parts: what is of one tone with the rest, or slow.
+        """Regions of which subtraction misses parts with the tone of the background, or slow ones.
 
-        Points there move with the region, and not as the rest does.
+        Points there move with the region, not with the background.
         """
         shown = np.zeros(frame.size[::-1], dtype=np.uint8)
         for s in seen:
@@ -241,7 +237,7 @@ class TrackFusion:
     def _older(
         self, regions: Sequence[Region], seen: Mapping[int, Region], missed: set[int]
     ) -> tuple[list[Region], dict[int, int]]:
-        """Regions of which it misses parts, or reported before it was and not yet seen whole in it.
+        """Regions with missed parts, or older than the background and not yet shown whole by a blob.
 
         Also the ids that pass to blobs, by key, which now show such a region whole.
         """
@@ -252,10 +248,10 @@ class TrackFusion:
                 continue
             if r.id not in self._old:
                 continue
-            both = {key: common_pixels(s, r) for key, s in seen.items()}
-            whole = {key: b / (seen[key].area + r.area - b) for key, b in both.items()}
-            best = max(whole, key=lambda key: whole[key], default=None)
-            if best is None or whole[best] <= WHOLE:
+            common = {key: common_pixels(s, r) for key, s in seen.items()}
+            iou = {key: c / (seen[key].area + r.area - c) for key, c in common.items()}
+            best = max(iou, key=lambda key: iou[key], default=None)
+            if best is None or iou[best] <= WHOLE:
                 out.append(r)
                 continue
             self._old.discard(r.id)
@@ -265,7 +261,7 @@ class TrackFusion:
     def _is_part(
         self, own: Region, regions: Sequence[Region], numbered: Mapping[int, Region]
     ) -> bool:
-        """Whether a blob that was never reported touches another one of the same region."""
+        """Whether an unreported blob touches a reported one of the same region."""
         for r in regions:
             host = numbered.get(self._known_id(r))
             if (
@@ -288,14 +284,14 @@ class TrackFusion:
         return ids.new()
 
     def _note_alias(self, r: Region, reported: Sequence[Region]) -> None:
-        """Note under which id a region of the layers is reported."""
+        """Record the id under which a region of the layers is reported."""
         best = max(reported, key=lambda s: common_pixels(s, r), default=None)
         if best is not None and common_pixels(best, r) > COMMON * min(r.area, best.area):
             self._alias[r.id] = best.id
 
 
 def _visible_regions(blobs: BlobTracks, frame: FusionFrame) -> dict[int, Region]:
-    """What is visible of each blob as a region, by key."""
+    """The visible part of each blob as a region, by key."""
     width, height = frame.size
     rows, columns = frame.foreground.labels.shape
     scale, seconds = (width / columns, height / rows), frame.foreground.seconds
@@ -319,7 +315,7 @@ def common_pixels(a: Region, b: Region) -> int:
 
 
 def are_near(a: Region, b: Region) -> bool:
-    """Whether two regions come nearer than some pixels to each other."""
+    """Whether two regions are within `BESIDE` pixels of each other."""
     x, y, w, h = a.bbox
     wide = np.pad(a.mask.view(np.uint8), BESIDE)
     near = cv2.dilate(wide, np.ones((2 * BESIDE + 1, 2 * BESIDE + 1), np.uint8)) > 0
@@ -330,10 +326,10 @@ def are_near(a: Region, b: Region) -> bool:
 def blob_region(
     s: BlobTrack, scale: tuple[float, float], size: tuple[int, int], seconds: float
 ) -> Region:
-    """What is visible of an object as a region.
+    """The visible part of an object as a region.
 
     Args:
-        s: An object that is visible.
+        s: A visible object.
         scale: Frame pixels per pixel of the foreground, (x, y).
         size: (width, height) of the frame.
         seconds: Between frames.
@@ -350,6 +346,6 @@ def blob_region(
     )
     shape = describe_mask(large.astype(bool), (left, top), size)
     velocity = (s.velocity[0] * scale[0], s.velocity[1] * scale[1])
-    # A box is known to about a pixel, and its last few steps are averaged.
+    # A box is accurate to about a pixel, and velocity is averaged over a few steps.
     sigma = 0.5 * scale[0] / seconds
     return shape.region(s.id, velocity, sigma, float(1 - np.exp(-s.frames / 5.0)))

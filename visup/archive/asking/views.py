@@ -35,12 +35,12 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
             " FROM lake.runs r",
         ),
         "objects": (
-            "the life of an object, with `seconds` from first to last seen",
+            "the lifetime of an object, with `seconds` from first to last seen",
             f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run), t.last_seen - t.first_seen AS seconds"
             " FROM lake.objects t JOIN lake.runs r USING (run)",
         ),
         "events": (
-            "something that happened, with `who`: the names of the objects",
+            "an event, with `who`: the names of the objects",
             f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run), " + _OBJECT_NAMES + ""
             " FROM lake.events t JOIN lake.runs r USING (run)" + _NAMES,
         ),
@@ -51,7 +51,7 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
             " FROM lake.alerts t JOIN lake.runs r USING (run)" + _NAMES,
         ),
         "tasks": (
-            "a stretch in which a task stood as it did",
+            "an interval in which the state of a task did not change",
             f"SELECT t.run, {_CLIP}, t.task, t.verdict, t.stage, t.confidence, t.success, {_INTERVAL}"
             " FROM lake.tasks t JOIN lake.runs r USING (run)",
         ),
@@ -70,11 +70,11 @@ VIEWS: Mapping[str, tuple[str, str]] = MappingProxyType(
             " LEFT JOIN lake.objects y ON y.run = t.run AND y.object = t.b",
         ),
         "percepts": (
-            "what a behaviour gave of one kind in ten seconds",
+            "percepts of one kind from one behaviour in ten seconds",
             f"SELECT t.run, {_CLIP}, t.* EXCLUDE (run) FROM lake.percepts t JOIN lake.runs r USING (run)",
         ),
         "health": (
-            "a time in which the image, or what is perceived, was in a state",
+            "an interval in which the image, or a kind of percept, was in a state",
             f"SELECT t.run, {_CLIP}, t.about, t.state, {_INTERVAL}"
             " FROM lake.health t JOIN lake.runs r USING (run)",
         ),

@@ -1,4 +1,4 @@
-"""Learning tasks, measured: random missions are watched, a task is learned, others are judged by it.
+"""Evaluation of task learning: tasks learned from runs of random missions judge runs not learned from.
 
 Read `worlds.py` (a world as a run), then `runner.py` (`visup eval learning`).
 """

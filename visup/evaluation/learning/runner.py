@@ -1,7 +1,7 @@
 """`visup eval learning`: tasks learned from a few good runs of random missions, judged on others.
 
-Of each kind of world some that go well are watched, a task is learned from them, and it judges further ones,
-that go well and that go wrong, none of which it has seen. What is cut short is not judged.
+For each kind of world a task is learned from a few good runs and judges further good and bad runs, none of
+which it has seen. Interrupted runs are excluded.
 """
 
 from __future__ import annotations
@@ -27,23 +27,24 @@ if TYPE_CHECKING:
     from visup.render.worlds.world import World
 
 MISSIONS = ("pick", "charge", "fetch", "boats", "bench")
-"""Kinds in which things meet that a camera sees meet. The others: a parcel is hidden by its bin, a payload
-is not told from the hand that holds it, a crane is above its truck from the start in the image, the one who
-inspects meets nobody, and who walks is alone."""
+"""Kinds whose meetings are visible to a camera. In the others a parcel is hidden by its bin, a payload
+cannot be told from the hand that holds it, a crane is above its truck in the image from the start, an
+inspector meets nobody, and a walker is alone."""
 SEEDS_APART = 10_000
+"""Offset between the seeds of two draws, so that their worlds differ."""
 MOST_DRAWN = 40
-"""Worlds of a kind are drawn so many times for each that is wanted, until their actors are the same."""
+"""Most draws for each world wanted, until enough have the same actors."""
 NOT_OVER = "in_progress"
 KEYS = ("accepted", "good", "refused", "bad")
 
 
 @dataclass(frozen=True, slots=True)
 class LearningTrial:
-    """One kind of world, and how many of it are watched.
+    """One kind of world, and its numbers of runs.
 
     Attributes:
-        kind: Of world.
-        seed: Of all that is drawn.
+        kind: Kind of world.
+        seed: Seed of all draws.
         taught: Good runs that the task is learned from.
         others: Further good runs, and as many bad ones.
     """
@@ -66,20 +67,20 @@ def evaluate_learning(
     """Learn tasks and judge further runs by them.
 
     Args:
-        kinds: Of worlds; `MISSIONS` when empty.
+        kinds: Kinds of worlds; `MISSIONS` when empty.
         runs: Good runs that each task is learned from.
         count: Further good runs of each kind, and as many bad ones.
-        seed: Of all worlds.
+        seed: Seed of all worlds.
         workers: Processes that share the work; as many as there are cores when None.
-        progress: Shows what is being done.
+        progress: Receives progress messages.
 
     Returns:
-        `items` by kind with `accepted` of `good`, `refused` of `bad`, `unlike`: how many actions one of the
-        learned and the written task has and the other not, `task` and the runs that are judged wrong;
-        `total`; `missions_held`: kinds in which all good and nine of ten bad runs are judged right.
+        `items` by kind with `accepted` of `good`, `refused` of `bad`, `unlike`: number of actions in which
+        the learned and the written task differ, `task`, and `wrong`: runs that are misjudged; `total`, with
+        `held` of `missions`: kinds in which all good and at least nine of ten bad runs are judged right.
 
     Raises:
-        SettingsError: There is no kind of a name.
+        SettingsError: A kind is unknown.
     """
     trials = [LearningTrial(k, seed, runs, count) for k in known_kinds(kinds or MISSIONS)]
     items: dict[str, Any] = {}
@@ -117,7 +118,7 @@ def evaluate_kind(trial: LearningTrial) -> dict[str, Any]:
 
 
 def bad_outcomes(kind: str) -> tuple[str, ...]:
-    """The ways in which a world of a kind goes wrong."""
+    """The outcomes with which a world of a kind fails."""
     found = []
     for outcome in KINDS[kind].outcomes[1:]:
         verdict = random_world(kind, 0, outcome).course.verdict
@@ -132,14 +133,14 @@ def worlds_of(
     count: int,
     actors: set[str] | None = None,
 ) -> list[World]:
-    """Worlds of one mission: with the same actors, those of the first one unless they are given.
+    """Worlds of one mission, all with the same actors: the given ones or those of the first world.
 
     Args:
-        kind: Of world.
-        seed: Each has numbers of its own.
-        outcomes: They take turns.
+        kind: Kind of world.
+        seed: Different seeds give different worlds.
+        outcomes: Outcomes, used in turn.
         count: How many.
-        actors: Who plays in them.
+        actors: Actors of the worlds.
     """
     found: list[World] = []
     for number in range(MOST_DRAWN * count):
@@ -154,7 +155,7 @@ def worlds_of(
 
 
 def actions_of(task: Task) -> set[tuple[str, frozenset[str]]]:
-    """The actions that a task asks for, with their actors."""
+    """The actions of a task, with their actors."""
     return {(a.name, frozenset(map(str, a.words))) for a in map(action_of, _facts(task))}
 
 

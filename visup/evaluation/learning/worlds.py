@@ -1,8 +1,7 @@
-"""Random worlds as runs to learn from: what is believed while the masks of a world are watched.
+"""Random worlds as runs to learn from: the mental model over time, given the masks of a world.
 
-Masks stand in for eyes, and the camera's true motion for that which eyes would see, so that learning is
-measured by itself: noise of a segmenter comes on top in practice. No picture is drawn, which leaves a few
-seconds for a world.
+True masks and the true camera motion replace perception, so that learning is measured in isolation; in
+practice noise of a segmenter is added. No image is rendered, so a world takes a few seconds.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from visup.runs.wiring import reasoning_agent
 
 
 def world_minds(world: World) -> tuple[Mind, ...]:
-    """What is believed of a world frame by frame, watched without a task."""
+    """The mental model of a world at each frame, without a task."""
     renderer = WorldRenderer(world)
     labels = {role: world.labels[name] for role, name in world.actors.items()}
     eyes = [TrueCamera(renderer.camera), *role_behaviours(renderer.mask, labels, FPS)]
@@ -46,10 +45,10 @@ def world_minds(world: World) -> tuple[Mind, ...]:
 
 
 class TrueCamera:
-    """A behaviour that reports how the picture of what rests has moved since the last frame.
+    """A behaviour that reports the true background motion since the last frame.
 
     Args:
-        camera: Of the world.
+        camera: The camera of the world.
     """
 
     contract = Contract("true_camera", gives=("camera",))
@@ -60,7 +59,7 @@ class TrueCamera:
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One motion for each frame."""
+        """One camera motion per frame."""
         motion = affine_motion(self._camera, max(0, frame.index - 1), frame.index, frame.size)
         yield self.contract.percept(frame, CameraMotion(motion))
 
@@ -68,7 +67,7 @@ class TrueCamera:
 def affine_motion(
     camera: PlateCamera, before: int, now: int, size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """(2, 3) the affine motion that comes closest to how the picture moved between two frames, pixels."""
+    """(2, 3) least-squares affine approximation of the image motion between two frames, pixels."""
     there, here = camera.to_plate(before), camera.to_plate(now)
     if there is None or here is None:
         return np.eye(2, 3)

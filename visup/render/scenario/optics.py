@@ -1,7 +1,7 @@
-"""The settings of a scenario that say how the scene is seen: camera, light, background, sensor.
+"""Imaging settings of a scenario: camera, light, background, sensor.
 
-What changes with time (zoom, the strength of the light, exposure) has keyframes and an `at`, which gives the
-settings as they are at a time.
+Settings that change over time (zoom, light strength, exposure) have keyframes and an `at`, which returns the
+settings at a given time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Seconds = Annotated[float, Field(ge=0)]
 
 
 class ScenarioModel(BaseModel):
-    """Settings that cannot be changed, and know of no other keys."""
+    """Immutable settings that reject unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -58,7 +58,7 @@ class CameraKey(ScenarioModel):
 
 
 class Shake(ScenarioModel):
-    """An unsteady hand."""
+    """Camera shake, as of an unsteady hand."""
 
     amplitude_deg: Annotated[float, Field(ge=0, le=5)]
     frequency_hz: Annotated[float, Field(gt=0, le=50)] = 1.0
@@ -78,14 +78,14 @@ class ZoomKey(ScenarioModel):
 
 
 class LightKey(ScenarioModel):
-    """How strong the light is at a time."""
+    """The strength of the light at a time."""
 
     at_s: Seconds = 0.0
     strength: Share
 
 
 class ExposureKey(ScenarioModel):
-    """How much the sensor makes of the light at a time."""
+    """The exposure of the sensor at a time."""
 
     at_s: Seconds = 0.0
     exposure: Exposure
@@ -106,7 +106,7 @@ class Camera(ScenarioModel):
     zoom: Annotated[tuple[ZoomKey, ...], AfterValidator(rising)] = ()
 
     def at(self, time: float) -> Camera:
-        """The camera as it is zoomed at a time."""
+        """The camera with its zoom at a time."""
         return _at(self, self.zoom, "fov_vertical_deg", time)
 
     @property
@@ -125,12 +125,12 @@ class Light(ScenarioModel):
     track: Annotated[tuple[LightKey, ...], AfterValidator(rising)] = ()
 
     def at(self, time: float) -> Light:
-        """The light as strong as it is at a time."""
+        """The light with its strength at a time."""
         return _at(self, self.track, "strength", time)
 
 
 class Stars(ScenarioModel):
-    """Stars that stand still in the world."""
+    """Stars, fixed in the world."""
 
     kind: Literal["stars"] = "stars"
     count: Annotated[int, Field(ge=0, le=100_000)] = 4000
@@ -139,7 +139,7 @@ class Stars(ScenarioModel):
 
 
 class Earth(ScenarioModel):
-    """A cloudy Earth with its limb before the stars; `light.earth` says where it is."""
+    """A cloudy Earth with its limb in front of the stars; `light.earth` gives its direction."""
 
     kind: Literal["earth"]
     altitude_km: Annotated[float, Field(ge=100, le=40_000)] = 300.0
@@ -161,7 +161,7 @@ class Panorama(ScenarioModel):
 
 
 class Texture(ScenarioModel):
-    """A pattern that goes through a body, as grain goes through wood."""
+    """A solid texture, which extends through a body like the grain of wood."""
 
     contrast: Annotated[float, Field(ge=0, le=1)] = 0.5
     size: Annotated[float, Field(gt=0)] = 0.3
@@ -169,7 +169,7 @@ class Texture(ScenarioModel):
 
 
 class Sensor(ScenarioModel):
-    """What the camera makes of the light."""
+    """The response of the camera to light."""
 
     exposure: Exposure = 1.0
     track: Annotated[tuple[ExposureKey, ...], AfterValidator(rising)] = ()
@@ -179,7 +179,7 @@ class Sensor(ScenarioModel):
     blur_px: Annotated[float, Field(ge=0, le=10)] = 0.5
 
     def at(self, time: float) -> Sensor:
-        """The sensor as it is exposed at a time."""
+        """The sensor with its exposure at a time."""
         return _at(self, self.track, "exposure", time)
 
 
@@ -187,7 +187,7 @@ Settings = TypeVar("Settings", Camera, Light, Sensor)
 
 
 def _at(settings: Settings, keys: tuple[Any, ...], name: str, time: float) -> Settings:
-    """The settings with one number as its keyframes say: straight between them, held outside."""
+    """The settings with one number interpolated linearly between its keyframes, constant outside them."""
     if not keys:
         return settings
     value = np.interp(time, [k.at_s for k in keys], [getattr(k, name) for k in keys])

@@ -1,6 +1,6 @@
-"""Scenario files: what is in the scene, how it moves, how it is lit, and what is true of it.
+"""Format of scenario files: objects, motion, light and ground truth of a scene.
 
-The format is told in ``docs/scenarios.md``. World coordinates are metres, right-handed; times are seconds.
+``docs/scenarios.md`` describes it. World coordinates are metres, right-handed; times are seconds.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from visup.render.scenario.optics import (
 
 
 class PoseKey(ScenarioModel):
-    """Where an object is at a time; at most one way to give its orientation, none for unturned."""
+    """The pose of an object at a time, with at most one form of orientation; none is the identity."""
 
     at_s: Seconds = 0.0
     position: Vector
@@ -47,7 +47,7 @@ class PoseKey(ScenarioModel):
 
 
 class TipKey(ScenarioModel):
-    """Where the tip of an arm is at a time, and the way its end effector points (world)."""
+    """The position of an arm's tip at a time, and the direction of its end effector (world)."""
 
     at_s: Seconds = 0.0
     position: Vector
@@ -62,7 +62,7 @@ class JointKey(ScenarioModel):
 
 
 class SteadyRotation(ScenarioModel):
-    """A steady turn about an axis of the world, from a time on, added to the track."""
+    """A constant rotation about a world axis from a time on, added to the track."""
 
     axis: Direction
     deg_per_s: float
@@ -73,16 +73,16 @@ Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(rising
 
 
 class Attachment(ScenarioModel):
-    """From a time on the object moves as if bolted to another (the tip, when that is an arm)."""
+    """A rigid attachment to another object from a time on (to the tip, when that is an arm)."""
 
     to: str
     from_s: Seconds
 
 
 class SceneObject(ScenarioModel):
-    """Something in the scene: a rigid body on a track, or an arm led by its tip or its joints.
+    """An object of the scene: a rigid body on a track, or an arm driven by its tip or its joints.
 
-    Objects with label 0 are scenery: they are seen but belong to the background.
+    Objects with label 0 are scenery: visible, but part of the background.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -117,7 +117,7 @@ class SceneObject(ScenarioModel):
 
 
 class StageTruth(ScenarioModel):
-    """A stage that a supervisor should see, and how it goes."""
+    """A stage that a supervisor should report, and its outcome."""
 
     stage: str
     from_s: Seconds
@@ -134,7 +134,7 @@ class AlertTruth(ScenarioModel):
 
 
 class CouplingTruth(ScenarioModel):
-    """Two objects take hold of each other, or let go."""
+    """Two objects couple or decouple."""
 
     kind: Literal["coupled", "decoupled"]
     objects: tuple[str, str]
@@ -142,7 +142,7 @@ class CouplingTruth(ScenarioModel):
 
 
 class ScenarioTruth(ScenarioModel):
-    """What is meant by the scene; the geometry gives the rest."""
+    """Ground truth that the geometry does not give."""
 
     verdict: Literal["succeeded", "failed", "interrupted", "in_progress"] = "in_progress"
     stage: tuple[StageTruth, ...] = ()
@@ -172,11 +172,11 @@ class Scenario(ScenarioModel):
 
     @property
     def labelled(self) -> tuple[SceneObject, ...]:
-        """The objects that have a label of their own, scenery left out."""
+        """The objects with a label, without scenery."""
         return tuple(o for o in self.object if o.label)
 
     def resized(self, size: tuple[int, int]) -> Scenario:
-        """The same scene on another number of pixels; the vertical field of view stays."""
+        """The same scene at another image size; the vertical field of view is unchanged."""
         return self.model_copy(update={"camera": self.camera.model_copy(update={"size": size})})
 
     @model_validator(mode="after")
@@ -219,7 +219,7 @@ def load_scenario(path: Path) -> Scenario:
         The scenario.
 
     Raises:
-        SettingsError: The file cannot be read, is not TOML, or has one fault.
+        SettingsError: The file cannot be read, is not TOML, or has one error.
         ErrorGroup: It has several.
     """
     try:
@@ -229,11 +229,11 @@ def load_scenario(path: Path) -> Scenario:
         raise SettingsError(
             f"the scenario cannot be read: {reason}", where=str(path), expected="a scenario in TOML"
         ) from error
-    return _beside(parse_scenario(text, str(path)), path.parent)
+    return _with_mesh_paths(parse_scenario(text, str(path)), path.parent)
 
 
 def parse_scenario(text: str, name: str = "scenario") -> Scenario:
-    """Check the text of a scenario; `name` is what messages call it. Raises as `load_scenario`."""
+    """Check the text of a scenario; `name` stands in messages. Raises as `load_scenario`."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -247,8 +247,8 @@ def parse_scenario(text: str, name: str = "scenario") -> Scenario:
         raise (faults[0] if len(faults) == 1 else ErrorGroup(faults)) from error
 
 
-def _beside(scenario: Scenario, folder: Path) -> Scenario:
-    """The scenario with its mesh files looked for beside the scenario's own file."""
+def _with_mesh_paths(scenario: Scenario, folder: Path) -> Scenario:
+    """The scenario with the paths of its mesh files relative to its own file."""
     items = [
         o.model_copy(update={"mesh": str(folder / o.mesh)}) if Path(o.mesh).suffix else o
         for o in scenario.object
@@ -257,7 +257,7 @@ def _beside(scenario: Scenario, folder: Path) -> Scenario:
 
 
 def _root_faults(error: ValidationError) -> list[dict[str, Any]]:
-    """The faults themselves, without those that only follow: a list is 'too short' once its items fell."""
+    """The root errors, without consequential ones: a list is 'too short' once its items are rejected."""
     found: list[dict[str, Any]] = [dict(e) for e in error.errors()]
     places = [e["loc"] for e in found]
     return [
@@ -268,7 +268,7 @@ def _root_faults(error: ValidationError) -> list[dict[str, Any]]:
 
 
 def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
-    """One fault that pydantic found, in the user's words."""
+    """A pydantic error in the user's terms."""
     steps = [
         s for s in error["loc"] if s not in ("stars", "earth", "panorama") or len(error["loc"]) == 1
     ]
@@ -286,7 +286,7 @@ def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
 
 
 def _place(name: str, text: str, steps: list[Any]) -> SourceLocation | None:
-    """The line where a key stands, when its word occurs only once in the file."""
+    """The line of a key, if it occurs only once in the file."""
     keys = [s for s in steps if isinstance(s, str)]
     if not keys:
         return None
