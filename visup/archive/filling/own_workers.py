@@ -128,7 +128,12 @@ def _preloaded_forkserver(distributed: Any) -> Iterator[None]:
 
     A replacement is ready at once, and the modules are in memory once.
     """
-    changed: dict[str, Any] = {"distributed.deploy.lost-worker-timeout": f"{START_S} s"}
+    changed: dict[str, Any] = {
+        "distributed.deploy.lost-worker-timeout": f"{START_S} s",
+        # Both sample the working thread, up to 1,000 times a second, for figures that nothing reads here.
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.gil.enabled": False,
+    }
     if "forkserver" in multiprocessing.get_all_start_methods():
         changed["distributed.worker.multiprocessing-method"] = "forkserver"
     with imported("dask").config.set(changed):

@@ -102,7 +102,9 @@ def _on_worker(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
 
 def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
     distributed, client = imported("distributed"), pool.client
-    book, running = PieceBook(jobs), dict[Any, tuple[ClipPiece, int]]()
+    # The longest first, so that no worker is left with a long clip at the end (LPT scheduling).
+    book = PieceBook(sorted(jobs, key=lambda job: job.bytes, reverse=True))
+    running: dict[Any, tuple[ClipPiece, int]] = {}
     completed = distributed.as_completed(raise_errors=False)
 
     def submit(piece: ClipPiece | None, resubmissions: int = 0) -> None:
