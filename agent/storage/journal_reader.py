@@ -6,7 +6,7 @@ import json
 import math
 import sqlite3
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,9 +123,14 @@ class Recording:
         for path, (index, data, crc) in self._rows(sql, (after,)):
             yield _observation_of(path, index, data, crc)
 
-    def moments(self) -> Iterator[tuple[int, float]]:
-        """Number and time (seconds) of each processed frame, in order."""
-        rows = self._rows("SELECT frame_index, time FROM steps ORDER BY frame_index")
+    def moments(self, after: int = -1) -> Iterator[tuple[int, float]]:
+        """Number and time (seconds) of each processed frame, in order.
+
+        Args:
+            after: Only frames with a higher number.
+        """
+        sql = "SELECT frame_index, time FROM steps WHERE frame_index > ? ORDER BY frame_index"
+        rows = self._rows(sql, (after,))
         return ((int(index), float(time)) for _, (index, time) in rows)
 
     def summary_at(self, frame: int) -> dict[str, Any]:
@@ -138,6 +143,20 @@ class Recording:
         for _, (index, time, text) in self._rows(sql, (frame,)):
             return {"frame_index": index, "time": time, **self._record(text)}
         raise self._no_step(frame)
+
+    def summaries_of(self, frames: Sequence[int]) -> Iterator[dict[str, Any]]:
+        """Summaries of some steps, as `summary_at`; those that are damaged or missing are left out.
+
+        Args:
+            frames: Numbers of a few hundred frames at most.
+        """
+        places = ",".join("?" * len(frames))
+        sql = f"SELECT frame_index, time, summary FROM steps WHERE frame_index IN ({places})"
+        for _, (index, time, text) in self._rows(f"{sql} ORDER BY frame_index", tuple(frames)):
+            try:
+                yield {"frame_index": index, "time": time, **self._record(text)}
+            except OutputError:
+                continue
 
     def step_at(self, frame: int) -> tuple[dict[str, Any], Observation]:
         """The summary of the beliefs after one step, and its observation.

@@ -75,6 +75,8 @@ class ImageFolder(VideoSource):
         )
 
     def _next(self) -> Frame | None:
+        while self._at < self.span[0]:
+            self._at += self.every
         index = self._at
         if index >= len(self._files):
             return None

@@ -220,7 +220,7 @@ class RosBag(VideoSource):
         try:
             for index, (stamp, kind, data) in self._messages:
                 time = self._clock.time(index, stamp)
-                if index % self.every == 0:
+                if index % self.every == 0 and index >= self.span[0]:
                     return Frame(index, time, self._image(kind, data))
         except UnreadableImageError as fault:
             problem = f"picture {index} of {self.frame_count} {fault}"

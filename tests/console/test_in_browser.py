@@ -11,12 +11,13 @@ from shutil import rmtree
 import numpy as np
 import pytest
 
-from tests.archive.recordings import record
+from tests.archive.recordings import meeting, record
 from tests.clips import write_clip
 from tests.console.running import OPERATOR, VIEWER
 from tests.console.test_runs import SETTINGS, doubtful
 from tests.paths import ROOT
 from tests.teaching.browser import Browser, found_browser
+from visup.agent import Observation
 from visup.console.feedback import read_feedback
 from visup.console.workbench.remembering import MODELS
 from visup.percepts.shape.database.model_database import ModelDatabase
@@ -256,6 +257,30 @@ def test_a_question_is_answered_to_see_what_would_have_followed(
     press(browser, "spartan")
     shows(browser, "as if object 1 were said to be spartan")
     assert violations(browser) == []
+
+
+def test_a_page_follows_a_run_that_goes_on(browser: Browser, address: str, folder: Path) -> None:
+    rows = "document.querySelector('.labels').innerText"
+
+    def looked_at() -> Iterator[Observation]:
+        for number, perceived in enumerate(meeting()):
+            if number == 30:
+                enter(browser, address)
+                follow(browser, "live")
+                browser.press("End")
+                shows(browser, "frame 2")
+                assert "captured" not in browser.value(rows)
+            yield perceived
+
+    try:
+        record(folder / "live", looked_at(), SETTINGS, ended=None)
+        shows(browser, "frame 59")
+        assert "captured" in browser.value(rows)
+        tab(browser, "Events")
+        shows(browser, "Task 'dock' is interrupted")
+        assert violations(browser) == []
+    finally:
+        rmtree(folder / "live")
 
 
 def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: Path) -> None:

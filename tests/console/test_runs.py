@@ -58,6 +58,35 @@ def test_what_is_read_is_what_was_believed(run: tuple[Path, Sequence[Step]]) -> 
         assert {a.id for a in read.alerts} == {a.id for a in mind.alerts}
 
 
+def test_a_view_that_reads_on_is_that_of_the_whole_run(tmp_path: Path) -> None:
+    folder, views = tmp_path / "a", list[RunView]()
+
+    def looked_at() -> Iterator[Observation]:
+        for number, perceived in enumerate(meeting()):
+            if number in (20, 21, 45):
+                views.append(views[-1].refreshed() if views else RunView(folder))
+                assert not views[-1].ended
+            yield perceived
+
+    record(folder, looked_at(), SETTINGS)
+    view, whole = views[-1].refreshed(), RunView(folder)
+    assert len(views[0].frames) < len(views[-1].frames) < len(view.frames) == 60
+    assert (view.frames, view.times, view.ended) == (whole.frames, whole.times, True)
+    assert (view.tracks, view.events, view.alerts) == (whole.tracks, whole.events, whole.alerts)
+    assert view.pictures is not None
+    assert view.refreshed() is view
+
+
+def test_a_run_that_was_taken_back_is_read_anew(tmp_path: Path) -> None:
+    """A run that is resumed from an earlier step does the later ones again."""
+    record(tmp_path / "a", meeting(), SETTINGS, ended=None)
+    view = RunView(tmp_path / "a")
+    with closing(sqlite3.connect(tmp_path / "a" / JOURNAL)) as db:
+        db.execute("DELETE FROM steps WHERE frame_index >= 40")
+        db.commit()
+    assert view.refreshed().frames == list(range(40))
+
+
 def test_every_moment_has_its_picture(run: tuple[Path, Sequence[Step]]) -> None:
     view = RunView(run[0])
     width, height = view.mind(0).frame_size

@@ -46,11 +46,16 @@ MOST_SAMPLES = 240
 """Maximum number of samples for a curve or row."""
 
 
+CARRIED = ("pictures", "settings", "models", "flows", "zones")
+"""What stays the same while a run grows."""
+
+
 class RunView:
     """A run as far as it was written when opened; `refreshed` reads on.
 
     Args:
         folder: Folder of the run.
+        before: An earlier view of the same run: only what was written since is read.
 
     Attributes:
         folder: The same.
@@ -61,24 +66,31 @@ class RunView:
         OutputError: It cannot be read.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, before: RunView | None = None) -> None:
         self.folder = folder
         self._run = open_run(folder)
-        moments = list(self._run.recording.moments())
-        self.frames = [frame for frame, _ in moments]
-        self.times = [time for _, time in moments]
+        self.frames: list[int] = list(before.frames) if before else []
+        self.times: list[float] = list(before.times) if before else []
+        moments = list(self._run.recording.moments(self.frames[-1] if self.frames else -1))
+        self.frames += [frame for frame, _ in moments]
+        self.times += [time for _, time in moments]
+        if before is not None:
+            self.__dict__ |= {k: v for k, v in before.__dict__.items() if k in CARRIED}
         self._moments: OrderedDict[int, tuple[Mind, Observation]] = OrderedDict()
         self._lock = Lock()
 
     def refreshed(self) -> RunView:
-        """This run, read again if it has grown."""
+        """This run, read on if it has grown or ended."""
         ends = self._run.recording.first_and_last()
-        if ends is None or (self.frames and ends[1] == self.frames[-1]):
+        same = ends is None or (bool(self.frames) and ends[1] == self.frames[-1])
+        if same and (self.ended or "ended" not in self._run.recording.facts()):
             return self
-        refreshed_view = RunView(self.folder)
-        if "pictures" in self.__dict__:
-            refreshed_view.__dict__["pictures"] = self.pictures
-        return refreshed_view
+        return RunView(self.folder, self if self._continues() else None)
+
+    def _continues(self) -> bool:
+        """Whether the journal still ends this view as it did; a run that was resumed may have gone back."""
+        moments = self._run.recording.moments(self.frames[-1] - 1 if self.frames else -1)
+        return next(moments, None) == (self.frames[-1], self.times[-1]) if self.frames else False
 
     @property
     def ended(self) -> bool:
@@ -279,13 +291,9 @@ class RunView:
 
         An approximation for runs of days: shorter changes may be missed. Unreadable moments are left out.
         """
-        step = max(1, len(self.frames) // MOST_SAMPLES)
-        for number in range(0, len(self.frames), step):
-            try:
-                told = self._run.recording.summary_at(self.frames[number])
-            except OutputError:
-                continue
-            yield self.times[number], told
+        step = max(1, -(-len(self.frames) // MOST_SAMPLES))
+        for told in self._run.recording.summaries_of(self.frames[::step]):
+            yield float(told["time"]), told
 
 
 def clock_text(seconds: float) -> str:

@@ -22,7 +22,7 @@ KEPT_BYTES = 1 << 26
 """Frames that were passed are kept up to so many bytes, so that going back a little costs nothing."""
 
 NEAR = 40
-"""Frames further ahead than so many are reached by passing over those between undecoded."""
+"""Frames further ahead than so many are reached by passing over those before them undecoded."""
 
 Picture = NDArray[np.uint8]
 
@@ -84,14 +84,25 @@ class ClipFrames:
             return self._kept[number]
         if number < 0 or self._source is None:
             raise self._missing(number)
-        if not self._source.live and not self._next <= number < self._next + NEAR:
-            return self._jump(number)
-        return self._read_on(self._source, number)
+        return self._read_on(self._at_or_before(self._source, number), number)
+
+    def _at_or_before(self, source: VideoSource, number: int) -> VideoSource:
+        """The source at or before a frame; what lies before a far one will be passed over undecoded."""
+        if source.live:
+            return source
+        if number < self._next:
+            source.close()
+            source, self._next = open_source(self.name), 0
+            self._source = source
+        if number >= self._next + NEAR:
+            source.span = (number, None)
+        return source
 
     def _read_on(self, source: VideoSource, number: int) -> Picture:
         while self._next <= number:
             frame = next(source, None)
             if frame is None:
+                self._next = number + 1  # so that a frame before is looked for from the start
                 raise self._missing(number)
             self._next = frame.index + 1
             self._keep(frame)
@@ -100,15 +111,6 @@ class ClipFrames:
                 f"frame {number} has gone by", where=self.name, hint="a camera cannot be rewound"
             )
         return self._kept[number]
-
-    def _jump(self, number: int) -> Picture:
-        """A frame far from the last one: what lies between is passed over, which is faster."""
-        with open_source(self.name, every=max(1, number)) as source:
-            for frame in source:
-                self._keep(frame)
-                if frame.index >= number:
-                    return frame.image
-        raise self._missing(number)
 
     def _keep(self, frame: Frame) -> None:
         self._kept[frame.index] = frame.image

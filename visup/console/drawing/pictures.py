@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from pathlib import Path
 from threading import Lock
 
@@ -16,6 +17,7 @@ from visup.runs.replay_report import GREY
 from visup.teaching.clip_frames import ClipFrames
 
 QUALITY = 85
+KEPT_PICTURES = 32
 Picture = NDArray[np.uint8]
 
 
@@ -34,6 +36,7 @@ class RunPictures:
 
     def __init__(self, source: str) -> None:
         self._lock, self._frames = Lock(), None
+        self._drawing, self._drawn = Lock(), OrderedDict[tuple[int, bool], bytes]()
         self.problem = ""
         path = Path(source)
         if not source or not (path.is_file() or path.is_dir()):
@@ -66,9 +69,18 @@ class RunPictures:
         return found if found.shape[:2] == mind.frame_size[::-1] else None
 
     def drawn(self, mind: Mind, *, plain: bool = False) -> bytes:
-        """A moment as JPEG, with the beliefs drawn over it unless `plain`."""
-        image = self.frame(mind)
-        return jpeg(image if plain else annotate(image, mind))
+        """A moment as JPEG, with the beliefs drawn over it unless `plain`.
+
+        Pages that follow a run ask for the same moments, so the last ones are kept.
+        """
+        which = mind.frame_index, plain
+        with self._drawing:
+            if which not in self._drawn:
+                image = self.frame(mind)
+                self._drawn[which] = jpeg(image if plain else annotate(image, mind))
+                if len(self._drawn) > KEPT_PICTURES:
+                    self._drawn.popitem(last=False)
+            return self._drawn[which]
 
 
 def jpeg(image: Picture) -> bytes:

@@ -44,10 +44,26 @@ class Playhead:
     drawn: list[tuple[float, float]] = field(default_factory=list)
     pen: bool = False
     _listeners: list[tuple[Listener, str | None]] = field(default_factory=list)
+    _growth_listeners: list[Listener] = field(default_factory=list)
 
     def listen(self, listener: Listener, panel: str | None = None) -> None:
         """Call a listener on every move; with `panel`, only while that panel is open."""
         self._listeners.append((listener, panel))
+
+    def listen_to_growth(self, listener: Listener) -> None:
+        """Call a listener whenever more of a live run was read."""
+        self._growth_listeners.append(listener)
+
+    def grow(self, run: RunView) -> None:
+        """Replace the run by a later view of it; a cursor at its end stays at the end."""
+        at_end = self.number >= len(self.run.frames) - 1
+        self.run = run
+        for listener in self._growth_listeners:
+            listener()
+        if at_end:
+            self.go(len(run.frames) - 1)
+        else:
+            self._notify()
 
     def open_panel(self, name: str) -> None:
         """Open another panel and update it."""

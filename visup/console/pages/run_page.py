@@ -19,8 +19,8 @@ from visup.console.pages.panels.try_panel import try_panel
 from visup.console.pages.panels.write_panel import write_panel
 from visup.console.pages.picture import RunPicture
 from visup.console.pages.playhead import SLIDER_STEP, SPEEDS, TICK_S, Playhead
-from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
+from visup.console.tracks import TimelineTrack
 
 REFRESH_S = 2.0
 """Interval of checks whether a live run has grown, seconds."""
@@ -100,10 +100,9 @@ def _timeline(head: Playhead) -> None:
             "update:model-value", lambda e: head.pull(float(e.args)), throttle=0.05
         )
         with ui.element("div").classes("labels").props("aria-hidden=true"):
-            for track in head.run.tracks:
-                ui.label(shown_text(track.label)).props(f'title="{track.group}"')
+            _track_labels(head)
         with ui.element("div").classes("bars") as bars:
-            ui.html(timeline_svg(head.run.tracks, head.run.seconds, head.run.start), sanitize=False)
+            drawing = ui.html("", sanitize=False)
             cursor = ui.element("div").classes("cursor")
     bars.on(
         "click",
@@ -117,8 +116,34 @@ def _timeline(head: Playhead) -> None:
         cursor.style(f"left:{100 * share:.3f}%")
         slider.set_value(round(share, 3))
 
+    def draw() -> None:
+        run = head.run
+        drawing.set_content(timeline_svg(run.tracks, run.seconds, run.start))
+
     head.listen(show)
+    head.listen_to_growth(draw)
+    draw()
     show()
+
+
+def _track_labels(head: Playhead) -> None:
+    """The names of the rows of the timeline; a live run gets new ones."""
+    shown: list[TimelineTrack] = []
+
+    @ui.refreshable
+    def labels() -> None:
+        for track in shown:
+            ui.label(shown_text(track.label)).props(f'title="{track.group}"')
+
+    def grown() -> None:
+        now = list(head.run.tracks)
+        if [(t.group, t.label) for t in now] != [(t.group, t.label) for t in shown]:
+            shown[:] = now
+            labels.refresh()
+
+    shown[:] = head.run.tracks
+    labels()
+    head.listen_to_growth(grown)
 
 
 def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
@@ -172,13 +197,12 @@ def _follow(state: ConsoleState, key: str, head: Playhead) -> None:
 
     def look() -> None:
         try:
-            grown: RunView = state.view(key, refresh=True)
+            grown = state.view(key, refresh=True)
         except VisupError:
             return
         if grown is not head.run:
-            at_end = head.number >= len(head.run.frames) - 1
-            head.run = grown
-            if at_end:
-                head.go(len(grown.frames) - 1)
+            head.grow(grown)
+        if grown.ended:
+            timer.cancel()
 
-    ui.timer(REFRESH_S, look)
+    timer = ui.timer(REFRESH_S, look)

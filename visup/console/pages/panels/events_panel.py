@@ -22,7 +22,13 @@ MOST_LINES = 200
 
 def events_panel(head: Playhead) -> None:
     """Lay out the events; those up to the cursor are marked."""
-    worded = worded_once(head.run.events)
+    worded = list(worded_once(head.run.events))
+    read = [len(head.run.events)]
+
+    def read_on() -> None:
+        if len(head.run.events) != read[0]:
+            read[0] = len(head.run.events)
+            worded[:] = worded_once(head.run.events)
 
     @ui.refreshable
     def lines() -> None:
@@ -35,6 +41,7 @@ def events_panel(head: Playhead) -> None:
 
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Events"'):
         lines()
+    head.listen_to_growth(read_on)
     head.listen(lines.refresh, "Events")
 
 
@@ -82,4 +89,12 @@ def alerts_panel(head: Playhead, key: str, role: ConsoleRole) -> None:
     ui.checkbox("only alerts open at the cursor", on_change=lambda e: only_open(bool(e.value)))
     with ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"'):
         listed()
+    shown = [head.run.alerts]
+
+    def read_on() -> None:
+        if head.run.alerts != shown[0]:
+            shown[0] = head.run.alerts
+            listed.refresh()
+
+    head.listen_to_growth(read_on)
     head.listen(lambda: listed.refresh() if wanted["open"] else None, "Alerts")
