@@ -270,11 +270,13 @@ def test_a_page_follows_a_run_that_goes_on(browser: Browser, address: str, folde
                 browser.press("End")
                 shows(browser, "frame 2")
                 assert "captured" not in browser.value(rows)
+                shows(browser, "running")
             yield perceived
 
     try:
-        record(folder / "live", looked_at(), SETTINGS, ended=None)
+        record(folder / "live", looked_at(), SETTINGS)
         shows(browser, "frame 59")
+        browser.until("document.querySelector('header')?.innerText.includes('interrupted')")
         assert "captured" in browser.value(rows)
         tab(browser, "Events")
         shows(browser, "Task 'dock' is interrupted")

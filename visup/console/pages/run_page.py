@@ -46,7 +46,7 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
         return
     head = Playhead(run)
     with page_frame(run.name):
-        verdict_badge(run.verdict, ended=run.ended)
+        _verdict(head)
         button("keyboard", "Keys (?)", show_keys)
     if not run.frames:
         ui.label("Nothing has been processed in this run yet.").classes("card w-full")
@@ -63,6 +63,17 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
     head.go_to_time(begin)
     if not run.ended:
         _follow(state, key, head)
+
+
+def _verdict(head: Playhead) -> None:
+    """The verdict of the run; that of a live one is there once it has ended."""
+
+    @ui.refreshable
+    def verdict() -> None:
+        verdict_badge(head.run.verdict, ended=head.run.ended)
+
+    verdict()
+    head.listen_to_growth(lambda: verdict.refresh() if head.run.ended else None)
 
 
 def _controls(head: Playhead) -> None:
