@@ -8,6 +8,7 @@ from run to run where several processes share the tests. Ordinary runs do withou
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 from pathlib import Path
@@ -30,7 +31,13 @@ class SameProvider(HypothesisProvider):
 
 AVAILABLE_PROVIDERS["visup-same"] = SameProvider
 settings.register_profile(
-    "same", derandomize=True, deadline=None, backend="visup-same", max_examples=50
+    "same", derandomize=True, deadline=None, backend="visup-same", max_examples=30
 )
 settings.register_profile("explore", deadline=None, print_blob=True, max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of tests and all modules stay to the end: the garbage collector need not look at them."""
+    gc.collect()
+    gc.freeze()
