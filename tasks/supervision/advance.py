@@ -251,7 +251,8 @@ class Advance:
         begun = (x.payload.begun for x in left)
         turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
         told = joined(self._told(x, transition) for x in left)
-        return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told))
+        earliest = max((_earliest_end(x) for x in left), default=-math.inf)
+        return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told, earliest=earliest))
 
     def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
         """The reports after a step is completed: about it and its predecessors."""
@@ -315,6 +316,14 @@ class Advance:
         """Since when a step's action has been contradicted, or None."""
         contrary = self.observe(step).contrary
         return None if contrary is None else contrary.since
+
+
+def _earliest_end(left: Leaf[StepMonitor]) -> float:
+    """The earliest time at which a completed step can have ended."""
+    monitor = left.payload
+    if left.step.hold_s is not None and monitor.fulfilled_at is not None:
+        return monitor.fulfilled_at
+    return monitor.entered if monitor.begun is None else monitor.begun
 
 
 def _may_end(transition: OpenTransition) -> bool:

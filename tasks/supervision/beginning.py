@@ -1,12 +1,17 @@
-"""Which stages have begun: a stage waits in its turn until there is evidence of it."""
+"""Which stages have begun, and when: a stage waits in its turn until there is evidence of it."""
 
 from __future__ import annotations
 
-from visup.agent import StageBelief, Status
+from collections.abc import Iterator
+
+from visup.agent import Mind, StageBelief, Status, TaskBelief
 from visup.agent.model.fast_replace import replace
+from visup.rules.relations.reasoner import sample_window
 from visup.tasks.automaton.states import leaves
 from visup.tasks.supervision.hypotheses import TaskHypotheses
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
+from visup.tasks.verification.dating import stage_onset
 from visup.tasks.verification.setting_out import setting_out
 
 
@@ -37,6 +42,37 @@ def _begun(before: StageBelief, now: StageBelief, stirs: bool) -> bool:
         return before.begun
     anew = before.status is Status.DONE and now.status is Status.ACTIVE
     return stirs or (before.begun and not anew) or now.status not in (Status.ACTIVE, Status.UNKNOWN)
+
+
+def stage_onsets(
+    model: MonitoredPhases,
+    before: TaskBelief,
+    now: TaskBelief,
+    posterior: TaskHypotheses | None,
+    mind: Mind,
+) -> Iterator[tuple[str, float]]:
+    """When each stage most probably began that is believed to have begun since the last step.
+
+    Args:
+        model: The task.
+        before: The previous belief.
+        now: The present one.
+        posterior: The hypotheses from which it is derived.
+        mind: The mind.
+
+    Yields:
+        Stage and seconds; see `stage_onset`.
+    """
+    begun = {s.stage for s in before.stages if s.begun}
+    anew = [s.stage for s in now.stages if s.begun and s.stage not in begun]
+    if not anew or posterior is None:
+        return
+    objects = TaskSnapshot(mind, now.bindings, model).objects
+    steps, window = leaves(posterior.likeliest.state), sample_window(mind)
+    for stage in anew:
+        mine = [x for x in steps if x.step.stage == stage]
+        if mine:
+            yield stage, stage_onset(mine, model.actions, objects, mind.time, window)
 
 
 CAME_LATER_S = 0.3

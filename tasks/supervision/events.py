@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from visup.agent import (
     AlertCondition,
@@ -33,11 +34,22 @@ KINDS = {
     Status.DONE: "stage_done",
     Status.UNKNOWN: "stage_unknown",
 }
+WORTH_SAYING_S = 0.25
+"""A beginning is dated back in its sentence if it is at least this long ago, seconds."""
+
+NOTHING: Mapping[str, float] = MappingProxyType({})
+
 GOES_ON = (Status.ACTIVE, Status.PROGRESSING, Status.STALLED)
 """Statuses after a pause for which only the resumption is reported."""
 
 
-def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) -> Iterator[Event]:
+def stage_events(
+    before: TaskBelief,
+    now: TaskBelief,
+    mind: Mind,
+    task: Task,
+    onsets: Mapping[str, float] = NOTHING,
+) -> Iterator[Event]:
     """Events of what changed between two beliefs about a task.
 
     Args:
@@ -45,6 +57,7 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
         now: The belief of this step.
         mind: The mind, for the time; it may still hold the old belief.
         task: The task, for the texts of its stages.
+        onsets: Stage that begins now -> when it most probably began, seconds; now if it is not given.
 
     Yields:
         Events of stages in the order of the task, then a change of the verdict.
@@ -62,6 +75,7 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
             if first and kind == "stage_started" and event.objects:
                 event = replace(event, text=_introduction(stage, now, mind))
             if kind == "stage_started":
+                event = _dated(event, onsets.get(stage.stage, mind.time))
                 event = replace(event, text=event.text + _own_words(stage.stage, before, task))
             yield event
     if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
@@ -185,6 +199,15 @@ def _stage_event(
         Severity.WARNING if bad else Severity.INFO,
         {"task": belief.task, "stage": stage.stage, "status": str(stage.status)},
     )
+
+
+def _dated(event: Event, began: float) -> Event:
+    """The beginning of a stage with the time at which it most probably began, said if that is earlier."""
+    data = {**event.data, "began": round(began, 3)}
+    if event.time - began < WORTH_SAYING_S:
+        return replace(event, data=data)
+    text = event.text.replace(" has begun", f" has begun, at about {began:.1f} s", 1)
+    return replace(event, data=data, text=text)
 
 
 def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:

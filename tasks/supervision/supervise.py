@@ -37,7 +37,7 @@ from visup.tasks.casting.matching import (
     unexplained,
 )
 from visup.tasks.grammar.nodes import Task
-from visup.tasks.supervision.beginning import is_first, stirring, with_begun
+from visup.tasks.supervision.beginning import is_first, stage_onsets, stirring, with_begun
 from visup.tasks.supervision.belief import (
     failed_belief,
     pending_stages,
@@ -285,7 +285,8 @@ def _events(
     yield from activity_events(memory.activity, new.activity, new.belief, mind)
     if not new.activity.reportable and memory.activity.reportable:
         return  # the end of its activity is the only event
-    yield from stage_events(memory.belief, new.belief, mind, model.task)
+    onsets = dict(stage_onsets(model, memory.belief, new.belief, new.posterior, mind))
+    yield from stage_events(memory.belief, new.belief, mind, model.task, onsets)
     yield from revision_events(memory.belief, new.belief, _revised(memory, new), mind)
     yield from invariant_events(model, memory, new, mind)
 

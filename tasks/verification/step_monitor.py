@@ -72,6 +72,8 @@ class StepMonitor:
         hasty_s: Delay after which it began, if the course requires a longer one; else None.
         fulfilled_at: When it was first fulfilled, or None.
         told: Reported relations of it and of earlier steps; incompatible ones are reported to begin later.
+        earliest: The earliest time at which it can have begun: when the previous step was first observed, or
+            had lasted as long as required.
     """
 
     entered: float
@@ -105,6 +107,7 @@ class StepMonitor:
     hasty_s: float | None = None
     fulfilled_at: float | None = None
     told: ReportedRelations = ()
+    earliest: float = -math.inf
 
     @property
     def begun_anew(self) -> bool:

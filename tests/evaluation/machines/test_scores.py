@@ -78,6 +78,13 @@ def test_beyond_the_tolerance_no_stage_counts(by: float) -> None:
     assert machine_scores(shifted(PERFECT, by), TRUTH)["stage_f1"] == 0.0
 
 
+def test_a_report_that_comes_late_is_wrong_though_it_states_the_right_beginning() -> None:
+    late = tuple(replace(s, time=s.time + 2.0, began=s.time) for s in PERFECT.stages)
+    scores = machine_scores(replace(PERFECT, stages=late), TRUTH)
+    assert (scores["stage_f1"], scores["stage_dated_f1"]) == (0.0, 1.0)
+    assert machine_total([scores])["stage_dated_f1"] == 1.0
+
+
 @pytest.mark.parametrize("by", [-1.1, 1.1])
 def test_beyond_a_second_no_interval_counts(by: float) -> None:
     scores = machine_scores(shifted(PERFECT, by), TRUTH)

@@ -55,3 +55,48 @@ def test_what_the_stage_before_asked_for_already_does_not_begin_the_next() -> No
     nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = carried(Spell("moving_together", 3.0, 12.0), nears)
     assert begun(script, text)["carry"] == pytest.approx(8.0, abs=0.4)
+
+
+def dated(script: Script, text: str, until: float = 14.0) -> dict[str, tuple[float, float]]:
+    """Stage -> when its beginning was reported, and when it is said to have begun."""
+    events = watch(script, until, text).events
+    told = (e for e in events if e.kind == "stage_started")
+    return {str(e.data["stage"]): (e.time, float(e.data["began"])) for e in told}
+
+
+RETREAT = """
+<t>    ::= <near> <hold> <away>
+<near> ::= converging(arm, satellite)
+<hold> ::= touching(arm, satellite)
+<away> ::= diverging(arm, satellite)
+"""
+
+
+def retreat(leaves: float) -> Script:
+    near, hold = Spell("converging", 0.5, 2.0), Spell("touching", 2.0, leaves)
+    return Script((near, hold, Spell("diverging", leaves, 12.0)))
+
+
+@pytest.mark.parametrize("leaves", [4.0, 6.5])
+def test_a_retreat_is_dated_to_its_onset(leaves: float) -> None:
+    told, began = dated(retreat(leaves), RETREAT)["away"]
+    assert told >= began == pytest.approx(leaves, abs=0.11)
+
+
+def test_a_contact_is_not_dated_back() -> None:
+    told, began = dated(retreat(6.0), RETREAT)["hold"]
+    assert told == began == pytest.approx(2.2, abs=0.11)
+
+
+def test_no_stage_is_dated_before_the_one_before_it_or_after_its_report() -> None:
+    begins = list(dated(retreat(2.3), RETREAT).values())
+    assert all(began <= told for told, began in begins)
+    assert [b for _, b in begins] == sorted(b for _, b in begins)
+
+
+def test_what_lasted_from_before_is_dated_to_the_end_of_the_stage_before_it() -> None:
+    text = RETREAT.replace("touching(arm, satellite)", "keeping_distance(arm, satellite) for 3 s")
+    keeps, drifts = Spell("keeping_distance", 2.0, 9.0), Spell("diverging", 3.0, 12.0)
+    script = Script((Spell("converging", 0.5, 2.0), keeps, drifts))
+    told, began = dated(script, text)["away"]
+    assert 5.0 - 0.11 <= began <= told

@@ -65,7 +65,7 @@ SCENE_EVALUATIONS = (
         "visup.evaluation.machines.runner:evaluate_machines",
         "watching",
         (
-            *("verdict", "verdicts_right", "stage_f1", "actors"),
+            *("verdict", "verdicts_right", "stage_f1", "stage_dated_f1", "actors"),
             *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
         ),
         (
@@ -110,7 +110,7 @@ SCENE_EVALUATIONS = (
         f"{_ADAPTERS}:random_worlds",
         "rendering and watching",
         (
-            *("verdicts_right", "verdicts", "stage_f1", "actors"),
+            *("verdicts_right", "verdicts", "stage_f1", "stage_dated_f1", "actors"),
             *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
         ),
         (

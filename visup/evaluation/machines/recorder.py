@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 from visup.agent import Event, Frame, Mind, Presence, Severity, Truth, Verdict
@@ -165,12 +165,12 @@ def told_stages(events: Sequence[Event], unsafe: str | None = None) -> tuple[Rep
         name = str(event.data.get("stage", ""))
         at = next((k for k in reversed(range(len(told))) if told[k].stage == name), None)
         if event.kind == "stage_started":
-            told.append(ReportedStage(name, event.time, "complete"))
+            told.append(ReportedStage(name, event.time, "complete", event.data.get("began")))
         elif at is not None and event.kind in _OUTCOMES:
-            told[at] = ReportedStage(name, told[at].time, _OUTCOMES[event.kind])
+            told[at] = replace(told[at], outcome=_OUTCOMES[event.kind])
     last = next((k for k in reversed(range(len(told))) if told[k].stage == unsafe), None)
     if last is not None:
-        told[last] = ReportedStage(told[last].stage, told[last].time, "unsafe")
+        told[last] = replace(told[last], outcome="unsafe")
     return tuple(told)
 
 

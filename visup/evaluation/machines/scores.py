@@ -7,7 +7,7 @@ truth (`MachineTruth`) are plain records and are compared only here.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from visup.evaluation.missions.scores import TrueStage, precision_recall_f1
@@ -65,11 +65,24 @@ class MachineTruth:
 
 @dataclass(frozen=True, slots=True)
 class ReportedStage:
-    """A reported stage: name, reported beginning, final outcome."""
+    """A reported stage.
+
+    Attributes:
+        stage: Its name.
+        time: When its beginning was reported, seconds.
+        outcome: Its final outcome.
+        began: When it began according to that report, seconds; None for the time of the report.
+    """
 
     stage: str
     time: float
     outcome: str
+    began: float | None = None
+
+    @property
+    def dated(self) -> ReportedStage:
+        """The same stage as if it had been reported when it began."""
+        return self if self.began is None else replace(self, time=self.began, began=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +126,17 @@ def machine_scores(report: MachineReport, truth: MachineTruth) -> dict[str, Any]
     """
     end = report.seconds if report.seconds > 0.0 else float("inf")
     stages = [s for s in truth.stages if s.from_s <= end]
+    dated = [s.dated for s in report.stages]
     found = actor_counts(report.boxes or {}, truth.boxes)
     scores: dict[str, Any] = {
         "stage_counts": list(matched_stages(report.stages, stages, truth.tolerance_s)),
+        "stage_dated_counts": list(matched_stages(dated, stages, truth.tolerance_s)),
         "actor_counts": list(found),
         "false_alerts": false_alerts(report.alerts, truth),
         "minutes": max(report.seconds, 1.0) / 60,
         "verdict": report.verdict,
         "told": [f"{s.stage} {s.time:.1f} {s.outcome}" for s in report.stages],
+        "began": [s.dated.time for s in report.stages],
     }
     if truth.accept:
         scores |= {"verdicts_right": int(report.verdict in truth.accept), "verdicts": 1}
@@ -145,6 +161,7 @@ def figures_of(counted: Mapping[str, Any]) -> dict[str, Any]:
     if sum(counted["stage_counts"]):
         names = ("stage_precision", "stage_recall", "stage_f1")
         figures |= dict(zip(names, precision_recall_f1(*counted["stage_counts"]), strict=True))
+        figures["stage_dated_f1"] = precision_recall_f1(*counted["stage_dated_counts"])[2]
     if counted["actor_counts"][1]:
         figures["actors"] = counted["actor_counts"][0] / counted["actor_counts"][1]
     for kind in ("contact", "move"):
@@ -169,7 +186,13 @@ def machine_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return total | (figures_of(total) if items else {})
 
 
-COUNTED = {"stage_counts": 3, "actor_counts": 2, "contact_counts": 3, "move_counts": 3}
+COUNTED = {
+    "stage_counts": 3,
+    "stage_dated_counts": 3,
+    "actor_counts": 2,
+    "contact_counts": 3,
+    "move_counts": 3,
+}
 
 
 def matched_stages(
