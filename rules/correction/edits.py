@@ -139,7 +139,8 @@ def _fillers(
         some = [m for m in re.finditer(r"\w+", found[0]) if m[0] not in known]
         if len(some) > 1 and any(found.start() <= at < found.end() for at in places):
             begin, end = found.start() + some[0].start(), found.start() + some[-1].end()
-            yield from (Repair(begin, end, new) for new in ("", "and", "&"))
+            joins = not line[:begin].rstrip().endswith(("(", ","))
+            yield from (Repair(begin, end, new) for new in (("", "and", "&") if joins else ("",)))
 
 
 def _left_out(

@@ -19,7 +19,7 @@ from visup.rules.correction.words import Terminals, Word, words_of
 MOST_PUT_IN_A_ROW = 4
 SPELLINGS_TRIED = 8
 """Most spellings tried of one correction, where an inserted unit or name may be one of several."""
-ALIKE = 3
+ALIKE = 8
 """Most parses followed with the same continuation: a bracket may be missing in several places.
 """
 NEARLY = 0.1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, cast
 
@@ -81,3 +81,23 @@ def bound(node: Formula, variable: Variable) -> Formula:
 
     found: Any = rebuilt(node, change)
     return cast("Formula", found)
+
+
+def cut_off(
+    node: And | Or, free: Callable[[Formula], Collection[str]]
+) -> tuple[Quantified, Formula, Quantified] | None:
+    """A quantifier that ends before the last use of its variable, as in `exists c: f(c) and g(c)`.
+
+    Args:
+        node: A conjunction or disjunction.
+        free: The objects that a formula names and does not bind.
+
+    Returns:
+        The quantifier, all from it on, and the quantifier about all of that; None if there is none.
+    """
+    for n, part in enumerate(node.parts):
+        later = node.parts[n + 1 :]
+        if isinstance(part, Quantified) and any(part.variable in free(x) for x in later):
+            whole = replace(part, part=replace(node, parts=(part.part, *later)))
+            return part, replace(node, parts=node.parts[n:]), whole
+    return None

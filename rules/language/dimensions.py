@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from visup.rules.formula.nodes import Comparison
+from visup.rules.formula.nodes import Comparison, MOfN, TimeWindow
 from visup.rules.formula.terms import (
     Arithmetic,
     Measure,
@@ -21,6 +21,7 @@ from visup.rules.formula.units import (
     Dimension,
     Number,
     Span,
+    Unit,
     number_text,
     units_of,
 )
@@ -205,3 +206,44 @@ def _with_unit(node: Comparison, wanted: Dimension) -> str | None:
     if sides == [str(node.left), str(node.right)]:
         return f"write `{sides[0]} {node.operator} 20 {unit}`".replace("20 `", "20`")
     return f"write `{sides[0]} {node.operator} {sides[1]}`"
+
+
+def check_time(number: Number | None, word: str) -> Iterator[Fault]:
+    """Errors of a time behind a word; none if there is no time."""
+    if number is None:
+        return
+    if number.dimension != TIME:
+        unit = Unit.MIN if number.unit == Unit.M else Unit.S
+        hint = f"write `{Number(abs(number.value) or 2.0, unit)}`"
+        yield number.span, f"'{word}' needs a time", "such as 2 s", hint
+    elif number.value <= 0:
+        hint = f"write `{Number(abs(number.value) or 2.0, number.unit)}`"
+        yield number.span, f"'{word}' needs a time above 0", "such as 2 s", hint
+
+
+def check_window(window: TimeWindow, word: str) -> Iterator[Fault]:
+    """Errors of a window."""
+    yield from check_time(window.high, word)
+    if window.low.dimension != TIME:
+        yield window.low.span, f"'{word}' needs a time", "such as 2 s", None
+    elif window.high.dimension == TIME and 0 < window.high.base < window.low.base:
+        what = f"a window from {window.low} to {window.high} is empty"
+        joint = " to " if word in ("for", "within") else " .. "
+        hint = f"write `{window.high}{joint}{window.low}`"
+        whole = window.low.span.to(window.high.span)
+        yield whole, what, "the shorter time first", hint
+
+
+def check_often(node: MOfN) -> Iterator[Fault]:
+    """Errors of a share or a count of samples."""
+    least, of = node.least, node.of
+    if node.counts_samples:
+        if not (least.unit is Unit.NONE and 1 <= least.value <= of.value):
+            what = f"'{least} of {of} samples' cannot be counted"
+            yield least.span, what, "3 of 5 samples", f"write `{of}`"
+        elif least.value % 1 or of.value % 1:
+            yield least.span, "samples are counted in whole numbers", "3 of 5 samples", None
+        return
+    yield from check_time(of, "of")
+    if least.dimension != SHARE or not 0 < least.base <= 1:
+        yield least.span, f"'{least}' is not a share of a time", "such as 60 %", "write `60 %`"

@@ -56,7 +56,8 @@ def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None
         pattern = rf"\b{pattern}\b" if m[2].isidentifier() else pattern
         if old := re.match(rf"\s*{pattern}", rest):
             return _replacing(where, old, m[1])
-        return _on_line(where, pattern, m[1]) or _further(where, pattern, rest, m[1])
+        elsewhere = _on_line(where, pattern, m[1]) or _further(where, pattern, rest, m[1])
+        return elsewhere or _anywhere(text, pattern, m[1])
     if m := _LINE.search(hint):
         return _at_the_end(text, m[1])
     if m := _PUT.search(hint):
@@ -95,6 +96,18 @@ def _further(where: SourceLocation, pattern: str, rest: str, new: str) -> TextFi
     """Replace a match on a later line, such as in the sentence of a rule."""
     found = re.search(pattern, rest)
     return None if found is None else _replacing(where, found, new)
+
+
+def _anywhere(text: str, pattern: str, new: str) -> TextFix | None:
+    """Replace a match before the fault, such as in a declaration, if it is the only one."""
+    found = list(re.finditer(pattern, text))
+    if len(found) != 1:
+        return None
+    line, column = (
+        text.count("\n", 0, found[0].start()) + 1,
+        found[0].start() - text.rfind("\n", 0, found[0].start()),
+    )
+    return TextFix(line, column, len(found[0][0]), new)
 
 
 def _replacing(where: SourceLocation, old: re.Match[str], new: str) -> TextFix:

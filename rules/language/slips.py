@@ -52,6 +52,7 @@ _RANGE = (
     rf"(?P<high>{_NUMBER}(?:\s*(?:{_UNIT})(?![\w/]))?)"
 )
 _ON = r"(touching(\1, \2) and north_of(\1, \2))"
+_QUOTES = "[\"'`\u201c\u201d\u201e\u00ab\u00bb]"
 _QUANTIFIED = r"\b(exists|forall)\s+"
 
 
@@ -247,6 +248,7 @@ SLIPS = (
     _slip(r"\b(?:warn)\b", "warning"),
     _slip(r"\b(?:note|notice|debug)\b", "info"),
     _slip(r"'([^'\"\n]*)'", r'"\1"'),
+    _slip(rf"\bsay[ \t]+(?!\"[^\"\n]*\"){_QUOTES}*([^\"\n]+?){_QUOTES}*[ \t]*$", r'say "\1"'),
     _slip(r"\bsay\s+([^\"\s][^\"\n]*)", lambda m: f'say "{m[1].strip()}"'),
     _slip(r"(say\s+\"[^\"\n]*\")(\s+)((?:hold|cooldown)\s+[\d.]+\s*\w+)", r"\3\2\1"),
     _slip(r"(say\s+\"[^\"\n]*\")(\s+)(when\s[^\n]*)", r"\3\2\1"),

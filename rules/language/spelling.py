@@ -39,6 +39,21 @@ _PUT_IN = {
     "NUMBER": (2.0, ("2", "20")),
     "SEVERITY": (1.5, ("warning",)),
 }
+_BRACKETS: Mapping[str, tuple[str, str, float]] = MappingProxyType(
+    {
+        **dict.fromkeys("[{", ("LPAR", "(", LIKELY)),
+        **dict.fromkeys("]}", ("RPAR", ")", LIKELY)),
+        "(": ("LSQB", "[", GUESS),
+        ")": ("RSQB", "]", GUESS),
+    }
+)
+"""Brackets of other kinds."""
+_LET = {
+    **dict.fromkeys(("=", ":=", "as", "is"), "be"),
+    **dict.fromkeys(("when", "if", "upon"), "at"),
+}
+"""Words that stand in place of `be` and `at` after `let`."""
+_NAMED = re.compile(r"\brule\s+(\w+)")
 _HEAD = re.compile(r"\A[^\n\"]*?\w[ ]*[(\[]([^)\n]*)[)\]]?[ ]*:[^\n]*")
 _ARGUMENTS = re.compile(r"\(([^()\n]*)\)|\{(\w+)\}")
 _NAMES = re.compile(r"(?<![\w\"'.])[A-Za-z_]\w*")
@@ -57,7 +72,9 @@ def speller(parser: Lark, start: str, text: str) -> Speller:
     variables, lacking = variables_of(text)
     put: dict[str, tuple[float, tuple[str, ...]]] = dict(_PUT_IN)
     said = " ".join(f"{{{v}}}" for v in variables[:3])
-    put["STRING"] = (2.0, (f'"{said}"',))
+    name = _NAMED.search(text)
+    plain = name[1].replace("_", " ") if name else "something is to be told"
+    put["STRING"] = (2.0, (f'"{said or plain}"', f'"{plain}"'))
     put["NAME"] = (2.2, (*variables[:3], *lacking) or ("a",))
     meant = partial(_meant, variables, lacking)
     return Speller(_automaton(parser, start), terminals_of(parser), put, _drops(variables), meant)
@@ -228,6 +245,11 @@ def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
         yield Meaning(1, ("UNIT",), UNITS_MEANT[first.casefold()], LIKELY)
     if first in (",", ":", "-", "to"):
         yield Meaning(1, ("__ANON_0",), "..", LIKELY)
+    if first in _LET:
+        yield Meaning(1, (_LET[first].upper(),), _LET[first], GUESS)
+    if first in _BRACKETS:
+        terminal, bracket, cost = _BRACKETS[first]
+        yield Meaning(1, (terminal,), bracket, cost)
     if first in TEMPORAL and len(said) > 1 and said[1] in "[(":
         yield Meaning(1, (_terminal(TEMPORAL[first]),), TEMPORAL[first], LIKELY)
     if not first[0].isalpha():

@@ -12,6 +12,7 @@ from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
 from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.nodes import (
     ZERO,
+    And,
     Comparison,
     Formula,
     FutureOperator,
@@ -19,6 +20,7 @@ from visup.rules.formula.nodes import (
     Let,
     MOfN,
     Node,
+    Or,
     PastOperator,
     Predicate,
     Quantified,
@@ -29,14 +31,18 @@ from visup.rules.formula.nodes import (
     children,
     walk,
 )
+from visup.rules.formula.rebuilding import cut_off
 from visup.rules.formula.terms import Arithmetic, Measure, Variable, WindowFunction
-from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
+from visup.rules.formula.units import Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.dimensions import (
     check_constant,
     check_dimensions,
+    check_often,
+    check_time,
     check_value,
+    check_window,
     example_amount,
 )
 from visup.rules.language.keywords import KEYWORDS
@@ -89,7 +95,7 @@ class TypeChecker:
             return
         reader = _FormulaChecker(self.vocabulary, rule.variables)
         found = [f for formula in rule.formulas for f in reader.node(formula)]
-        found += [f for w in ("hold", "cooldown") for f in _time(getattr(rule, w), w)]
+        found += [f for w in ("hold", "cooldown") for f in check_time(getattr(rule, w), w)]
         found += self._head(rule)
         # A variable missing because of a faulty call is no second error.
         for name in sorted(set(rule.variables) - reader.used) if not found else ():
@@ -116,9 +122,18 @@ class TypeChecker:
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
                 what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
-                other = rule.variables[0] if rule.variables else None
-                hint = None if other is None else f"write `{{{other}}}` in place of `{{{word}}}`"
+                hint = self._mended_head(rule, word)
                 yield rule.span, what, _listed((*rule.variables, "is")), hint
+
+    def _mended_head(self, rule: Rule, word: str) -> str | None:
+        """The head with a name that the formulas use, too; else another name in the sentence."""
+        given = ", ".join(rule.variables)
+        if word in _objects_in(rule, self.vocabulary) and len(rule.variables) < MAX_VARIABLES:
+            more = f"{given}, {word}" if given else word
+            return f"write `{rule.name}({more})` in place of `{rule.name}({given})`"
+        return (
+            f"write `{{{rule.variables[0]}}}` in place of `{{{word}}}`" if rule.variables else None
+        )
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:
         together = variables_of(rule)
@@ -154,6 +169,16 @@ class _FormulaChecker:
             case Let():
                 yield from self.let(node)
                 return
+            case And() | Or() if (loose := cut_off(node, self.unbound)) is not None:
+                part, rest, whole = loose
+                name = part.variable
+                what = f"'{part.kind} {name}:' ends before '{name}' is used again"
+                hint = f"write `{whole}` in place of `{rest}`"
+                yield part.span, what, "parentheses around all that it is about", hint
+                self.scope = (*self.scope, name)
+                yield from self.node(whole.part)
+                self.scope = self.scope[:-1]
+                return
             case Variable():
                 yield from self.variable(node)
             case Arithmetic(operator="/", left=left, right=Variable(name=Unit.S) as unit):
@@ -167,7 +192,7 @@ class _FormulaChecker:
                 if self.of_rule:
                     yield from check_constant(node)
             case PastOperator(window=TimeWindow() as window):
-                yield from _window(window, "for" if node.kind == "always" else "within")
+                yield from check_window(window, "for" if node.kind == "always" else "within")
             case FutureOperator(window=window, span=span) | Until(window=window, span=span):
                 word = node.kind if isinstance(node, FutureOperator) else "until"
                 if window is None:
@@ -175,15 +200,27 @@ class _FormulaChecker:
                     bounded = replace(node, window=TimeWindow(ZERO, Number(5.0, Unit.S)))
                     yield span, what, f"such as {word}[5 s]", f"write `{bounded}`"
                 else:
-                    yield from _window(window, word)
+                    yield from check_window(window, word)
             case Since(window=TimeWindow() as window):
-                yield from _window(window, "since")
+                yield from check_window(window, "since")
             case MOfN():
-                yield from _often(node)
+                yield from check_often(node)
             case Last(duration=duration) | WindowFunction(duration=duration):
-                yield from _time(duration, getattr(node, "name", "last"))
+                yield from check_time(duration, getattr(node, "name", "last"))
         for part in children(node):
             yield from self.node(part)
+
+    def unbound(self, node: Node) -> set[str]:
+        """The objects that a formula names and neither it nor anything around it binds."""
+        found = {name for part in children(node) for name in self.unbound(part)}
+        if isinstance(node, Predicate | Measure):
+            table = (
+                self.vocabulary.words if isinstance(node, Predicate) else self.vocabulary.quantities
+            )
+            takes = table[node.name].takes if node.name in table else ()
+            found |= {w for w, t in zip(node.words, takes, strict=False) if t == "object"}
+        bound = {node.variable} if isinstance(node, Quantified) else set()
+        return found - bound - set(self.scope)
 
     def quantified(self, node: Quantified) -> Iterator[Fault]:
         name, outer = node.variable, self.scope
@@ -262,6 +299,8 @@ class _FormulaChecker:
             hint = did_you_mean(synonym(call.name, table) or call.name, table)
             if call.name in (quantities if fact else words):
                 hint = self._compared(call) if fact else "it is true or false"
+            elif call.name in self.scope and not call.words:
+                hint = f"write `seen({call.name})` in place of `{call.name}`"
             yield call.span, f"there is no {kind} '{call.name}'", _nearest(call.name, table), hint
             return
         takes = table[call.name].takes
@@ -311,44 +350,6 @@ def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:
             found += [w for w, t in zip(node.words, takes, strict=False) if t == "object"]
     bound = {n.variable for f in rule.formulas for n in walk(f) if isinstance(n, Quantified)}
     return [w for w in dict.fromkeys(found) if w not in bound]
-
-
-def _time(number: Number | None, word: str) -> Iterator[Fault]:
-    if number is None:
-        return
-    if number.dimension != TIME:
-        unit = Unit.MIN if number.unit == Unit.M else Unit.S
-        hint = f"write `{Number(abs(number.value) or 2.0, unit)}`"
-        yield number.span, f"'{word}' needs a time", "such as 2 s", hint
-    elif number.value <= 0:
-        hint = f"write `{Number(abs(number.value) or 2.0, number.unit)}`"
-        yield number.span, f"'{word}' needs a time above 0", "such as 2 s", hint
-
-
-def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
-    yield from _time(window.high, word)
-    if window.low.dimension != TIME:
-        yield window.low.span, f"'{word}' needs a time", "such as 2 s", None
-    elif window.high.dimension == TIME and 0 < window.high.base < window.low.base:
-        what = f"a window from {window.low} to {window.high} is empty"
-        joint = " to " if word in ("for", "within") else " .. "
-        hint = f"write `{window.high}{joint}{window.low}`"
-        whole = window.low.span.to(window.high.span)
-        yield whole, what, "the shorter time first", hint
-
-
-def _often(node: MOfN) -> Iterator[Fault]:
-    least, of = node.least, node.of
-    if node.counts_samples:
-        if not (least.unit is Unit.NONE and 1 <= least.value <= of.value):
-            what = f"'{least} of {of} samples' cannot be counted"
-            yield least.span, what, "3 of 5 samples", f"write `{of}`"
-        elif least.value % 1 or of.value % 1:
-            yield least.span, "samples are counted in whole numbers", "3 of 5 samples", None
-        return
-    yield from _time(of, "of")
-    if least.dimension != SHARE or not 0 < least.base <= 1:
-        yield least.span, f"'{least}' is not a share of a time", "such as 60 %", "write `60 %`"
 
 
 def _nearest(word: str, known: Iterable[str]) -> str:

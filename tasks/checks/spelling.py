@@ -20,7 +20,7 @@ from visup.tasks.actions.actions import ACTIONS, known_actions
 from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
 from visup.tasks.diagnostics.recovery import KEYWORDS
 from visup.tasks.grammar.parser import parser
-from visup.tasks.grammar.statement import NAME
+from visup.tasks.grammar.statement import NAME, PARAMETERS
 
 SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
 """Cost of replacing a word: by one that differs in case; by a synonym; by one of similar spelling."""
@@ -176,6 +176,7 @@ def _stage_name(said: str) -> str:
     return name if name[:1].isalpha() else f"stage_{name}"
 
 
+_STAGE = re.compile(rf"<[ ]*{NAME}{PARAMETERS}[ ]*>")
 _REFERENCE = re.compile(r"< (\w[\w \-.]*) >")
 _HEAD = re.compile(
     r"(?: (?:task|stage|def|define|function|rule|step|phase|action|- ))?(?: \d+ [.)])?"
@@ -212,6 +213,8 @@ class _Meanings:
             found.append(
                 Meaning(ref[0].count(" ") + 1, ("STAGE",), f"<{_stage_name(ref[1])}>", LIKELY)
             )
+        if at == 0 and _STAGE.fullmatch(said[0]):
+            found.append(Meaning(1, ("HEAD",), f"{said[0]} ::=", LIKELY))
         if at == 0 and (head := _head_of(said)) is not None:
             found.append(Meaning(head[0], ("HEAD",), f"<{head[1]}> ::=", LIKELY))
         return found

@@ -12,6 +12,7 @@ from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.spelling import plain_call
 from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
+from visup.tasks.grammar.statement import NAME, PARAMETERS
 
 New = str | Callable[[re.Match[str]], str]
 
@@ -46,8 +47,8 @@ KEYWORD = (
 )
 SIGN = r"begins|ends|fails|progresses|pauses"
 MEANT = "|".join(SIGNS_MEANT)
-NAME = r"[^\W\d]\w*"
 CALL = rf"{NAME}\s*\([^()]*\)"
+PAIR = rf"\(\s*{NAME}\s*,\s*{NAME}\s*\)"
 PARTS = rf"(?:{CALL}|<[^<>]*>)"
 TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"
 
@@ -79,7 +80,8 @@ USUAL = (
     _usual("E103", rf"\bnot\s+({NAME})(?=\s*\()", lambda m: OPPOSITES.get(m[1], m[1])),
     _usual("E103 E127", rf"\b(?:historically|always|once|eventually|globally|finally|next)\s+(?={CALL})", ""),
     _usual("E103", rf"\b({NAME})(?=\s+(?:{CALL}|<))", lambda m: closest(m[1], PREFIXES) or m[1]),
-    _usual("E103", rf"^\s*({NAME})(?=\s*::=)", r"<\1>"),
+    _usual("E103", rf"^\s*({NAME}{PARAMETERS})(?=\s*::=)", r"<\1>"),
+    _usual("E103", rf"^\s*[\[({{]\s*({NAME}{PARAMETERS})\s*[\])}}](?=\s*::=)", r"<\1>"),
     _usual("E103", rf"(?<![<\w])({NAME})(?![\w>(])", r"<\1>"),
     _usual("E102 E202", r"(?<=>)\s*(?:::\s*=|: :=|:=|=|->|→|::|:|=>|:==|<-)\s*", " ::= "),
     _usual("E101", rf"<({NAME})>\s*\(([^()]*)\)", r"<\1(\2)>"),
@@ -100,7 +102,8 @@ USUAL = (
     _usual("E101", r"<=>|<->|->|=>", " "),
     _usual("E101 E103 E117 E119 E135", r",\s*,", ","),
     _usual("E101 E119 E103", r"\b(any\s+\d+)\s*(?=\()", r"\1 of "),
-    _usual("E101 E115", rf"\b(for\s+each\s+{NAME}\s+(?:of|in))\s+({NAME}(?:\s*,\s*{NAME})+)\s+", r"\1 (\2) "),
+    _usual("E101 E115", rf"\b(for\s+each\s+{NAME})\s+(?:of|in)\s+({NAME}(?:\s*,\s*{NAME})+)\s+",
+           r"\1 of (\2) "),
     _usual("E101 E119", r"\bany\s+of\s*(?=\()", "any 1 of "),
     _usual("E119 E101", rf"\bany\s+(\d+)\s+of\s+({PARTS}(?:\s*,\s*{PARTS})+)", r"any \1 of (\2)"),
     _usual("E115 E101", rf"\bfor\s+each\s+({NAME})\s+(?={NAME}\()", r"for each new \1 "),
@@ -224,7 +227,6 @@ USUAL = (
     _usual("E201", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*\)",
            lambda m: f"{_action_meant(m[1])}({m[2]}) & {_action_meant(m[1])}({m[3]})"),
     _usual("E202", rf"<({NAME})>\s*", ""),
-    _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*\)", r"\1(\2, other)"),
     _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),
     _usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,[^()]*\)", r"\1(\2)"),
     _usual("E206", rf"<({NAME})>\s*::=\s*<\1>\s*([^\n|]+)", r"<\1> ::= \2 <\1>?"),
@@ -265,6 +267,8 @@ USUAL = (
     _usual("E229", rf"\b{NAME}(\(\s*{NAME}\s*,\s*{NAME}\s*\))", r"inside\1"),
     _usual("E226", rf"\b(for|within|after|every)\s+{NAME}", r"\1 5 s"),
     _usual("E113", rf"<\s*({CALL})\s*>", r"\1"),
+    _usual("E101 E103 E119", rf"(?<![\w>])({PAIR})(?=\s*(?:[<>]|between\b))", r"gap\1"),
+    _usual("E101 E103 E119", rf"(?<![\w>])({PAIR})", r"touching\1"),
     _usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
 )  # fmt: skip
 """In order of trial."""

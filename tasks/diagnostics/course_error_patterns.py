@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.grammar.statement import NAME, RESERVED_WORDS, RecognisedError
+from visup.tasks.grammar.statement import NAME, PARAMETERS, RESERVED_WORDS, RecognisedError
 
 
 def open_angle(text: str) -> RecognisedError | None:
     """A reference with one angle bracket."""
     # A quantity may be compared with a parameter: `gap(arm, satellite) < reach`.
-    m = re.search(rf"<(?:(?<!\))(?<!\) )[ ]*)?({NAME})(?![ ]*>|\w)", text)
+    m = re.search(rf"<(?:(?<!\))(?<!\) )[ ]*)?({NAME})(?!{PARAMETERS}[ ]*>|\w)", text)
     if m is not None:
         return RecognisedError(
             "E107", m.start(), len(m[0]), f"`<{m[1]}` is not closed", f"`<{m[1]}>`"
@@ -39,7 +39,7 @@ def brackets(text: str) -> RecognisedError | None:
         elif opened:
             opened.pop()
         else:
-            return RecognisedError("E111", m.start(), 1, "`)` has no `(` before it")
+            return RecognisedError("E111", m.start(), 1, "`)` has no `(` before it", "`(`")
     if opened:
         return RecognisedError("E110", opened[0], 1, "`(` is not closed", "`)`")
     return None

@@ -31,6 +31,7 @@ from visup.tasks.diagnostics.course_error_patterns import (
 )
 from visup.tasks.grammar.statement import (
     NAME,
+    PARAMETERS,
     RESERVED_WORDS,
     ErrorPattern,
     RecognisedError,
@@ -90,7 +91,9 @@ def _heading(text: str) -> RecognisedError | None:
 
 
 def _definer(text: str) -> RecognisedError | None:
-    m = re.match(rf"\s*<[ ]*{NAME}[ ]*>\s*(?!::=(?!=))(::==+|:=|==|=>|=|::(?!=)|:|->|→)", text)
+    m = re.match(
+        rf"\s*<[ ]*{NAME}{PARAMETERS}[ ]*>\s*(?!::=(?!=))(::==+|:=|==|=>|=|::(?!=)|:|->|→)", text
+    )
     if m is None:
         return None
     what = f"`{m[1]}` stands where `::=` should"
@@ -98,7 +101,7 @@ def _definer(text: str) -> RecognisedError | None:
 
 
 def _bare_head(text: str) -> RecognisedError | None:
-    m = re.match(rf"\s*({NAME})\s*(?:::=|:=|=)", text)
+    m = re.match(rf"\s*({NAME}{PARAMETERS})\s*(?:::=|:=|=)", text)
     if m is None or m[1] in RESERVED_WORDS:
         return None
     what = f"the name of stage `{m[1]}` is written without angle brackets"
@@ -106,7 +109,11 @@ def _bare_head(text: str) -> RecognisedError | None:
 
 
 def _open_head(text: str) -> RecognisedError | None:
-    m = re.match(rf"\s*(<[ ]*({NAME}))\s*(?:::=|:=|=)", text)
+    m = re.match(rf"\s*[\[({{]\s*({NAME}{PARAMETERS})\s*[\])}}]\s*(?:::=|:=|=)", text)
+    if m is not None:
+        what = f"the name of stage `{m[1]}` is not written in angle brackets"
+        return RecognisedError("E103", m.start(1), len(m[1]), what, f"`<{m[1]}> ::= ...`")
+    m = re.match(rf"\s*(<[ ]*({NAME}{PARAMETERS}))\s*(?:::=|:=|=)", text)
     if m is not None:
         return RecognisedError(
             "E107", m.start(1), len(m[1]), f"`<{m[2]}` is not closed", f"`<{m[2]}> ::= ...`"
@@ -121,7 +128,7 @@ def _open_head(text: str) -> RecognisedError | None:
 def _not_a_name(text: str) -> RecognisedError | None:
     for m in re.finditer(r"<([^<>()|&\n]*)>", text):
         inner = m[1].strip()
-        if re.fullmatch(NAME, inner):
+        if re.fullmatch(rf"{NAME}{PARAMETERS}", inner):
             continue
         said = f"`{inner}` is not a name" if inner else "a name is missing between `<` and `>`"
         hint = None
@@ -134,7 +141,7 @@ def _not_a_name(text: str) -> RecognisedError | None:
 
 
 def _empty_stage(text: str) -> RecognisedError | None:
-    m = re.fullmatch(rf"\s*(<[ ]*({NAME})[ ]*>)\s*::=\s*", text)
+    m = re.fullmatch(rf"\s*(<[ ]*({NAME}{PARAMETERS})[ ]*>)\s*::=\s*", text)
     if m is None:
         return None
     return RecognisedError(

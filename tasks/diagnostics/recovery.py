@@ -23,6 +23,7 @@ ACTORS = r"(?:\([\w ,]*\)[ ]*)?"
 HEAD = re.compile(rf"<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
 OPENS = re.compile(  # a line that begins a statement, valid or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
+    rf"|[\[({{][ ]*{NAME}[ ]*{ACTORS}[\])}}]\s*(?:::=|:=)"
     r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage"
     r"|bystanders?|ground(?=[ ]+is\b))\b(?![ ]*\())"
 )

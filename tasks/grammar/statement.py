@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 NAME = r"[^\W\d]\w*"
+PARAMETERS = r"(?:[ ]*\([\w ,]*\))?"
+"""The actors of a stage that is said of any: `<mount(leg)>`."""
 RESERVED_WORDS = (
     "actor", "is", "or", "never", "always", "during", "for", "within", "include", "parameter",
     "zone",

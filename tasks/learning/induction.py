@@ -17,9 +17,11 @@ from visup.agent.model.errors import TaskError
 from visup.tasks.checks.load import parse_task
 from visup.tasks.grammar.nodes import Actor
 from visup.tasks.learning.alignment import aligned
+from visup.tasks.learning.bodies import as_one_body
 from visup.tasks.learning.judging import JudgedRun, judged
 from visup.tasks.learning.meetings import MEETINGS
 from visup.tasks.learning.order import (
+    Either,
     Free,
     Item,
     Joint,
@@ -28,13 +30,16 @@ from visup.tasks.learning.order import (
     Plan,
     Series,
     Times,
+    action_text,
     leaves_of,
     plan_of,
     shared,
+    symbols_of,
     with_loops,
     without,
 )
 from visup.tasks.learning.periods import Period, course_of, periods_of
+from visup.tasks.learning.precedence import Precedence, invariants, precedences
 from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.rests import Rest, rests_of
 from visup.tasks.learning.traces import RunTrace, Symbol
@@ -91,6 +96,7 @@ class _Draft:
         holding: Whether the last stage must hold for a while.
         periods: The periodic loops.
         rests: Actors that must not be pushed.
+        order: Contacts that must not come too early.
     """
 
     name: str
@@ -103,6 +109,7 @@ class _Draft:
     holding: bool = True
     periods: dict[Loop, Period] = field(default_factory=dict)
     rests: tuple[Rest, ...] = ()
+    order: tuple[Precedence, ...] = ()
 
     def text(self) -> str:
         """The task file."""
@@ -111,13 +118,17 @@ class _Draft:
         lines.append(f"<{self.name}> ::= {_course(self.plan, names)}")
         lines += [self._stage(o, name) for o, name in names.items()]
         lines += [str(self.declared[a]) for a in self.actors() if a in self.declared]
-        lines += [f"never {_action(s)}  # in no good run, and in a bad one" for s in self.forbidden]
+        lines += [
+            f"never {action_text(s)}  # in no good run, and in a bad one" for s in self.forbidden
+        ]
+        seen = f"  # in {_all(len(self.runs))}"
+        lines += [line + seen for line in invariants(self.order, names)]
         lines += [rest.invariant(_all(len(self.runs))) for rest in self.rests]
         return "\n".join(lines) + "\n"
 
     def actors(self) -> list[str]:
         """Its actors, sorted."""
-        symbols = [s for o in leaves_of(self.plan) for s in _symbols(o[0])]
+        symbols = [s for o in leaves_of(self.plan) for s in symbols_of(o[0])]
         return sorted({a for _, actors in (*symbols, *self.forbidden) for a in actors})
 
     def _stage(self, occurrence: Occurrence, name: str) -> str:
@@ -126,7 +137,7 @@ class _Draft:
             return f"<{name}> ::= {course_of(item, self.periods[item])}"
         if isinstance(item, Loop):
             least, most = self.times[item]
-            body = " ".join(_action(s) for i in item.body for s in _symbols(i))
+            body = " ".join(action_text(s) for i in item.body for s in symbols_of(i))
             said = f"{least} to {most} times in a row"
             return f"<{name}> ::= ({body}) at least {least} times at most {most} times  # {said}"
         spans = self._spans(occurrence)
@@ -141,8 +152,12 @@ class _Draft:
 
     def _asked(self, occurrence: Occurrence, clause: str) -> str:
         """What a stage asks for, with a clause of time."""
-        action, already = _action(occurrence[0]), self._from_the_start(occurrence)
-        if isinstance(occurrence[0], Joint) and (clause or already):
+        item, already = occurrence[0], self._from_the_start(occurrence)
+        if isinstance(item, Either):
+            word = "already " if already else ""
+            return " | ".join(f"{word}{action_text(part)}{clause}" for part in item.parts)
+        action = action_text(item)
+        if isinstance(item, Joint) and (clause or already):
             action = f"({action})"
         return f"{'already ' if already else ''}{action}{clause}"
 
@@ -207,7 +222,7 @@ def learn_task(
     Raises:
         TaskError: The good runs have no event in common.
     """
-    rows = joined(relevant(good))
+    rows = joined(as_one_body(relevant(good), good))
     folded, times = with_loops([tuple(e.item for e in row) for row in rows])
     if not times:  # without loops, surplus repeats in some runs are noise
         rows = aligned(rows)
@@ -225,7 +240,7 @@ def learn_task(
     periods = periods_of(times, rows)
     draft = _Draft(name, plan, times, good, rows, declared or {}, periods=periods)
     results = _validated(draft, dropped)
-    _require_rests(draft, results)
+    _require(draft, results)
     bad_verdicts = {r.name: _judge(draft, r) for r in bad}
     for run in bad:
         if bad_verdicts[run.name] is Verdict.SUCCEEDED:
@@ -258,11 +273,18 @@ def _validated(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
         draft.plan = plan
 
 
-def _require_rests(draft: _Draft, results: Mapping[str, Verdict]) -> None:
-    """Require actors at rest in all good runs to stay so, unless that changes a verdict of one."""
+def _require(draft: _Draft, results: Mapping[str, Verdict]) -> None:
+    """Require what held in all good runs, unless that changes a verdict of one: order, and who rests."""
+    draft.order = tuple(precedences(draft.plan, draft.rows, draft.runs))
+    if draft.order and _verdicts(draft) != dict(results):
+        draft.order = ()
     draft.rests = tuple(rests_of(draft.runs, draft.actors()))
-    if {r.name: _judge(draft, r) for r in draft.runs if r.minds} != dict(results):
+    if draft.rests and _verdicts(draft) != dict(results):
         draft.rests = ()
+
+
+def _verdicts(draft: _Draft) -> dict[str, Verdict]:
+    return {r.name: _judge(draft, r) for r in draft.runs if r.minds}
 
 
 def _blamed(draft: _Draft, run: JudgedRun) -> Occurrence | None:
@@ -329,7 +351,7 @@ def _at_once(rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence
 
 
 def _pairs(item: Item) -> set[tuple[str, ...]]:
-    return {actors for _, actors in _symbols(item)}
+    return {actors for _, actors in symbols_of(item)}
 
 
 def deadline(spans: Sequence[float]) -> int:
@@ -346,34 +368,19 @@ def _course(plan: Plan, names: Mapping[Occurrence, str]) -> str:
     return f"<{names[plan]}>"
 
 
-def _symbols(item: Item) -> list[Symbol]:
-    if isinstance(item, Joint):
-        return list(item.parts)
-    return [s for i in item.body for s in _symbols(i)] if isinstance(item, Loop) else [item]
-
-
-def _action(symbol: Item) -> str:
-    if isinstance(symbol, Loop):
-        return " ".join(map(_action, symbol.body))
-    if isinstance(symbol, Joint):
-        return " & ".join(map(_action, symbol.parts))
-    action, actors = symbol
-    return f"{action}({', '.join(actors)})"
-
-
 def _plain(item: Item) -> str:
     if isinstance(item, Loop):
         return "repeat"
-    words = [STAGE_NAMES.get(action, action) for action, _ in _symbols(item)]
+    words = [STAGE_NAMES.get(action, action) for action, _ in symbols_of(item)]
     return "_and_".join(dict.fromkeys(words))
 
 
 def _who(item: Item) -> str:
-    return "_".join(dict.fromkeys(a for _, actors in _symbols(item) for a in actors))
+    return "_".join(dict.fromkeys(a for _, actors in symbols_of(item) for a in actors))
 
 
 def _text(occurrence: Occurrence) -> str:
-    return _action(occurrence[0])
+    return action_text(occurrence[0])
 
 
 def _all(count: int) -> str:

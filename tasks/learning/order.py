@@ -31,7 +31,14 @@ class Joint:
     parts: tuple[Symbol, ...]
 
 
-Item = Symbol | Loop | Joint
+@dataclass(frozen=True, slots=True)
+class Either:
+    """Symbols of which any is evidence of one event."""
+
+    parts: tuple[Symbol, ...]
+
+
+Item = Symbol | Loop | Joint | Either
 Word = tuple[Item, ...]
 
 
@@ -201,3 +208,22 @@ def without(plan: Plan, dropped: Occurrence) -> Plan | None:
 
 
 Times = Mapping[Loop, tuple[int, int]]
+
+
+def symbols_of(item: Item) -> list[Symbol]:
+    """The symbols of an item, in order."""
+    if isinstance(item, Joint | Either):
+        return list(item.parts)
+    return [s for i in item.body for s in symbols_of(i)] if isinstance(item, Loop) else [item]
+
+
+def action_text(symbol: Item) -> str:
+    """An item as a course of a task file."""
+    if isinstance(symbol, Loop):
+        return " ".join(map(action_text, symbol.body))
+    if isinstance(symbol, Joint):
+        return " & ".join(map(action_text, symbol.parts))
+    if isinstance(symbol, Either):
+        return " | ".join(map(action_text, symbol.parts))
+    action, actors = symbol
+    return f"{action}({', '.join(actors)})"

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from visup.tasks.learning.meetings import CLOSE_S, Meeting, Pair, meetings_of, pairs_by_weight
-from visup.tasks.learning.order import Item, Joint
+from visup.tasks.learning.order import Either, Item, Joint
 from visup.tasks.learning.traces import Happening, RunTrace, Symbol
 
 ENDED_S = 0.3
@@ -27,12 +27,14 @@ class CourseEvent:
         at: Time by which it is ordered, seconds: an approach has that of its meeting.
         lasts: Whether it lasts to the end of the run.
         beside: Symbols of simultaneous events joined with it.
+        instead: Symbols that are evidence of the same event.
     """
 
     happening: Happening
     at: float
     lasts: bool = False
     beside: tuple[Symbol, ...] = ()
+    instead: tuple[Symbol, ...] = ()
 
     @property
     def symbol(self) -> Symbol:
@@ -41,7 +43,9 @@ class CourseEvent:
 
     @property
     def item(self) -> Item:
-        """The symbol, or the joint of several."""
+        """The symbol, or several: all of them, or any."""
+        if self.instead:
+            return Either((self.symbol, *self.instead))
         return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
 
 
@@ -199,7 +203,7 @@ def joined(rows: Sequence[Row]) -> list[list[CourseEvent]]:
 
 
 def _single(event: CourseEvent, row: Row) -> bool:
-    return sum(e.symbol == event.symbol for e in row) == 1
+    return not event.instead and sum(e.symbol == event.symbol for e in row) == 1
 
 
 def _together(once: Sequence[Mapping[Symbol, CourseEvent]], a: Symbol, b: Symbol) -> bool:

@@ -11,6 +11,9 @@ from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.vocabulary import RULES as VOCABULARY
 
 CONDITIONS = [
+    "exists c: touching(a, c) and touching(b, c)",
+    "moving(a and speed(a) > 200 px/s and seen(b)",
+    "let x = speed(a) when touching(a, b): speed(a) > x",
     "not touching(a, b), seen(a)",
     "touching(a, b), not coupled(a, b)",
     "rising(gap(a, b) > 3 px) and",

@@ -10,12 +10,17 @@ from tests.tasks.checks.mistakes import (
     eighth_conditions,
     eighth_tasks,
     eleventh,
+    fourteenth,
     ninth_conditions,
     ninth_tasks,
     tenth,
+    thirteenth,
     twelfth,
 )
 from tests.tasks.checks.test_mistakes_counted import mended, of_rules, of_tasks
+
+BOTH = (tenth, eleventh, twelfth, thirteenth, fourteenth)
+"""Sittings whose mistakes in both languages stand in one table."""
 
 
 def in_task(stage: str) -> str:
@@ -25,10 +30,10 @@ def in_task(stage: str) -> str:
 
 def mistakes() -> Iterator[tuple[str, Callable[[], bool]]]:
     """Each text with a mistake, and whether its hints mend it."""
-    for table in (eighth_conditions, ninth_conditions, tenth, eleventh, twelfth):
+    for table in (eighth_conditions, ninth_conditions, *BOTH):
         for text in (*map(rule, table.CONDITIONS), *table.WHOLE_RULES):
             yield text, partial(mended, text, of_rules)
-    for tasks in (eighth_tasks, ninth_tasks, tenth, eleventh, twelfth):
+    for tasks in (eighth_tasks, ninth_tasks, *BOTH):
         for text in (*map(in_task, tasks.STAGES), *tasks.FILES):
             yield text, partial(mended, text, of_tasks)
 

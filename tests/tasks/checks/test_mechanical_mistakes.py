@@ -1,0 +1,29 @@
+"""One slip at one word of a good text, of each kind: told, mended, and often with what was meant.
+
+`python -m tests.tasks.checks.mistakes.counted` tells of all good texts of the repository; here are a few.
+"""
+
+from random import Random
+
+from tests.tasks.checks.mistakes.counted import accounts, good_rules, good_tasks
+from tests.tasks.checks.mistakes.mutations import KINDS, slips, tokens_of
+
+ONE_IN = 20
+
+
+def test_nearly_all_mechanical_mistakes_are_mended_by_their_hints() -> None:
+    found = [one for _, one in accounts(of_each=1, seed=5, every=ONE_IN)]
+    assert len(found) > 60
+    assert all(one.told for one in found)
+    assert sum(one.legal for one in found) >= 0.94 * len(found)
+    assert sum(one.restored for one in found) >= 0.7 * len(found)
+
+
+def test_a_slip_changes_one_place_of_a_text_and_of_each_kind_there_are_some() -> None:
+    kinds: set[str] = set()
+    for good in (*good_rules()[::8], *good_tasks()[::8]):
+        for slip in slips(good, Random(1)):
+            kinds.add(slip.kind)
+            assert slip.text[: slip.begin] == good[: slip.begin]
+            assert slip.text != good
+    assert kinds == set(KINDS)

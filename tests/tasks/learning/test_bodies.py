@@ -1,0 +1,91 @@
+"""Parts that rest against each other count as one body; the order in which parts are assembled is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from random import Random
+
+from tests.tasks.learning.test_learning import ARM, CRATE, PART, TRAY, run_of
+from tests.tasks.scripted import Spell
+from visup.agent import Verdict
+from visup.tasks import parse_task
+from visup.tasks.learning.bodies import as_one_body
+from visup.tasks.learning.induction import learn_task
+from visup.tasks.learning.judging import judged
+from visup.tasks.learning.order import Either
+from visup.tasks.learning.relevance import CourseEvent
+from visup.tasks.learning.traces import Happening, RunTrace
+
+Row = list[CourseEvent]
+
+
+def contact(one: str, other: str, begin: float, end: float = 20.0) -> CourseEvent:
+    pair = tuple(sorted((one, other)))
+    return CourseEvent(Happening(("touching", pair), begin, end), begin, end == 20.0)
+
+
+def trace(**moved_s: float) -> RunTrace:
+    return RunTrace("run", (), 0.0, 20.0, moved_s=moved_s)
+
+
+RUNS = [trace(base=0.0, block=3.0, cap=3.0)] * 2
+FIRST = contact("base", "block", 4.0)
+
+
+def merged(*rows: Sequence[CourseEvent]) -> list[Row]:
+    return as_one_body(rows, RUNS[: len(rows)])
+
+
+def test_the_contact_with_the_part_that_moves_less_stands_for_both_where_all_runs_have_it() -> None:
+    rows = [
+        [FIRST, contact("base", "cap", 8.0), contact("block", "cap", 8.1)],
+        [FIRST, contact("block", "cap", 8.0, 9.0), contact("base", "cap", 8.4)],
+    ]
+    for row in merged(*rows):
+        assert [e.item for e in row] == [FIRST.symbol, ("touching", ("base", "cap"))]
+
+
+def test_either_contact_is_evidence_where_each_is_missed_in_some_run() -> None:
+    first, second = merged(
+        [FIRST, contact("base", "cap", 8.0)], [FIRST, contact("block", "cap", 9.0)]
+    )
+    either = Either((("touching", ("base", "cap")), ("touching", ("block", "cap"))))
+    assert [e.item for e in first] == [e.item for e in second] == [FIRST.symbol, either]
+    assert (first[1].at, second[1].at) == (8.0, 9.0)
+
+
+def test_contacts_stay_apart_where_the_two_do_not_stay_together() -> None:
+    first = contact("base", "block", 4.0, 6.0)
+    row = [first, contact("base", "cap", 8.0), contact("block", "cap", 9.0)]
+    assert merged(row) == [row]
+
+
+def test_a_contact_in_passing_before_the_two_have_met_does_not_count() -> None:
+    passing, long = contact("block", "cap", 3.6, 4.2), contact("block", "cap", 2.0, 3.6)
+    kept = [FIRST, contact("base", "cap", 8.0)]
+    assert merged([passing, *kept]) == [kept]
+    assert merged([long, *kept]) == [[long, *kept]]
+
+
+def assembled(name: str, seed: int, order: Sequence[int] = (PART, CRATE)) -> RunTrace:
+    """Part and crate are put onto the tray, one after the other."""
+    rng, at, spells = Random(seed), 1.0, list[Spell]()
+    for thing in order:
+        arrives = at + rng.uniform(3.0, 5.0)
+        spells += [
+            Spell("converging", at, arrives, (thing, TRAY)),
+            Spell("touching", arrives, 1e9, (thing, TRAY)),
+        ]
+        at = arrives + rng.uniform(3.0, 4.0)
+    spells.append(Spell("touching", at - 3.0, 1e9, (PART, CRATE)))
+    spells.append(Spell("converging", 0.4, 2.0, (ARM, PART)))
+    return replace(run_of(name, spells), moved_s={"crate": 3.0, "part": 3.0, "tray": 0.0})
+
+
+def test_the_order_of_parts_that_are_put_together_is_kept() -> None:
+    learned = learn_task("assemble", [assembled(f"good{k}", k) for k in range(3)])
+    task = parse_task(learned.text)
+    assert "never touching(crate, tray) for 2 s during" in learned.text
+    assert judged(task, assembled("x", 10).minds).verdict is Verdict.SUCCEEDED
+    assert judged(task, assembled("x", 11, (CRATE, PART)).minds).verdict is not Verdict.SUCCEEDED
