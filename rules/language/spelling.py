@@ -243,13 +243,7 @@ def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
         )
     if first.casefold() in UNITS_MEANT:
         yield Meaning(1, ("UNIT",), UNITS_MEANT[first.casefold()], LIKELY)
-    if first in (",", ":", "-", "to"):
-        yield Meaning(1, ("__ANON_0",), "..", LIKELY)
-    if first in _LET:
-        yield Meaning(1, (_LET[first].upper(),), _LET[first], GUESS)
-    if first in _BRACKETS:
-        terminal, bracket, cost = _BRACKETS[first]
-        yield Meaning(1, (terminal,), bracket, cost)
+    yield from _signs_meant(first)
     if first in TEMPORAL and len(said) > 1 and said[1] in "[(":
         yield Meaning(1, (_terminal(TEMPORAL[first]),), TEMPORAL[first], LIKELY)
     if not first[0].isalpha():
@@ -269,6 +263,17 @@ def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
         named = synonym(first, _VOCABULARY) or closest(first, _VOCABULARY)
         if named is not None:
             yield Meaning(1, ("NAME",), named, LIKELY)
+
+
+def _signs_meant(first: str) -> Iterator[Meaning]:
+    """Possible meanings of signs, and of the small words of `let`."""
+    if first in (",", ":", "-", "to"):
+        yield Meaning(1, ("__ANON_0",), "..", LIKELY)
+    if first in _LET:
+        yield Meaning(1, (_LET[first].upper(),), _LET[first], GUESS)
+    if first in _BRACKETS:
+        terminal, bracket, cost = _BRACKETS[first]
+        yield Meaning(1, (terminal,), bracket, cost)
 
 
 TEMPORAL: Mapping[str, str] = MappingProxyType(

@@ -170,14 +170,7 @@ class _FormulaChecker:
                 yield from self.let(node)
                 return
             case And() | Or() if (loose := cut_off(node, self.unbound)) is not None:
-                part, rest, whole = loose
-                name = part.variable
-                what = f"'{part.kind} {name}:' ends before '{name}' is used again"
-                hint = f"write `{whole}` in place of `{rest}`"
-                yield part.span, what, "parentheses around all that it is about", hint
-                self.scope = (*self.scope, name)
-                yield from self.node(whole.part)
-                self.scope = self.scope[:-1]
+                yield from self.widened(*loose)
                 return
             case Variable():
                 yield from self.variable(node)
@@ -194,13 +187,7 @@ class _FormulaChecker:
             case PastOperator(window=TimeWindow() as window):
                 yield from check_window(window, "for" if node.kind == "always" else "within")
             case FutureOperator(window=window, span=span) | Until(window=window, span=span):
-                word = node.kind if isinstance(node, FutureOperator) else "until"
-                if window is None:
-                    what = f"'{word}' without a window would wait forever"
-                    bounded = replace(node, window=TimeWindow(ZERO, Number(5.0, Unit.S)))
-                    yield span, what, f"such as {word}[5 s]", f"write `{bounded}`"
-                else:
-                    yield from check_window(window, word)
+                yield from _ahead(node, window, span)
             case Since(window=TimeWindow() as window):
                 yield from check_window(window, "since")
             case MOfN():
@@ -209,6 +196,16 @@ class _FormulaChecker:
                 yield from check_time(duration, getattr(node, "name", "last"))
         for part in children(node):
             yield from self.node(part)
+
+    def widened(self, short: Quantified, rest: Formula, whole: Quantified) -> Iterator[Fault]:
+        """A quantifier that ends too early, and the errors within all that it is about."""
+        name = short.variable
+        what = f"'{short.kind} {name}:' ends before '{name}' is used again"
+        hint = f"write `{whole}` in place of `{rest}`"
+        yield short.span, what, "parentheses around all that it is about", hint
+        self.scope = (*self.scope, name)
+        yield from self.node(whole.part)
+        self.scope = self.scope[:-1]
 
     def unbound(self, node: Node) -> set[str]:
         """The objects that a formula names and neither it nor anything around it binds."""
@@ -338,6 +335,17 @@ class _FormulaChecker:
             other = EXAMPLES.get(wanted)
             hint = None if other is None else f"write `{other}` in place of `{word}`"
             yield call.span, what, None, hint or "rename the variable"
+
+
+def _ahead(node: FutureOperator | Until, window: TimeWindow | None, span: Span) -> Iterator[Fault]:
+    """Errors of a window into the future."""
+    word = node.kind if isinstance(node, FutureOperator) else "until"
+    if window is None:
+        what = f"'{word}' without a window would wait forever"
+        bounded = replace(node, window=TimeWindow(ZERO, Number(5.0, Unit.S)))
+        yield span, what, f"such as {word}[5 s]", f"write `{bounded}`"
+    else:
+        yield from check_window(window, word)
 
 
 def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:

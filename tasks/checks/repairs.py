@@ -18,9 +18,9 @@ from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.additions import added
 from visup.tasks.checks.corrections import corrected, said
-from visup.tasks.checks.usual_meanings import NAME, USUAL, recoveries
+from visup.tasks.checks.usual_meanings import USUAL, recoveries
 from visup.tasks.diagnostics.recovery import KEYWORDS
-from visup.tasks.grammar.statement import RESERVED_WORDS
+from visup.tasks.grammar.statement import NAME, RESERVED_WORDS
 from visup.tasks.grammar.units import UNITS
 
 CHARACTERS_TRIED = 60_000

@@ -6,7 +6,7 @@
 from random import Random
 
 from tests.tasks.checks.mistakes.counted import accounts, good_rules, good_tasks
-from tests.tasks.checks.mistakes.mutations import KINDS, slips, tokens_of
+from tests.tasks.checks.mistakes.mutations import KINDS, slips
 
 ONE_IN = 20
 
