@@ -10,7 +10,7 @@ from visup.percepts.motion.features.work_image import Floats
 
 Labels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
-
+Pixels = NDArray[np.uint32]
 
 LINE, WAITS = -1, -2  # labels of pixels on a boundary, and of pixels in a queue
 LEVELS = 256
@@ -18,7 +18,7 @@ LEVELS = 256
 
 @compiled
 def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
-    """Seeded watershed: pixel for pixel the result of `cv2.watershed`, in two thirds of its time.
+    """Seeded watershed: pixel for pixel the result of `cv2.watershed`, in a third to half of its time.
 
     Pixels beside the cells wait in one first-in, first-out queue for each edge strength; the weakest is
     emptied first. A pixel between two cells becomes a boundary.
@@ -32,69 +32,71 @@ def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
     height, width = marks.shape
     flat, east, south = marks.ravel(), right.ravel(), down.ravel()
     one, row = np.uint64(1), np.uint64(width)
-    first, last = np.full(LEVELS, -1, np.int32), np.full(LEVELS, -1, np.int32)
     marks[0], marks[height - 1] = LINE, LINE
     marks[:, 0], marks[:, width - 1] = LINE, LINE
-    # As a separate function, called for each pixel, this loop would raise the total from 20 ms to 28 ms
-    # (512 x 288 pixels, both measured in one process).
-    for y in range(1, height - 1):
-        for x in range(1, width - 1):
-            p = np.uint64(y * width + x)
-            if flat[p] != 0:
-                continue
-            edge = np.uint8(LEVELS - 1)
-            west, right_of = flat[p - one] > 0, flat[p + one] > 0
-            above, below = flat[p - row] > 0, flat[p + row] > 0
-            if west:
-                edge = min(edge, east[p - one])
-            if right_of:
-                edge = min(edge, east[p])
-            if above:
-                edge = min(edge, south[p - row])
-            if below:
-                edge = min(edge, south[p])
-            if west or right_of or above or below:
-                _queue(flat, first, last, p, np.uint64(edge))
+    after, first, last = _seed_queues(flat, east, south, height, width)
+    # A processor cannot guess whether a neighbour is free, so there is no branch on it: each neighbour is
+    # written behind the end of its queue, and the end moves only if it was free (2.9 ms, not 8.1).
     lowest = np.uint64(0)
     while True:
-        while lowest < np.uint64(LEVELS) and first[lowest] < 0:
+        while first[lowest] == last[lowest]:
             lowest += one
-        if lowest == np.uint64(LEVELS):
-            break
-        p = np.uint64(first[lowest])
-        first[lowest] = WAITS - 1 - flat[p]
+            if lowest == np.uint64(LEVELS):
+                return
+        p = np.uint64(after[np.uint64(first[lowest])])
+        first[lowest] = p
         a, b, c, d = flat[p - one], flat[p + one], flat[p - row], flat[p + row]
         cell = max(max(a, b), max(c, d))
-        if (0 < a != cell) or (0 < b != cell) or (0 < c != cell) or (0 < d != cell):
+        between = ((a > 0) & (a != cell)) | ((b > 0) & (b != cell))
+        if between | ((c > 0) & (c != cell)) | ((d > 0) & (d != cell)):
             flat[p] = LINE
             continue
         flat[p] = cell
-        lowest = _come_to(flat, first, last, p - one, east[p - one], lowest)
-        lowest = _come_to(flat, first, last, p + one, east[p], lowest)
-        lowest = _come_to(flat, first, last, p - row, south[p - row], lowest)
-        lowest = _come_to(flat, first, last, p + row, south[p], lowest)
+        for side in range(4):
+            if side == 0:
+                label, q, level = a, p - one, np.uint64(east[p - one])
+            elif side == 1:
+                label, q, level = b, p + one, np.uint64(east[p])
+            elif side == 2:
+                label, q, level = c, p - row, np.uint64(south[p - row])
+            else:
+                label, q, level = d, p + row, np.uint64(south[p])
+            free, end = label == 0, last[level]
+            flat[q] = WAITS if free else label
+            after[np.uint64(end)] = q
+            last[level] = np.uint32(q) if free else end
+            lowest = min(lowest, level if free else lowest)
 
 
 @compiled
-def _come_to(
-    flat: Labels, first: Labels, last: Labels, p: np.uint64, edge: int, lowest: np.uint64
-) -> np.uint64:
-    """Queue a pixel not reached yet; returns the lowest level with pixels waiting."""
-    if flat[p] != 0:
-        return lowest
-    level = np.uint64(edge)
-    _queue(flat, first, last, p, level)
-    return min(lowest, level)
+def _seed_queues(
+    flat: Labels, east: Bytes, south: Bytes, height: int, width: int
+) -> tuple[Pixels, Pixels, Pixels]:
+    """The queues of the pixels beside the seeds: linked lists, one for each level.
 
-
-@compiled
-def _queue(flat: Labels, first: Labels, last: Labels, p: np.uint64, level: np.uint64) -> None:
-    """Append a pixel to the queue of a level, a linked list through `flat`."""
-    if first[level] < 0:
-        first[level] = p
-    else:
-        flat[np.uint64(last[level])] = WAITS - 1 - np.int32(p)
-    last[level], flat[p] = p, WAITS
+    Returns:
+        The pixel that follows each pixel, and as an entry past the last pixel each level's first; the entry
+        before the first that waits on each level, and the last that waits there. Both are the same where none does.
+    """
+    one, row = np.uint64(1), np.uint64(width)
+    after = np.empty(len(flat) + LEVELS, np.uint32)
+    first = np.arange(len(flat), len(flat) + LEVELS).astype(np.uint32)
+    last = first.copy()
+    highest = np.uint8(LEVELS - 1)
+    for y in range(1, height - 1):
+        for x in range(1, width - 1):
+            p = np.uint64(y * width + x)
+            west, right_of = flat[p - one] > 0, flat[p + one] > 0
+            above, below = flat[p - row] > 0, flat[p + row] > 0
+            if (flat[p] == 0) & (west | right_of | above | below):
+                edge = min(
+                    min(east[p - one] if west else highest, east[p] if right_of else highest),
+                    min(south[p - row] if above else highest, south[p] if below else highest),
+                )
+                level = np.uint64(edge)
+                after[np.uint64(last[level])] = p
+                last[level], flat[p] = p, WAITS
+    return after, first, last
 
 
 @compiled
