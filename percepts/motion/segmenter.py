@@ -349,7 +349,8 @@ class MotionSegmenter:
     ) -> Constraints:
         """Constraints over one frame, from where dense flow expects the points."""
         x, y = points.xy.astype(np.int64).T
-        c = track_points(points, points.xy + flow[y, x], old, image, 1, self.settings.noise)
+        guess, noise = points.xy + flow[y, x], self.settings.noise
+        c = track_points(points, guess, old, image, 1, noise, nearby=self._foreground.moves)
         return add_flow_constraints(c, points, flow, old, image, self.settings.noise)
 
     def _begin_tracking(
@@ -360,9 +361,8 @@ class MotionSegmenter:
         span = scene.time - old.time
         guess = predicted_positions(scene, tracks, self._predicted(scene.time, span), lag, span)
         noise = self.settings.noise
-        return self._executor.submit(
-            track_points, scene.points, guess, old, scene.image, lag, noise
-        )
+        look = partial(track_points, nearby=self._foreground.moves)
+        return self._executor.submit(look, scene.points, guess, old, scene.image, lag, noise)
 
     def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
         """The background motion fitted to the constraints over one baseline."""

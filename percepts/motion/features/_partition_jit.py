@@ -75,8 +75,8 @@ def _seed_queues(
     """The queues of the pixels beside the seeds: linked lists, one for each level.
 
     Returns:
-        The pixel that follows each pixel, and as an entry past the last pixel each level's first; the entry
-        before the first that waits on each level, and the last that waits there. Both are the same where none does.
+        What follows each pixel, and after the last one, for each level, its first pixel; what precedes the
+        first pixel that waits on each level; and the last that waits there: the same where none does.
     """
     one, row = np.uint64(1), np.uint64(width)
     after = np.empty(len(flat) + LEVELS, np.uint32)

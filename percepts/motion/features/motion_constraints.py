@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,14 +18,12 @@ from visup.percepts.motion.features._motion_constraints_jit import (
     strongest_gradients,
     structure_tensors,
 )
+from visup.percepts.motion.features.point_search import WINDOW, search, search_widely
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 
 Ints = NDArray[np.int64]
-WINDOW = 11
 MARGIN = 3  # pixels at the border of the image where no point is taken
 CORNER = 0.1  # least ratio of the eigenvalues of a corner's structure tensor
-STEPS_NEAR = 10, 0.03  # most iterations of a search, and the step, pixels, at which it stops: well
-STEPS_FAR = 30, 0.01  # below FLOOR; slow motion over long baselines needs more of both
 AGREED = 0.25  # pixels up to which dense flow and the search for a point agree
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
@@ -148,7 +145,14 @@ def mahalanobis(error: Floats, information: Floats) -> Floats:
 
 
 def track_points(
-    points: Points, guess: Floats, old: WorkImage, new: WorkImage, lag: int, noise: float
+    points: Points,
+    guess: Floats,
+    old: WorkImage,
+    new: WorkImage,
+    lag: int,
+    noise: float,
+    *,
+    nearby: bool = False,
 ) -> Constraints:
     """Constraints over one baseline, each point checked forward and backward.
 
@@ -159,6 +163,7 @@ def track_points(
         new: The newest image.
         lag: Frames between them.
         noise: Standard deviation of grey values.
+        nearby: Whether points are first searched where they are expected, which takes half the time.
 
     Returns:
         Constraints of the points that were tracked.
@@ -169,7 +174,8 @@ def track_points(
     begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
     # Between adjacent frames dense flow gives the starting point: coarse levels would only mislead.
     near = lag == 1
-    there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 1 if near else 2, near)
+    look = search if nearby else search_widely
+    there, found, misfit = look(new, old, start, begin, 1 if near else 2, near=near)
     home, back = _back(points, begin, there, found, (old, new), near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # Results of lost points may not even be finite.
@@ -210,39 +216,11 @@ def _back(
     if len(checked):
         first = np.ascontiguousarray((start + aside)[checked])
         old, new = images
-        ends, sound, _ = _follow(
-            old.grey, new.grey, np.ascontiguousarray(there[checked]), first, 0, near
+        ends, sound, _ = search_widely(
+            old, new, np.ascontiguousarray(there[checked]), first, 0, near=near
         )
         home[checked], back[checked] = ends, sound
     return home, back
-
-
-def _follow(
-    source: NDArray[np.uint8],
-    target: NDArray[np.uint8],
-    start: Floats,
-    begin: Floats,
-    levels: int,
-    near: bool,
-) -> tuple[Floats, NDArray[np.uint8], Floats]:
-    """Pyramidal Lucas-Kanade from given starting values: (N, 1, 2), (N, 1), (N, 1)."""
-    most, enough = STEPS_NEAR if near else STEPS_FAR
-    end, found, misfit = cv2.calcOpticalFlowPyrLK(
-        source,
-        target,
-        start,
-        begin,
-        winSize=(WINDOW, WINDOW),
-        maxLevel=levels,
-        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, most, enough),
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-        minEigThreshold=1e-5,
-    )
-    return (
-        np.asarray(end, dtype=np.float32),
-        np.asarray(found, dtype=np.uint8),
-        np.asarray(misfit, dtype=np.float32),
-    )
 
 
 def add_flow_constraints(

@@ -53,6 +53,14 @@ class ForegroundState:
         """Whether the background hardly moves: then tracks over long baselines beat single frames."""
         return self.ground_px is not None and self.ground_px < CALM_PX
 
+    @property
+    def moves(self) -> bool:
+        """Whether the background is known to move: then a quicker search for points does.
+
+        While it is calm, tracks decide what is reported, and they lose by it.
+        """
+        return self.ground_px is not None and not self.calm
+
 
 def resting(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
     """The state after a frame in which only the background's motion is updated.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -118,10 +119,10 @@ def clean_mask(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | Non
     Returns:
         (H, W) bool, or None when the largest part is too small.
     """
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=4)
+    count, labels = cv2.connectedComponents(mask.view(np.uint8), connectivity=4)
     if count < 2:
         return None
-    areas = stats[1:, cv2.CC_STAT_AREA]
+    areas = component_areas(mask.view(np.uint8), labels, count)[1:]
     largest = int(areas.max())
     if largest < least:
         return None
@@ -132,12 +133,28 @@ def clean_mask(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | Non
     return _filled(whole, HOLE * largest)
 
 
+def component_areas(mask: NDArray[np.uint8], labels: NDArray[Any], count: int) -> NDArray[Any]:
+    """Pixels of each component, the rest of the image first; OpenCV's statistics take four times as long.
+
+    Args:
+        mask: (h, w), not 0 where the components are.
+        labels: (h, w), from `cv2.connectedComponents`.
+        count: Number of labels.
+    """
+    if count > 2:
+        return np.bincount(labels.ravel(), minlength=count)
+    inside = cv2.countNonZero(mask)
+    return np.array([mask.size - inside, inside])[:count]
+
+
 def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
     """Fill holes of up to `most` pixels: small enclosed parts are seldom background."""
     padded = np.ones((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
     np.logical_not(mask, out=padded[1:-1, 1:-1].view(bool))
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)
-    small = stats[:, cv2.CC_STAT_AREA] <= most
+    count, labels = cv2.connectedComponents(padded, connectivity=4)
+    if count == 2:
+        return mask
+    small = component_areas(padded, labels, count) <= most
     small[[0, labels[0, 0]]] = False
     return np.asarray(mask | small[labels][1:-1, 1:-1]) if small.any() else mask
 

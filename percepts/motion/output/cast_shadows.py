@@ -41,19 +41,21 @@ BARE_EVEN, BARE_HUE = 1.25, 0.03  # the same limits where the ground has no text
 FOR, AGAINST = 1.0, 1.5  # weight of a frame
 BOUNDS = (-6.0, 3.0)
 SURE = 2.0  # evidence from which a region counts as a shadow
-STEP_PX = 0.5  # the ground is warped once it is off by this much: each warp blurs it
+STEP_PX = 0.5  # the ground is warped where it is off by this much: each warp blurs it
 MOST = 256  # most regions with stored evidence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BareGround:
-    """The ground as seen where nothing moved, warped along with the camera.
+    """The ground as seen where nothing moved, and how the camera has moved since.
+
+    Both images are warped only when they are renewed, and in between the part that is looked at.
 
     Attributes:
         bare: (h, w, 3) float32, seen bare for at least `DELAY_S`; NaN where it never was.
         latest: (h, w, 3) float32, as last seen bare.
         since: Seconds when `latest` was taken.
-        off: (2, 3) float64, affine map still to be applied to both, pixels.
+        off: (2, 3) float64, affine map from the newest image to both, pixels.
     """
 
     bare: Floats
@@ -99,7 +101,9 @@ class CastShadowFilter:
             ground = _aligned(ground, scene)
         for r in regions:
             self._weigh(r, image, ground, frame)
-        self._ground = _updated(ground, image, _covered(regions, frame, image), frame.time)
+        if frame.time - ground.since >= DELAY_S:
+            ground = _updated(ground, image, _covered(regions, frame, image), frame.time)
+        self._ground = ground
         self._evidence = dict(list(self._evidence.items())[-MOST:])
         return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
 
@@ -174,29 +178,49 @@ def comparable_image(frame: Frame) -> Floats:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     scale = min(1.0, SIZE / max(frame.size))
     size = (max(8, round(frame.size[0] * scale)), max(8, round(frame.size[1] * scale)))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
+    # Means over whole pixels first: by a ratio that is no whole number they take eight times as long.
+    whole = max(int(1 / scale), 1)
+    if whole > 1:
+        height, width = (n // whole * whole for n in image.shape[:2])
+        fewer = (width // whole, height // whole)
+        image = np.asarray(
+            cv2.resize(image[:height, :width], fewer, interpolation=cv2.INTER_AREA), dtype=np.uint8
+        )
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32)
 
 
 def _aligned(ground: BareGround, scene: FrameMeasurements) -> BareGround:
-    """The ground aligned with the newest image."""
+    """The ground with the camera's motion to the newest image."""
     if not scene.measured:
         return ground
-    height, width = ground.bare.shape[:2]
+    width = ground.bare.shape[1]
     step = -np.asarray(scene.measured[0].background.models[-1].matrix, dtype=np.float64)
     step[:, 2] *= width / scene.image.shape[1]
-    # From the newest image to the previous one, composed with the map not yet applied.
+    # From the newest image to the previous one, composed with the map from there.
     back = np.vstack([step + np.eye(2, 3), [0.0, 0.0, 1.0]])
-    off = ground.off @ back
+    return replace(ground, off=ground.off @ back)
+
+
+def _is_off(ground: BareGround) -> bool:
+    """Whether the ground has to be warped to fit the newest image."""
+    height, width = ground.bare.shape[:2]
     corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]]).T
-    if np.abs((off - np.eye(2, 3)) @ corners).max() < STEP_PX:
-        return replace(ground, off=off)
-    return BareGround(_moved(ground.bare, off), _moved(ground.latest, off), ground.since)
+    return bool(np.abs((ground.off - np.eye(2, 3)) @ corners).max() >= STEP_PX)
 
 
-def _moved(image: Floats, back: Doubles) -> Floats:
-    """An image warped by an affine map from new to old positions; NaN outside the old image."""
-    size, flags = image.shape[1::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    nothing = (np.nan, np.nan, np.nan)
+def _bare_part(ground: BareGround, box: tuple[int, int, int, int]) -> Floats:
+    """The bare ground in a box (x0, y0, x1, y1) of the newest image."""
+    x0, y0, x1, y1 = box
+    if not _is_off(ground):
+        return ground.bare[y0:y1, x0:x1]
+    back = ground.off.copy()
+    back[:, 2] += back[:, :2] @ np.array([x0, y0])
+    return _moved(ground.bare, back, (x1 - x0, y1 - y0))
+
+
+def _moved(image: Floats, back: Doubles, size: tuple[int, int]) -> Floats:
+    """A (width, height) image, warped by an affine map from new to old positions; NaN outside the old one."""
+    flags, nothing = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, (np.nan, np.nan, np.nan)
     return np.asarray(
         cv2.warpAffine(image, back, size, flags=flags, borderValue=nothing), dtype=np.float32
     )
@@ -204,15 +228,14 @@ def _moved(image: Floats, back: Doubles) -> Floats:
 
 def _updated(ground: BareGround, image: Floats, covered: Mask, now: float) -> BareGround:
     """The ground updated by one more image."""
-    if now - ground.since < DELAY_S:
-        return ground
+    known, latest, off = ground.bare, ground.latest, ground.off
+    if _is_off(ground):
+        size = (image.shape[1], image.shape[0])
+        known, latest, off = _moved(known, off, size), _moved(latest, off, size), np.eye(2, 3)
     bare = ~covered[..., None]
-    settled = bare & np.isfinite(ground.latest)
-    return replace(
-        ground,
-        bare=np.where(settled, ground.latest, ground.bare),
-        latest=np.where(bare, image, np.float32(np.nan)),
-        since=now,
+    settled = bare & np.isfinite(latest)
+    return BareGround(
+        np.where(settled, latest, known), np.where(bare, image, np.float32(np.nan)), now, off
     )
 
 
@@ -227,9 +250,9 @@ def _covered(regions: Sequence[Region], frame: Frame, image: Floats) -> Mask:
 def _cut(
     region: Region, image: Floats, ground: BareGround, frame: Frame
 ) -> tuple[Floats, Floats, Mask]:
-    (x0, y0, x1, y1), mask = _scaled(region, frame, image)
-    part = np.s_[y0:y1, x0:x1]
-    return image[part], ground.bare[part], mask
+    box, mask = _scaled(region, frame, image)
+    x0, y0, x1, y1 = box
+    return image[y0:y1, x0:x1], _bare_part(ground, box), mask
 
 
 def _scaled(region: Region, frame: Frame, image: Floats) -> tuple[tuple[int, int, int, int], Mask]:

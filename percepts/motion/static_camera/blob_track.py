@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.outlines.region_outline import component_areas
 
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.int32]
@@ -107,9 +108,10 @@ def find_blobs(
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 5))
     closed = cv2.morphologyEx(change.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    filled = cv2.drawContours(np.zeros_like(closed), outlines, -1, 1, cv2.FILLED)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
-    keep = stats[:, cv2.CC_STAT_AREA] >= least
+    filled = np.zeros(closed.shape, np.uint8)
+    cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
+    count, labels = cv2.connectedComponents(filled, connectivity=8)
+    keep = component_areas(filled, labels, count) >= least
     keep[0] = False
     number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
     return Foreground(image, number[labels], int(keep.sum()), time, seconds)

@@ -47,12 +47,11 @@ class PartMotion:
 
     def predicted(self, lag: int, span_s: float, where: tuple[float, float]) -> Affine:
         """Its displacement over a baseline, from the best known rate."""
-        best = self.best_rate(where)
-        if best is None:
+        rate = self.rates.get(lag)
+        if rate is None or max(r.time for r in self.rates.values()) - rate.time >= 0.5:
+            rate = self.best_rate(where)
+        if rate is None:
             return Affine(np.zeros((2, 3)))
-        own = self.rates.get(lag)
-        newest = max(r.time for r in self.rates.values())
-        rate = own if own is not None and newest - own.time < 0.5 else best
         return Affine(rate.matrix * span_s, rate.sigma * span_s)
 
     def best_rate(self, where: tuple[float, float]) -> AffineRate | None:

@@ -9,7 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.motion.clips import texture
-from visup.percepts.motion.output.cast_shadows import shadow_evidence
+from visup.agent import Frame
+from visup.percepts.motion.output.cast_shadows import (
+    BareGround,
+    _bare_part,
+    comparable_image,
+    shadow_evidence,
+)
 
 SHAPE = (60, 80)
 WHERE = cv2.ellipse(np.zeros(SHAPE, np.uint8), (40, 30), (30, 20), 0, 0, 360, 1, -1) > 0
@@ -61,3 +67,21 @@ def test_even_darkening_of_plain_ground_tells_less() -> None:
     plain = shadow_evidence(noisy(now, 1, 0.5), noisy(bare, 2, 0.5), WHERE)
     textured = shadow_evidence(noisy(0.6 * ground(1), 1), noisy(ground(1), 2), WHERE)
     assert 0 < plain < textured
+
+
+@given(st.integers(-9, 9), st.integers(-9, 9))
+@settings(max_examples=20, deadline=None)
+def test_the_part_of_the_ground_that_is_looked_at_moves_with_the_camera(dx: int, dy: int) -> None:
+    bare = ground(7)
+    moved = BareGround(bare, bare, 0.0, np.array([[1.0, 0, dx], [0, 1, dy]]))
+    found = _bare_part(moved, (20, 15, 50, 40))
+    np.testing.assert_allclose(found, bare[15 + dy : 40 + dy, 20 + dx : 50 + dx], atol=1e-3)
+
+
+@pytest.mark.parametrize("size", [(854, 480), (320, 240), (1001, 777), (60, 40)])
+def test_a_smaller_image_has_the_tones_of_the_frame(size: tuple[int, int]) -> None:
+    frame = cv2.resize(ground(3).astype(np.uint8), size, interpolation=cv2.INTER_LINEAR)
+    found = comparable_image(Frame(0, 0.0, np.asarray(frame, np.uint8)))
+    assert max(found.shape[:2]) <= 384
+    back = cv2.resize(found, size, interpolation=cv2.INTER_LINEAR)
+    assert np.abs(back - frame).mean() < 3
