@@ -350,7 +350,7 @@ class MotionSegmenter:
         """Constraints over one frame, from where dense flow expects the points."""
         x, y = points.xy.astype(np.int64).T
         guess, noise = points.xy + flow[y, x], self.settings.noise
-        c = track_points(points, guess, old, image, 1, noise, nearby=self._foreground.moves)
+        c = track_points(points, guess, (old, image), 1, noise, nearby=self._foreground.moves)
         return add_flow_constraints(c, points, flow, old, image, self.settings.noise)
 
     def _begin_tracking(
@@ -362,7 +362,7 @@ class MotionSegmenter:
         guess = predicted_positions(scene, tracks, self._predicted(scene.time, span), lag, span)
         noise = self.settings.noise
         look = partial(track_points, nearby=self._foreground.moves)
-        return self._executor.submit(look, scene.points, guess, old, scene.image, lag, noise)
+        return self._executor.submit(look, scene.points, guess, (old, scene.image), lag, noise)
 
     def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
         """The background motion fitted to the constraints over one baseline."""

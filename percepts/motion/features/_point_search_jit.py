@@ -39,7 +39,6 @@ def search_nearby(
     grey, gx, gy = source
     most, enough, reach = limits
     height, width = grey.shape
-    zero, one = np.float32(0), np.float32(1)
     end, found = begin.copy(), np.zeros(len(start), np.bool_)
     misfit = np.full(len(start), np.float32(255))
     own = np.zeros((3, WINDOW, LANES), np.float32)
@@ -56,16 +55,7 @@ def search_nearby(
             for i in range(WINDOW):
                 own[0, j, i], own[1, j, i] = tones[j, i], along_x[j, i]
                 own[2, j, i] = along_y[j, i]
-        # The loops over windows are written out: in a function of its own, the compiler could not know that
-        # `sums` is apart from the rest. They add column by column, not along a row one by one.
-        for i in range(LANES):
-            sums[0, i], sums[1, i], sums[2, i] = zero, zero, zero
-        for j in range(WINDOW):
-            for i in range(LANES):
-                sums[0, i] += own[1, j, i] * own[1, j, i]
-                sums[1, i] += own[1, j, i] * own[2, j, i]
-                sums[2, i] += own[2, j, i] * own[2, j, i]
-        xx, xy, yy = _total(sums[0]), _total(sums[1]), _total(sums[2])
+        xx, xy, yy = _tensor(own, sums)
         damped = np.float32(DAMPING) * (xx + yy) + np.float32(1e-3)
         xx, yy = xx + damped, yy + damped
         area = xx * yy - xy * xy
@@ -80,18 +70,7 @@ def search_nearby(
                 for j in range(WINDOW + 1):
                     for i in range(WINDOW + 1):
                         other[j, i] = part[j, i]
-            a, b = np.float32(u - column), np.float32(v - row)
-            p, q, r, s = (one - a) * (one - b), a * (one - b), (one - a) * b, a * b
-            for i in range(LANES):
-                sums[0, i], sums[1, i], sums[2, i] = zero, zero, zero
-            for j in range(WINDOW):
-                for i in range(LANES):
-                    upper = p * other[j, i] + q * other[j, i + 1]
-                    off = upper + (r * other[j + 1, i] + s * other[j + 1, i + 1]) - own[0, j, i]
-                    sums[0, i] += off * own[1, j, i]
-                    sums[1, i] += off * own[2, j, i]
-                    sums[2, i] += abs(off)
-            by_x, by_y, differs = _total(sums[0]), _total(sums[1]), _total(sums[2])
+            by_x, by_y, differs = _difference(own, other, u - column, v - row, sums)
             step_x, step_y = (xy * by_y - yy * by_x) / area, (xy * by_x - xx * by_y) / area
             misfit[n] = differs / np.float32(WINDOW * WINDOW)
             u, v = u + step_x, v + step_y
@@ -107,6 +86,49 @@ def search_nearby(
 def _is_inside(x: float, y: float, height: int, width: int) -> bool:
     """Whether a window, and the pixels that interpolation needs, are in the image."""
     return bool(HALF <= x < width - HALF - 1 and HALF <= y < height - HALF - 1)
+
+
+@compiled
+def _tensor(own: Floats, sums: Floats) -> tuple[np.float32, np.float32, np.float32]:
+    """The structure tensor (xx, xy, yy) of a window; `sums` is overwritten."""
+    # Column by column, here and below: sums along a row would have to be added in its order, one by one.
+    for k in range(3):
+        for i in range(LANES):
+            sums[k, i] = np.float32(0)
+    for j in range(WINDOW):
+        for i in range(LANES):
+            sums[0, i] += own[1, j, i] * own[1, j, i]
+            sums[1, i] += own[1, j, i] * own[2, j, i]
+            sums[2, i] += own[2, j, i] * own[2, j, i]
+    return _total(sums[0]), _total(sums[1]), _total(sums[2])
+
+
+@compiled
+def _difference(
+    own: Floats, other: Floats, right: float, down: float, sums: Floats
+) -> tuple[np.float32, np.float32, np.float32]:
+    """How two windows differ: by the gradients along x and y, and absolutely; `sums` is overwritten.
+
+    Args:
+        own: (3, WINDOW, LANES) grey values and gradients of the point.
+        other: (WINDOW + 1, LANES + 1) grey values of the other image.
+        right: Position of the window in those, 0 to 1.
+        down: The same along y.
+        sums: (3, LANES).
+    """
+    one, a, b = np.float32(1), np.float32(right), np.float32(down)
+    p, q, r, s = (one - a) * (one - b), a * (one - b), (one - a) * b, a * b
+    for k in range(3):
+        for i in range(LANES):
+            sums[k, i] = np.float32(0)
+    for j in range(WINDOW):
+        for i in range(LANES):
+            upper = p * other[j, i] + q * other[j, i + 1]
+            off = upper + (r * other[j + 1, i] + s * other[j + 1, i + 1]) - own[0, j, i]
+            sums[0, i] += off * own[1, j, i]
+            sums[1, i] += off * own[2, j, i]
+            sums[2, i] += abs(off)
+    return _total(sums[0]), _total(sums[1]), _total(sums[2])
 
 
 @compiled

@@ -147,20 +147,18 @@ def mahalanobis(error: Floats, information: Floats) -> Floats:
 def track_points(
     points: Points,
     guess: Floats,
-    old: WorkImage,
-    new: WorkImage,
+    images: tuple[WorkImage, WorkImage],
     lag: int,
     noise: float,
     *,
-    nearby: bool = False,
+    nearby: bool,
 ) -> Constraints:
     """Constraints over one baseline, each point checked forward and backward.
 
     Args:
         points: Points of the newest image.
         guess: (N, 2) float32, where each is expected in the old image.
-        old: The older image.
-        new: The newest image.
+        images: The older image and the newest.
         lag: Frames between them.
         noise: Standard deviation of grey values.
         nearby: Whether points are first searched where they are expected, which takes half the time.
@@ -168,6 +166,7 @@ def track_points(
     Returns:
         Constraints of the points that were tracked.
     """
+    old, new = images
     if not len(points):
         return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_no_constraints())
     start = points.xy.reshape(-1, 1, 2).copy()
@@ -176,7 +175,7 @@ def track_points(
     near = lag == 1
     look = search if nearby else search_widely
     there, found, misfit = look(new, old, start, begin, 1 if near else 2, near=near)
-    home, back = _back(points, begin, there, found, (old, new), near)
+    home, back = _back(points, begin, there, found, images, near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # Results of lost points may not even be finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))

@@ -163,59 +163,44 @@ def update_planes(
     mean, other = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
     variance, seen_s = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
     other_s = np.empty((height, width), np.float32)
-    zero, one, three = np.float32(0), np.float32(1), np.float32(3)
-    seconds, settle, restless = (
-        np.float32(pace.seconds),
-        np.float32(pace.settle),
-        np.float32(pace.restless),
-    )
-    fits_below, rare, alike_below = (
-        np.float32(pace.fits),
-        np.float32(pace.rare),
-        np.float32(pace.alike),
-    )
-    least, most = np.float32(pace.least), np.float32(pace.most)
-    # Row by row, in single precision throughout: half the time of indices and constants that are wider.
     for y in range(height):
-        tones, old_mean, old_other = image[y], known.mean[y], known.other[y]
-        old_variance, old_seen, old_other_s = known.variance[y], known.seen_s[y], known.other_s[y]
-        new_mean, new_other, moving_row, gone_row = mean[y], other[y], moving[y], gone[y]
-        new_variance, new_seen, new_other_s = variance[y], seen_s[y], other_s[y]
         for x in range(width):
-            spread, seen, instead = old_variance[x], old_seen[x], old_other_s[x]
-            off = _squared_distance(tones, old_mean, x) / (three * spread)
-            moves, is_known = moving_row[x], seen > zero
-            fits = (off < fits_below) & (not moves) & is_known
-            weight = max(seconds / (seen + seconds), settle) if fits else zero
-            step = zero
-            if is_known and not fits:
-                alike = _squared_distance(tones, old_other, x) < alike_below
-                step = np.float32(0.3) if alike else one
-                instead = instead + seconds if alike else seconds
+            spread, seen, instead = known.variance[y, x], known.seen_s[y, x], known.other_s[y, x]
+            off = _squared_distance(image, known.mean, y, x) / (np.float32(3) * spread)
+            moves, is_known = moving[y, x], seen > 0
+            fits = off < pace.fits and not moves and is_known
+            away = is_known and not fits
+            weight = np.float32(max(pace.seconds / (seen + pace.seconds), pace.settle))
+            weight = weight if fits else np.float32(0)
+            step = np.float32(0)
+            if away:
+                alike = _squared_distance(image, known.other, y, x) < pace.alike
+                step = np.float32(0.3 if alike else 1.0)
+                instead = instead + pace.seconds if alike else pace.seconds
             for i in range(3):
-                now, old, before = tones[x, i], old_mean[x, i], old_other[x, i]
-                new_mean[x, i] = old + weight * (now - old)
-                new_other[x, i] = before + step * (now - before)
+                now, old, before = image[y, x, i], known.mean[y, x, i], known.other[y, x, i]
+                mean[y, x, i] = old + weight * (now - old)
+                other[y, x, i] = before + step * (now - before)
             # Leaves and water vary strongly and return; a single passing object has little effect.
             if not moves:
-                spread += restless * (min(off, rare) - one) * spread
-            enough = (three * seen if moves else min(seen, np.float32(20))) + np.float32(0.2)
+                spread += pace.restless * (min(off, pace.rare) - 1) * spread
+            enough = (3 * seen if moves else min(seen, 20.0)) + 0.2
             if fits:
-                seen = min(seen + seconds, np.float32(60))
-            if gone_row[x]:
-                new_other[x] = tones[x]
-            new_variance[x] = max(least, min(most, spread))
-            new_seen[x], new_other_s[x] = seen, instead
-            if instead > enough or (gone_row[x] and is_known):
-                new_mean[x] = new_other[x]
-                new_variance[x], new_seen[x], new_other_s[x] = 2 * least, instead, zero
+                seen = min(seen + pace.seconds, 60.0)
+            if gone[y, x]:
+                other[y, x] = image[y, x]
+            variance[y, x] = max(pace.least, min(pace.most, spread))
+            seen_s[y, x], other_s[y, x] = seen, instead
+            if instead > enough or (gone[y, x] and is_known):
+                mean[y, x] = other[y, x]
+                variance[y, x], seen_s[y, x], other_s[y, x] = 2 * pace.least, instead, 0.0
     return BackgroundPlanes(mean, variance, seen_s, other, other_s)
 
 
 @compiled
-def _squared_distance(tones: Floats, others: Floats, x: int) -> np.float32:
-    """Squared distance of a pixel of two rows, (w, 3)."""
-    a = tones[x, 0] - others[x, 0]
-    b = tones[x, 1] - others[x, 1]
-    c = tones[x, 2] - others[x, 2]
-    return np.float32(a * a + b * b + c * c)
+def _squared_distance(image: Floats, tones: Floats, y: int, x: int) -> float:
+    """Squared distance of a pixel of (h, w, 3) images."""
+    a = image[y, x, 0] - tones[y, x, 0]
+    b = image[y, x, 1] - tones[y, x, 1]
+    c = image[y, x, 2] - tones[y, x, 2]
+    return float(a * a + b * b + c * c)

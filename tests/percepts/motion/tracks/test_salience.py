@@ -36,7 +36,7 @@ def scene(time: float = 0.0) -> FrameMeasurements:
 
 def still(at: FrameMeasurements) -> BaselineMotion:
     """Nothing has moved, over one frame."""
-    c = follow(at.points, at.points.xy, at.image, at.image, 1, 1.0)
+    c = follow(at.points, at.points.xy, (at.image, at.image), 1, 1.0, nearby=True)
     rest = (Affine(np.zeros((2, 3))),)
     return BaselineMotion(
         c, BackgroundMotion(rest, 1.0, None, empty_prevalence(at.image.shape), True)
