@@ -41,3 +41,8 @@ def pytest_collection_finish() -> None:
     """Thousands of tests and all modules stay to the end: the garbage collector need not look at them."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_unconfigure() -> None:
+    """What was left alone is freed as usual at the end."""
+    gc.unfreeze()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from visup.agent import ObjectBelief
+from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.fragments import in_place_of_hidden
 from visup.rules.presence.lifecycle import confirm
 from visup.rules.presence.object_tracks import at_border
@@ -33,6 +34,9 @@ def confirm_new(context: StepContext) -> None:
 def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
     """Conditions for the entry of an object: seen often and steadily enough, no part of another, no speck."""
     s, track = context.settings, context.of[belief.id]
+    if _known_at_first_sight(context, belief):
+        yield Condition("not part of another object", not context.may_be_part(belief))
+        return
     yield at_least("sightings", track.sightings, s.least_sightings)
     yield Condition("not part of another object", not context.may_be_part(belief))
     named = belief.id in context.recognised
@@ -47,6 +51,17 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
     needed = s.entry_s if at_edge or _is_early(context, belief) else s.entry_inside_s
     steady = context.now - track.coherent_since
     yield at_least("seen steadily for", steady, needed, " s", slack=1e-6)
+
+
+def _known_at_first_sight(context: StepContext, belief: ObjectBelief) -> bool:
+    """Whether it was recognised by appearance in the first picture, with little doubt.
+
+    Steadiness is asked for since shadows and flickers may pass for bodies; this one is known by its looks.
+    """
+    if context.now > context.start or belief.id not in context.recognised:
+        return False
+    found = hypotheses_by_object(context.mind, context.observation).get(belief.id, ())
+    return max((h.similarity for h in found), default=0.0) >= context.settings.sure_similarity
 
 
 def _is_early(context: StepContext, belief: ObjectBelief) -> bool:

@@ -27,6 +27,7 @@ class PresenceSettings:
         contact_px: Regions closer than this may hide parts of each other.
         reidentify_s: A new region must be seen this long before it can be a hidden object.
         least_share: Share of the image below which an unrecognised region does not enter.
+        sure_similarity: What is recognised by appearance in the first picture enters at once from here on.
     """
 
     entry_s: float = 0.36
@@ -46,3 +47,4 @@ class PresenceSettings:
     contact_px: float = 4.0
     reidentify_s: float = 0.12
     least_share: float = 0.0005
+    sure_similarity: float = 0.7

@@ -49,6 +49,20 @@ def test_what_is_there_at_the_start_enters_soon_and_once() -> None:
     assert told[0][2] < 1.0
 
 
+@pytest.mark.parametrize(
+    ("similarity", "since", "at_once"),
+    [(0.9, 0, True), (0.7, 0, True), (0.69, 0, False), (0.9, 1, False), (None, 0, False)],
+)
+def test_only_what_is_known_well_in_the_first_picture_enters_at_once(
+    similarity: float | None, since: int, at_once: bool
+) -> None:
+    names = {1: [("probe", similarity)]} if similarity is not None else {}
+    scene = [still(i) if i >= since else None for i in range(50)]
+    ((kind, _, entered),) = events(reason(seen(i, [r], names=names) for i, r in enumerate(scene)))
+    assert kind == "entry"
+    assert (entered == 0.0) == at_once
+
+
 def test_what_comes_over_the_border_later_enters_soon_after() -> None:
     comes = 3.0
     told = events(
