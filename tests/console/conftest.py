@@ -11,6 +11,7 @@ from tests.archive.recordings import meeting, record
 from tests.console.evidence_files import keep_evidence
 from tests.console.running import running_console
 from tests.console.test_runs import SETTINGS, doubtful
+from tests.teaching.browser import Browser, found_browser
 from visup.api.recorded import open_run
 
 SECRET = "what stands outside of the folders"
@@ -39,3 +40,17 @@ def console(folder: Path) -> Iterator[str]:
     saved.mkdir()
     with running_console(folder, saved) as address:
         yield address
+
+
+@pytest.fixture
+def address(console: str) -> str:
+    found_browser()
+    return console
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    found_browser()
+    with Browser(tmp_path / "profile", (1280, 860)) as browser:
+        yield browser
+        assert browser.value("window.troubles || []") == []

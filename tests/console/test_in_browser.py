@@ -2,85 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from shutil import rmtree
 
 import numpy as np
-import pytest
 
-from tests.archive.recordings import meeting, record
+from tests.archive.recordings import record
 from tests.clips import write_clip
+from tests.console.browsing import (
+    LISTEN,
+    enter,
+    follow,
+    open_run,
+    press,
+    shows,
+    switch,
+    tab,
+    violations,
+)
 from tests.console.running import OPERATOR, VIEWER
 from tests.console.test_runs import SETTINGS, doubtful
 from tests.paths import ROOT
-from tests.teaching.browser import Browser, found_browser
-from visup.agent import Observation
+from tests.teaching.browser import Browser
 from visup.console.feedback import read_feedback
 from visup.console.workbench.remembering import MODELS
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.runs.inputs.answer_box import ANSWERS
 from visup.runs.inputs.zones import load_zones
-
-
-@pytest.fixture
-def address(console: str) -> str:
-    found_browser()
-    return console
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    found_browser()
-    with Browser(tmp_path / "profile", (1280, 860)) as browser:
-        yield browser
-        assert browser.value("window.troubles || []") == []
-
-
-LISTEN = (
-    "window.troubles = []; window.onerror = (m) => window.troubles.push(String(m));"
-    "console.error = (...m) => window.troubles.push(m.join(' '));"
-)
-
-
-def enter(browser: Browser, address: str, token: str = OPERATOR) -> None:
-    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
-    browser.open(f"{address}?token={token}")
-
-
-def open_run(browser: Browser, address: str, token: str = OPERATOR, name: str = "evening") -> None:
-    enter(browser, address, token)
-    browser.until("document.querySelectorAll('.runs tbody a').length == 4")
-    follow(browser, name)
-
-
-def follow(browser: Browser, name: str) -> None:
-    """Open a run from the list."""
-    link = f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}')"
-    browser.until(f"!!{link}")
-    browser.value(f"{link}.click()")
-    browser.until("document.querySelector('img.picture')?.naturalWidth > 0")
-
-
-def tab(browser: Browser, name: str) -> None:
-    browser.value(
-        f"[...document.querySelectorAll('.q-tab')].find(t => t.innerText.trim() == '{name}').click()"
-    )
-
-
-def press(browser: Browser, text: str) -> None:
-    browser.until(
-        f"[...document.querySelectorAll('button')].some(b => b.innerText.trim() == '{text}')"
-    )
-    browser.value(
-        f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() == '{text}').click()"
-    )
-
-
-def shows(browser: Browser, text: str) -> None:
-    browser.until(f"document.body?.innerText.includes({text!r})")
 
 
 def test_a_run_is_found_and_opened(browser: Browser, address: str) -> None:
@@ -115,15 +63,6 @@ def test_one_cursor_moves_picture_timeline_and_belief(browser: Browser, address:
     browser.until("document.body && !document.body.innerText.includes('frame 0')")
     browser.press(" ")
     browser.until("document.body?.innerText.includes('frame 59')")
-
-
-def switch(browser: Browser, name: str) -> None:
-    browser.until(
-        f"[...document.querySelectorAll('.q-checkbox')].some(c => c.innerText.trim() == '{name}')"
-    )
-    browser.value(
-        f"[...document.querySelectorAll('.q-checkbox')].find(c => c.innerText.trim() == '{name}').click()"
-    )
 
 
 def test_relations_lie_over_the_picture_and_a_click_says_who_it_is(
@@ -244,61 +183,6 @@ def test_a_task_is_written_checked_tried_and_a_zone_is_drawn_and_saved(
     assert (zone.name, len(zone.polygon)) == ("dock", 3)
 
 
-def test_a_question_is_answered_to_see_what_would_have_followed(
-    browser: Browser, address: str
-) -> None:
-    open_run(browser, address, VIEWER, "who-is-it")
-    browser.press("End")
-    shows(browser, "Is object 1 the satellite or the arm?")
-    assert not browser.value("document.body?.innerText.includes('if answered')")
-    open_run(browser, address, OPERATOR, "who-is-it")
-    browser.press("End")
-    shows(browser, "if answered")
-    press(browser, "spartan")
-    shows(browser, "as if object 1 were said to be spartan")
-    assert violations(browser) == []
-
-
-def test_a_page_follows_a_run_that_goes_on(browser: Browser, address: str, folder: Path) -> None:
-    rows = "document.querySelector('.labels').innerText"
-
-    def looked_at() -> Iterator[Observation]:
-        for number, perceived in enumerate(meeting()):
-            if number == 30:
-                enter(browser, address)
-                follow(browser, "live")
-                browser.press("End")
-                shows(browser, "frame 2")
-                assert "captured" not in browser.value(rows)
-                shows(browser, "running")
-            yield perceived
-
-    try:
-        record(folder / "live", looked_at(), SETTINGS)
-        shows(browser, "frame 59")
-        browser.until("document.querySelector('header')?.innerText.includes('interrupted')")
-        assert "captured" in browser.value(rows)
-        tab(browser, "Events")
-        shows(browser, "Task 'dock' is interrupted")
-        assert violations(browser) == []
-    finally:
-        rmtree(folder / "live")
-
-
-def test_a_run_that_goes_on_is_answered(browser: Browser, address: str, folder: Path) -> None:
-    record(folder / "live", doubtful(), SETTINGS, ended=None)
-    try:
-        enter(browser, address)
-        follow(browser, "live")
-        browser.press("End")
-        shows(browser, "answer:")
-        press(browser, "spartan")
-        shows(browser, "Sent to the run")
-        assert (folder / "live" / ANSWERS).read_text() == "1=spartan\n"
-    finally:
-        rmtree(folder / "live")
-
-
 def test_why_an_object_looks_like_a_model_is_shown(
     browser: Browser, address: str, folder: Path
 ) -> None:
@@ -366,21 +250,6 @@ def test_the_wall_shows_alerts_with_pictures_and_keeps_who_saw_them(
     browser.value("document.querySelector('input[aria-label=\"Search alerts\"]').focus()")
     browser.type("nowhere")
     shows(browser, "No such alerts.")
-
-
-def violations(browser: Browser) -> list[str]:
-    """What axe-core calls serious or critical on the page as it is."""
-    browser.until("document.getAnimations().every(a => a.playState == 'finished')")
-    program = files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
-    browser.value(program + "; 0")
-    browser.value("window.found = null; axe.run().then(r => window.found = r.violations); 0")
-    browser.until("window.found !== null")
-    grave = "window.found.filter(v => ['serious', 'critical'].includes(v.impact))"
-    return list(
-        browser.value(
-            f"{grave}.map(v => v.id + ': ' + v.nodes[0].html + v.nodes[0].failureSummary)"
-        )
-    )
 
 
 def test_everybody_can_use_it(browser: Browser, address: str) -> None:
