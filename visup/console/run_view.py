@@ -89,8 +89,10 @@ class RunView:
 
     def _continues(self) -> bool:
         """Whether the journal still ends this view as it did; a run that was resumed may have gone back."""
-        moments = self._run.recording.moments(self.frames[-1] - 1 if self.frames else -1)
-        return next(moments, None) == (self.frames[-1], self.times[-1]) if self.frames else False
+        if not self.frames:
+            return False
+        moments = self._run.recording.moments(self.frames[-1] - 1)
+        return next(moments, None) == (self.frames[-1], self.times[-1])
 
     @property
     def ended(self) -> bool:
