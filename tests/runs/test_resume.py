@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,6 +22,7 @@ from visup.agent.model.step import Step
 from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
+from visup.evaluation.runtime import resume
 from visup.evaluation.runtime.resume import evaluate_resume
 from visup.percepts.video.live_source import LiveSource, Reconnection
 from visup.runs.checkpoints import CHECKPOINT
@@ -68,6 +70,16 @@ def test_killed_runs_that_are_resumed_equal_an_unbroken_one() -> None:
     assert figures["failures"] == []
     assert figures["total"]["equal"] == 2
     assert figures["total"]["lost"] == 0
+
+
+def test_a_kill_that_comes_after_the_end_is_judged_like_any_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(resume, "_kill", lambda child, after_s: os.waitpid(child, 0))
+    figures = evaluate_resume(kills=1, seed=5)
+    assert figures["failures"] == []
+    assert figures["total"]["early"] == 0
+    assert figures["total"]["equal"] == 1
 
 
 @pytest.mark.parametrize("state", ["kept", "none", "damaged"])
