@@ -4,7 +4,7 @@ The policy, in one place: *the newest frame that is due*. A frame is due when it
 recording played as if from a camera, when its time has come. Of the frames that became due while the previous
 one was processed, all but the newest are dropped; frames keep their numbers and times, so that later stages
 know how long the gap was. Dropped frames are counted and reported (`runtime_faults`, `dropped`).
- A recording needs no thread, and with an injected clock the same frames are dropped each time. A live source
+A recording needs no thread, and with an injected clock the same frames are dropped each time. A live source
 is read in a thread, since a capture that is not drained returns old frames later.
 """
 
@@ -15,7 +15,6 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from itertools import pairwise
 
 from visup.agent import AlertCondition, Frame, Severity
 from visup.agent.cycle.system_alerts import FRAMES_DROPPED
@@ -23,7 +22,7 @@ from visup.percepts.video.source import VideoSource
 
 WINDOW_S = 5.0
 SHARE = 0.1
-"""Dropped share of the frames of the window from which it is reported."""
+"""Dropped share of the frames of the window from which it is reported, until none was dropped."""
 
 LONG_S = 1.0
 """Time without a processed frame from which it is a warning, seconds."""
@@ -49,8 +48,9 @@ class RealTimeFrames(Iterator[Frame], ABC):
         self.clock = clock
         self.dropped = 0
         self.given = 0
-        self._recent: deque[tuple[float, int]] = deque()
+        self._recent: deque[tuple[float, int, float]] = deque()  # time, dropped, seconds before it
         self._origin: float | None = None
+        self._reported = False
 
     def lag(self, time: float) -> float:
         """Age of a frame, seconds, assuming that the first came without delay.
@@ -66,21 +66,26 @@ class RealTimeFrames(Iterator[Frame], ABC):
             self._origin = self.clock() - frame.time
         self.dropped += missed
         self.given += 1
-        self._recent.append((frame.time, missed))
+        since = frame.time - self._recent[-1][0] if self._recent else 0.0
+        self._recent.append((frame.time, missed, since))
         while frame.time - self._recent[0][0] > WINDOW_S:
             self._recent.popleft()
+        lost, shown = self._lost(), len(self._recent)
+        # With one limit for both, an alert would open and close every few seconds near that limit.
+        self._reported = lost > 0 and (self._reported or lost >= SHARE * (lost + shown))
         return frame
 
+    def _lost(self) -> int:
+        return sum(missed for _, missed, _ in self._recent)
+
     def runtime_faults(self) -> Iterable[AlertCondition]:
-        """Reports dropped frames while more than a tenth of the recent ones were."""
-        lost = sum(missed for _, missed in self._recent)
-        if lost < SHARE * (lost + len(self._recent)):
+        """Reports dropped frames from a tenth of the recent ones on, until none of them was."""
+        if not self._reported:
             return
-        times = [at for at, missed in self._recent]
-        longest = max((b - a for a, b in pairwise(times)), default=0.0)
+        lost, longest = self._lost(), max(since for _, _, since in self._recent)
         text = (
             f"Frames come faster than they can be watched: {lost} of the last "
-            f"{lost + len(times)} were dropped; for up to {longest:.1f} s nobody looked."
+            f"{lost + len(self._recent)} were dropped; for up to {longest:.1f} s nobody looked."
         )
         severity = Severity.WARNING if longest >= LONG_S else Severity.INFO
         yield AlertCondition(FRAMES_DROPPED, (), severity, text, key=self.name, needs=())

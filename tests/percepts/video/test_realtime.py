@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,28 @@ def test_what_was_dropped_long_ago_is_told_no_more() -> None:
     _, played = watched(times, [0.1] * 50 + [0.0] * 400)
     assert played.dropped > 50
     assert list(played.runtime_faults()) == []
+
+
+def test_one_gap_longer_than_what_is_remembered_is_told_with_its_length() -> None:
+    played = PacedRecording(frames([k / 25 for k in range(400)]), "clip", clock=(clock := Clock()))
+    next(played)
+    clock.pass_by(8.0)
+    next(played)
+    (said,) = played.runtime_faults()
+    assert said.severity == Severity.WARNING
+    assert "for up to 8.0 s nobody looked" in said.cause
+
+
+def test_a_share_near_the_limit_is_one_alert_and_not_many() -> None:
+    clock, told = Clock(), []
+    times = [k / 25 for k in range(1000)]
+    played = PacedRecording(frames(times), "clip", clock=clock, wait=clock.pass_by)
+    # About one frame in ten is dropped, now somewhat more, now somewhat less.
+    for k in range(800):
+        next(played)
+        told.append(bool(list(played.runtime_faults())))
+        clock.pass_by(0.085 if k % (8 if k // 100 % 2 else 12) == 0 else 0.0)
+    assert sum(b and not a for a, b in pairwise(told)) == 1
 
 
 class Steps(VideoSource):
