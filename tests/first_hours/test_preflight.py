@@ -61,6 +61,8 @@ def test_who_says_beforehand_who_is_who_needs_no_models(visup: Call, clip: Path)
         ([*DOCK, "--models", MODELS], 0, "warning: It is not known what the actor 'satellite'"),
         (DOCK, 2, "cannot be followed"),
         ([*DOCK, "--actor", "arms=arm"], 2, "no task has an actor called 'arms'"),
+        ([*DOCK, "--actor", "arms=arm"], 2, "did you mean 'arm'?"),
+        ([*DOCK, "--models", MODELS, "--actor", "arm=spartn"], 2, "did you mean 'spartan'?"),
     ],
 )
 def test_check_says_whether_a_run_can_begin(

@@ -161,6 +161,16 @@ def test_a_file_is_seen_once_and_a_camera_for_ever(
     assert "verdict none after 7 frames" in cell.bench.lines[-1]
 
 
+def test_what_the_service_stopped_itself_is_not_said_to_be_stopped_by_the_user(cell: Cell) -> None:
+    cell.step()
+    cell.supervisor.stop(cell.now)
+    problem = {"problem": "stopped by the user", "stopped": True}
+    cell.bench.last.tell(ENDED, live=True, verdict="failed", steps=7, **problem)
+    cell.bench.last.code = 0
+    cell.turn()
+    assert cell.bench.lines[-1].endswith("verdict failed after 7 frames; it is no longer watched")
+
+
 @pytest.mark.parametrize("stubborn", [False, True])
 def test_a_stop_takes_no_longer_than_it_may(cell: Cell, stubborn: bool) -> None:
     cell.step()

@@ -10,6 +10,7 @@ from visup.agent import Behaviour, Contract, Frame, Mind, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.cycle.system_alerts import grave_kinds, verdict_without_task
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
@@ -340,6 +341,7 @@ def _check_actors(
             raise SettingsError(
                 f"no task has an actor called '{actor}'",
                 expected=f"one of: {', '.join(sorted(known))}",
+                hint=did_you_mean(actor, known),
             )
         for model in models:
             if database is not None and model not in database.names():
@@ -347,4 +349,5 @@ def _check_actors(
                     f"the actor '{actor}' stands for '{model}', which is not in the model database",
                     where=str(settings.models),
                     expected=f"one of: {', '.join(database.names())}",
+                    hint=did_you_mean(model, database.names()),
                 )

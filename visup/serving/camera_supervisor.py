@@ -322,7 +322,8 @@ def _outcome(process: _Supervised, consequence: str) -> str:
     if end.kind is ReportKind.REFUSED:
         text = f"it cannot be watched: {_text(end.data.get('text'))}"
     else:
-        problem = end.data.get("problem")
+        # Who asked it to stop is the service itself, whose reason is the consequence.
+        problem = None if end.data.get("stopped") and consequence else end.data.get("problem")
         text = f"verdict {end.data.get('verdict') or 'none'} after {end.data.get('steps')} frames"
         text += f" ({_text(problem)})" if problem else ""
     return f"{text}; {consequence}" if consequence else text
