@@ -375,6 +375,14 @@ def test_the_summary_is_made_of_sentences() -> None:
     )
 
 
+def test_the_summary_says_a_reason_once() -> None:
+    (alert,) = data().alerts
+    tasks = tuple(replace(t, evidence="they were apart") for t in data().tasks)
+    alert = replace(alert, cause="The stage 'captured' is failing: they were apart.")
+    told = summary(replace(data(), tasks=tasks, alerts=(alert,)))
+    assert told.endswith("They were apart. One alert was raised, at 7.0 s.")
+
+
 @pytest.mark.parametrize(
     ("source", "title"),
     [

@@ -61,8 +61,8 @@ def _tiles(run: RunData) -> str:
     facts = {
         "duration": f"{run.duration:.1f} s",
         "frames": str(run.frames),
-        "objects": str(len(run.objects)),
-        "alerts": str(grave),
+        "object" if len(run.objects) == 1 else "objects": str(len(run.objects)),
+        "alert" if grave == 1 else "alerts": str(grave),
     }
     return f"<dl class=tiles>{''.join(_tile(k, v) for k, v in facts.items())}</dl>"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
@@ -56,7 +57,8 @@ def title_of(run: RunData) -> str:
 
 def summary(run: RunData) -> str:
     """One paragraph: the source, the objects, the verdict and its reason."""
-    sentences = [_watched(run), _followed(run), *_why(run), _alerted(run.alerts)]
+    why = _why(run)
+    sentences = [_watched(run), _followed(run), *why, _alerted(run.alerts, why)]
     return " ".join(s for s in sentences if s)
 
 
@@ -131,15 +133,17 @@ def _why(run: RunData) -> list[str]:
     return [_sentence(t.evidence) for t in run.tasks if t.evidence]
 
 
-def _alerted(alerts: tuple[Alert, ...]) -> str:
+def _alerted(alerts: tuple[Alert, ...], told: Sequence[str]) -> str:
+    """How many alerts there were, and the first one, unless its reason has been `told`."""
     grave = [a for a in alerts if a.severity > Severity.INFO]
     if not grave:
         return "No alert was raised."
     first = min(grave, key=lambda a: (a.opened, a.id))
     verb = "was" if len(grave) == 1 else "were"
     begins = "" if len(grave) == 1 else "the first "
-    text = f"{count(len(grave), 'alert')} {verb} raised, {begins}at {first.opened:.1f} s: "
-    return _sentence(text + first.cause)
+    text = f"{count(len(grave), 'alert')} {verb} raised, {begins}at {first.opened:.1f} s"
+    known = any(why.rstrip(".").casefold() in first.cause.casefold() for why in told)
+    return _sentence(text if known else f"{text}: {first.cause}")
 
 
 def _sentence(text: str) -> str:
