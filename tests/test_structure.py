@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter, defaultdict
+from functools import cache
 from pathlib import Path
 from statistics import median
 
@@ -32,13 +33,22 @@ def sources() -> list[Path]:
     return sorted(found)
 
 
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sources()}
-FUNCTIONS = [
-    (path, node)
-    for path, tree in TREES.items()
-    for node in ast.walk(tree)
-    if isinstance(node, Function)
-]
+SOURCES = sources()
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCES}
+
+
+@cache
+def functions() -> list[tuple[Path, Function]]:
+    return [
+        (path, node)
+        for path, tree in trees().items()
+        for node in ast.walk(tree)
+        if isinstance(node, Function)
+    ]
 
 
 def code_lines(function: Function) -> int:
@@ -57,32 +67,32 @@ def parameters(function: Function) -> int:
 
 
 def test_no_room_holds_more_modules_than_one_can_look_over() -> None:
-    modules = [path for path in TREES if path.name != "__init__.py"]
+    modules = [path for path in SOURCES if path.name != "__init__.py"]
     rooms = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules)
     assert {room: n for room, n in rooms.items() if n > MOST_MODULES} == {}
 
 
 def test_no_file_is_too_long() -> None:
-    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in TREES}
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES}
     assert {p.relative_to(ROOT).as_posix(): n for p, n in lengths.items() if n > MOST_LINES} == {}
 
 
 def test_functions_are_small() -> None:
-    lengths = sorted(code_lines(f) for _, f in FUNCTIONS)
+    lengths = sorted(code_lines(f) for _, f in functions())
     assert median(lengths) <= 7
     assert lengths[int(0.9 * len(lengths))] <= 18
-    long = [f"{p.name}:{f.name}" for p, f in FUNCTIONS if code_lines(f) > LONG_FUNCTION]
+    long = [f"{p.name}:{f.name}" for p, f in functions() if code_lines(f) > LONG_FUNCTION]
     assert len(long) <= MOST_LONG_FUNCTIONS, long
 
 
 def test_functions_take_few_parameters() -> None:
-    many = [f"{p.name}:{f.name}" for p, f in FUNCTIONS if parameters(f) > MANY_PARAMETERS]
+    many = [f"{p.name}:{f.name}" for p, f in functions() if parameters(f) > MANY_PARAMETERS]
     assert len(many) <= MOST_WITH_MANY_PARAMETERS, many
 
 
 def test_no_class_name_stands_for_two_ideas() -> None:
     where = defaultdict(list)
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 where[node.name].append(path.relative_to(ROOT).as_posix())
@@ -90,10 +100,10 @@ def test_no_class_name_stands_for_two_ideas() -> None:
 
 
 @pytest.mark.parametrize(
-    "room", [p for p in TREES if p.name == "__init__.py"], ids=lambda p: p.parent.name
+    "room", [p for p in SOURCES if p.name == "__init__.py"], ids=lambda p: p.parent.name
 )
 def test_every_room_says_what_it_is_for(room: Path) -> None:
-    said = ast.get_docstring(TREES[room]) or ""
+    said = ast.get_docstring(trees()[room]) or ""
     assert len(said.split()) >= 5
     assert "Placeholder" not in said
 
@@ -104,10 +114,10 @@ EXAMPLES_OF_NAMES = {"FILE.py"}
 
 def test_files_that_the_sources_name_exist() -> None:
     tests = {path.name for path in (ROOT / "tests").rglob("*.py")}
-    known = {path.name for path in TREES} | tests | EXAMPLES_OF_NAMES
+    known = {path.name for path in SOURCES} | tests | EXAMPLES_OF_NAMES
     named = {
         (path.relative_to(ROOT).as_posix(), name)
-        for path in TREES
+        for path in SOURCES
         for name in re.findall(r"`(?:\w+/)*(\w+\.py)`", path.read_text(encoding="utf-8"))
     }
     assert {(where, name) for where, name in named if name not in known} == set()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from random import Random
 
 import pytest
@@ -75,12 +76,18 @@ def picked(name: str, seed: int, spoilt: str = "") -> RunTrace:
     return run_of(name, spells)
 
 
-GOOD = [picked(f"good{k}", k) for k in range(3)]
-BAD = [picked("drop", 50, "drop"), picked("bump", 51, "bump")]
+@cache
+def good_runs() -> list[RunTrace]:
+    return [picked(f"good{k}", k) for k in range(3)]
+
+
+@cache
+def bad_runs() -> list[RunTrace]:
+    return [picked("drop", 50, "drop"), picked("bump", 51, "bump")]
 
 
 def test_a_task_learned_from_three_runs_accepts_others_and_refuses_bad_ones() -> None:
-    learned = learn_task("bring", GOOD, BAD)
+    learned = learn_task("bring", good_runs(), bad_runs())
     task = parse_task(learned.text)
     assert set(learned.good.values()) == {Verdict.SUCCEEDED}
     others = [judged(task, picked("x", k).minds).verdict for k in range(10, 16)]
@@ -95,7 +102,7 @@ def test_a_task_learned_from_three_runs_accepts_others_and_refuses_bad_ones() ->
 
 
 def test_what_was_learned_differs_little_from_what_one_writes() -> None:
-    learned = parse_task(learn_task("bring", GOOD).text)
+    learned = parse_task(learn_task("bring", good_runs()).text)
     written = parse_task(
         "<bring> ::= <approach> <grasp> <carry> <place> <release>\n"
         "<approach> ::= converging(arm, part)\n<grasp> ::= coupled(arm, part)\n"
@@ -182,14 +189,14 @@ TEXT = """# how a part is brought
 
 def test_durations_are_fitted_in_their_places_and_all_else_stays() -> None:
     task = parse_task(TEXT)
-    runs = [judged(task, run.minds) for run in GOOD]
+    runs = [judged(task, run.minds) for run in good_runs()]
     fitted = fitted_amounts(task, runs)
     assert next(f.clause for f in fitted) == "within 90 s"
     text = with_amounts(TEXT, fitted)
     assert parse_task(text)
     assert text.splitlines()[:2] == TEXT.splitlines()[:2]
     assert "90 s" not in text
-    assert all(judged(parse_task(text), r.minds).verdict is Verdict.SUCCEEDED for r in GOOD)
+    assert all(judged(parse_task(text), r.minds).verdict is Verdict.SUCCEEDED for r in good_runs())
 
 
 def test_coverage_names_what_no_run_went_through() -> None:
@@ -197,7 +204,7 @@ def test_coverage_names_what_no_run_went_through() -> None:
         "<t> ::= <reach> (<grasp> | <miss>)\n<reach> ::= converging(arm, part)\n"
         "<grasp> ::= coupled(arm, part) decoupled(arm, part)\n<miss> ::= diverging(arm, part) for 30 s"
     )
-    stages = coverage_of(task, [judged(task, run.minds) for run in GOOD])
+    stages = coverage_of(task, [judged(task, run.minds) for run in good_runs()])
     said = [str(s) for s in stages]
     assert said == [
         "<reach>: done in 3 of 3, never failed",
