@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 EVERY = 6
+UNTIL_S = 15.0
+"""Seconds of the clip; its capture fails at 13.3 s."""
 
 RUN = """
 import os, sys
@@ -17,17 +19,27 @@ from pathlib import Path
 cores = [int(c) for c in sys.argv[2].split(",")]
 os.sched_setaffinity(0, cores)
 from visup.runs.demo import demo_settings
-from visup.runs.runner import supervise
+from visup.runs.runner import Audience, supervise
 from visup.runs.settings import RunOptions
+
+def stop(step, frame):
+    if step.time >= float(sys.argv[4]):
+        raise KeyboardInterrupt
+
 folder = Path(sys.argv[1])
 folder.mkdir()
-supervise(demo_settings(int(sys.argv[3])), folder, options=RunOptions(video=False, report=False))
+options = RunOptions(video=False, report=False)
+supervise(demo_settings(int(sys.argv[3])), folder, audience=Audience([stop]), options=options)
 """
 
 
 def told(folder: Path, cores: list[int]) -> bytes:
     subprocess.run(
-        [sys.executable, "-c", RUN, str(folder), ",".join(map(str, cores)), str(EVERY)], check=True
+        [
+            *(sys.executable, "-c", RUN, str(folder)),
+            *(",".join(map(str, cores)), str(EVERY), str(UNTIL_S)),
+        ],
+        check=True,
     )
     return (folder / "events.jsonl").read_bytes()
 

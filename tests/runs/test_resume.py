@@ -58,6 +58,26 @@ def broken_run(settings: WatchSettings, folder: Path, at: int, options: RunOptio
         supervise(settings, folder, audience=Audience([pull]), options=options)
 
 
+@pytest.fixture(scope="module")
+def unbroken(clip: WatchSettings, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that nothing interrupted; only read."""
+    folder = fresh_folder(tmp_path_factory.mktemp("unbroken") / "run", "")
+    supervise(clip, folder, options=BARE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def answered(
+    clip: WatchSettings, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[WatchSettings, Path]:
+    """Settings with models, and an unbroken run in which the operator said who object 1 is."""
+    settings = replace(clip, models=ROOT / "visup" / "data" / "demo.models")
+    folder = fresh_folder(tmp_path_factory.mktemp("answered") / "run", "")
+    told = HumanOperator({1: "spartan"})
+    supervise(settings, folder, audience=Audience(operator=told), options=BARE)
+    return settings, folder
+
+
 def outcome(folder: Path) -> object:
     run = Recording.open(folder)
     facts = run.facts()
@@ -83,9 +103,10 @@ def test_a_kill_that_comes_after_the_end_is_judged_like_any_other(
 
 
 @pytest.mark.parametrize("state", ["kept", "none", "damaged"])
-def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, state: str) -> None:
-    whole, parts = tmp_path / "whole", tmp_path / "parts"
-    supervise(clip, fresh_folder(whole, ""), options=BARE)
+def test_a_run_goes_on_to_the_same_end(
+    clip: WatchSettings, unbroken: Path, tmp_path: Path, state: str
+) -> None:
+    parts = tmp_path / "parts"
     every = 0.0 if state == "none" else 0.2
     options = RunOptions(video=False, report=False, state_every_s=every)
     broken_run(clip, parts, 27, options)
@@ -96,7 +117,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     past = interrupted_run(parts)
     assert (past.state is not None) == (state == "kept")
     result = supervise(past.settings, parts, options=options, past=past)
-    assert outcome(parts) == outcome(whole)
+    assert outcome(parts) == outcome(unbroken)
     assert any("perceived again" in n for n in result.notes) == (state != "kept")
     assert any("it was changed" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is complete"):
@@ -105,11 +126,10 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
 
 @pytest.mark.parametrize("part", ["agent", "kept", "behaviours"])
 def test_a_state_of_an_earlier_form_is_told_and_all_is_perceived_again(
-    clip: WatchSettings, tmp_path: Path, part: str
+    clip: WatchSettings, unbroken: Path, tmp_path: Path, part: str
 ) -> None:
-    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    parts = tmp_path / "parts"
     options = RunOptions(video=False, state_every_s=0.2)
-    supervise(clip, fresh_folder(whole, ""), options=options)
     broken_run(clip, parts, 27, options)
     past = interrupted_run(parts)
     assert past.state is not None
@@ -120,7 +140,7 @@ def test_a_state_of_an_earlier_form_is_told_and_all_is_perceived_again(
     }
     past = replace(past, state=earlier[part])
     result = supervise(past.settings, parts, options=options, past=past)
-    assert outcome(parts) == outcome(whole)
+    assert outcome(parts) == outcome(unbroken)
     (note,) = (n for n in result.notes if "perceived again" in n)
     assert f"another form than visup {__version__} has" in note
 
@@ -144,32 +164,33 @@ def test_a_run_goes_on_only_with_its_own_video(clip: WatchSettings, tmp_path: Pa
         supervise(WatchSettings(source=str(other)), tmp_path / "run", options=BARE, past=past)
 
 
-@pytest.mark.parametrize("at", [12, 14, 15, 16, 17, 25])
-def test_what_the_operator_said_is_remembered(clip: WatchSettings, tmp_path: Path, at: int) -> None:
-    """An answer is taken up one step after its object is confirmed, whenever the run is killed."""
-    demo = ROOT / "visup" / "data" / "demo.models"
-    settings = WatchSettings(clip.source, models=demo)
-    folder = tmp_path / "whole"
-    told = HumanOperator({1: "spartan"})
-    supervise(settings, fresh_folder(folder, ""), audience=Audience(operator=told), options=BARE)
-    run = Recording.open(folder)
+def test_an_answer_is_replayed(answered: tuple[WatchSettings, Path]) -> None:
+    run = Recording.open(answered[1])
     (frame,) = run.answers()
     assert run.answers()[frame] == {1: "spartan"}
     assert not transcript_diff(recorded_transcript(run), replay(run, settings_for(run)))
-    parts = tmp_path / "parts"
+
+
+@pytest.mark.parametrize("at", [12, 14, 15, 16, 17, 25])
+def test_what_the_operator_said_is_remembered(
+    answered: tuple[WatchSettings, Path], tmp_path: Path, at: int
+) -> None:
+    """An answer is taken up one step after its object is confirmed, whenever the run is killed."""
+    (settings, whole), parts = answered, tmp_path / "parts"
 
     def pull(step: Step, frame: Frame) -> None:
         if step.frame_index == at:
             raise Pulled
 
     parts.mkdir()
+    told = HumanOperator({1: "spartan"})
     with pytest.raises(Pulled):
         supervise(settings, parts, audience=Audience([pull], operator=told), options=BARE)
     past = interrupted_run(parts)
     supervise(
         past.settings, parts, audience=Audience(operator=HumanOperator()), options=BARE, past=past
     )
-    assert outcome(parts) == outcome(folder)
+    assert outcome(parts) == outcome(whole)
 
 
 def test_a_folder_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:
