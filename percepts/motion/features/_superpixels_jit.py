@@ -54,9 +54,13 @@ def cell_totals(labels: Labels, values: Floats, count: int) -> Floats:
     height, width = labels.shape
     out = np.zeros(count, np.float32)
     for y in range(height):
-        for x in range(width):
-            if values[y, x] != 0:
-                out[labels[y, x]] += values[y, x]
+        some = 0
+        for x in range(width):  # without branches: empty rows are passed over quickly
+            some |= values[y, x] != 0
+        if some:
+            for x in range(width):
+                if values[y, x] != 0:
+                    out[labels[y, x]] += values[y, x]
     return out
 
 
@@ -90,6 +94,37 @@ def dilate_cells(
                         end += 1
             begin = last
     return near
+
+
+@compiled
+def connected_groups(
+    ends: Labels, neighbours: Labels, members: NDArray[np.bool_]
+) -> tuple[Labels, Any]:
+    """Groups of members that are connected by members, and how many.
+
+    `ends` and `neighbours` are as in CSR matrices and symmetric.
+
+    Returns:
+        (count,) int32 number of each member's group, from 0 by the least of its cells; -1 for the rest.
+    """
+    group, reached = np.full(len(members), -1, np.int32), np.empty(len(members), np.int32)
+    groups = 0
+    for first in range(len(members)):
+        if not members[first] or group[first] >= 0:
+            continue
+        reached[0], begin, end = first, 0, 1
+        group[first] = groups
+        while begin < end:
+            i = reached[begin]
+            begin += 1
+            for at in range(ends[i], ends[i + 1]):
+                other = neighbours[at]
+                if members[other] and group[other] < 0:
+                    group[other] = groups
+                    reached[end] = other
+                    end += 1
+        groups += 1
+    return group, groups
 
 
 @compiled

@@ -75,8 +75,8 @@ class Constraints:
     def __len__(self) -> int:
         return len(self.xy)
 
-    def take(self, which: Ints) -> Constraints:
-        """The constraints at (M,) indices."""
+    def take(self, which: Ints | slice) -> Constraints:
+        """The constraints at (M,) indices, or a slice of them, which shares their memory."""
         return Constraints(
             self.lag,
             self.span_s,

@@ -14,10 +14,9 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features._superpixels_jit import connected_groups
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import Belief
@@ -300,12 +299,12 @@ def _candidates(
     last_key: int,
 ) -> tuple[Keys, list[int]]:
     """Owners, with a new key for each large enough group of unowned moving cells, and those keys."""
-    free = np.flatnonzero(moves & (owner == 0))
+    unowned = moves & (owner == 0)
+    free = np.flatnonzero(unowned)
     if not len(free):
         return owner, []
-    count = len(owner)
-    link = sparse.csr_matrix((cues.affinity, cues.neighbours, cues.ends), shape=(count, count))
-    groups, group = connected_components(link[free][:, free], directed=False)
+    number, groups = connected_groups(cues.ends, cues.neighbours, unowned)
+    group = number[free]
     area = np.bincount(group, cues.area[free], groups)
     good = area >= least
     keys = np.where(good, last_key + np.cumsum(good), 0)

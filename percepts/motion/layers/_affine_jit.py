@@ -94,7 +94,7 @@ def reweighted_least_squares(
     constraints.
     """
     count, k = phi.shape
-    info = _with_slack(information, slack)
+    info = with_slack(information, slack)
     now = start.astype(np.float64)
     w, model = np.empty(count), np.zeros((2, k))
     normal, right = np.empty((2 * k, 2 * k)), np.empty(2 * k)
@@ -103,8 +103,8 @@ def reweighted_least_squares(
         normal[:], right[:] = 0, 0
         for i in range(k):
             normal[i, i] = normal[k + i, k + i] = hold[i]
-        _add_equations(phi, moved, info, w, normal, right)
-        _solve(normal, right)
+        add_equations(phi, moved, info, w, normal, right)
+        solve(normal, right)
         model = right.copy().reshape(2, k)
         if _move(phi, model, now) < SETTLED:
             break
@@ -115,7 +115,60 @@ def reweighted_least_squares(
 
 
 @compiled
-def _with_slack(information: Floats, slack: float) -> Doubles:
+def affine_fit(
+    points: tuple[Floats, Floats, Floats],
+    weight: Floats,
+    guess: tuple[Doubles, Doubles],
+    limits: tuple[float, float, float],
+    rounds: int,
+) -> tuple[Doubles, float, float]:
+    """A robust affine fit to those of N constraints that have a weight.
+
+    Args:
+        points: (N, 2) positions, (N, 2) displacements, (N, 3) inverse covariances.
+        weight: (N,), how far each belongs to the layer.
+        guess: (2, 3) matrix and (2, 3) bend to start from.
+        limits: How strongly the linear part is held at zero; error of the model, pixels; Mahalanobis distance
+            beyond which a constraint hardly counts.
+        rounds: Most iterations.
+
+    Returns:
+        (2, 3) matrix, standard deviation of its displacements, pixels, and sum of the last weights; that is
+        negative when there is nothing to fit.
+    """
+    xy, moved, information = points
+    use = np.flatnonzero(weight > 0)
+    count, total, x, y = len(use), 0.0, 0.0, 0.0
+    for n in use:
+        total += weight[n]
+        x += weight[n] * xy[n, 0]
+        y += weight[n] * xy[n, 1]
+    if total < 3.0:
+        return guess[0], 0.0, -1.0
+    x, y, wide = x / total, y / total, 0.0
+    for n in use:
+        wide += weight[n] * ((xy[n, 0] - x) ** 2 + (xy[n, 1] - y) ** 2)
+    spread = sqrt(wide / total) + 1.0
+    phi, share = np.ones((count, 3)), np.empty(count)
+    for i in range(count):
+        n = use[i]
+        phi[i, 0], phi[i, 1], share[i] = (xy[n, 0] - x) / spread, (xy[n, 1] - y) / spread, weight[n]
+    rigidity, slack, cutoff = limits
+    # Along an edge motion is unknown: regularise towards none, not towards a drifting guess.
+    hold = np.array([rigidity, rigidity, 0.01]) / slack**2
+    start = displacements(xy[use], guess[0], guess[1])
+    model, w, mean = reweighted_least_squares(
+        phi, moved[use], information[use], share, start, hold, slack, cutoff, rounds
+    )
+    matrix = np.empty((2, 3))
+    for i in range(2):
+        matrix[i, 0], matrix[i, 1] = model[i, 0] / spread, model[i, 1] / spread
+        matrix[i, 2] = model[i, 2] - (matrix[i, 0] * x + matrix[i, 1] * y)
+    return matrix, 1 / sqrt(mean / 2 + 1e-9), w.sum()
+
+
+@compiled
+def with_slack(information: Floats, slack: float) -> Doubles:
     """(N, 3) information after adding an isotropic variance to the covariance."""
     v, out = slack * slack, np.empty((len(information), 3))
     for n in range(len(information)):
@@ -140,7 +193,7 @@ def _reweight(
 
 
 @compiled
-def _add_equations(
+def add_equations(
     phi: Doubles, moved: Floats, info: Doubles, w: Doubles, normal: Doubles, right: Doubles
 ) -> None:
     """Add the weighted normal equations, (2K, 2K), lower triangle only, and (2K,)."""
@@ -174,7 +227,7 @@ def _move(phi: Doubles, model: Doubles, now: Doubles) -> float:
 
 
 @compiled
-def _solve(normal: Doubles, right: Doubles) -> None:
+def solve(normal: Doubles, right: Doubles) -> None:
     """Solve a positive definite system in place by Cholesky; the lower triangle is read."""
     size = len(right)
     for i in range(size):

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from visup.percepts.motion.features.motion_constraints import Constraints
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.layers._affine_jit import (
+    affine_fit,
     displacements,
     log_likelihoods,
     reweighted_least_squares,
     squared_misfits,
+    with_slack,
 )
 
 Doubles = NDArray[np.float64]
@@ -144,16 +146,7 @@ def widened(information: Floats, sigma: float) -> Floats:
     """Information after adding an isotropic variance to the covariance, (N, 3) float32."""
     if sigma <= 0:
         return information
-    a, b, c = np.ascontiguousarray(information.T, dtype=np.float64)
-    # (L^-1 + v I)^-1 = L (I + v L)^-1, in closed form for 2 x 2, safe when L is singular.
-    v = sigma * sigma
-    det = a * c - b * b
-    scale = 1 / (1 + v * (a + c) + v * v * det)
-    out = np.empty(information.shape, dtype=np.float32)
-    out[:, 0] = (a + v * det) * scale
-    out[:, 1] = b * scale
-    out[:, 2] = (c + v * det) * scale
-    return out
+    return with_slack(information, sigma).astype(np.float32)
 
 
 def fit_affine(
@@ -180,29 +173,8 @@ def fit_affine(
     Returns:
         The fitted layer; the guess with no support when there is nothing to fit.
     """
-    total = float(weight.sum())
-    if total < 3.0:
+    points, limits = (c.xy, c.moved, c.information), (rigidity, slack, cutoff)
+    matrix, sigma, support = affine_fit(points, weight, guess._coefficients, limits, rounds)
+    if support < 0:
         return Affine(guess.matrix, guess.sigma, 0.0)
-    # Most constraints have no weight: an object covers few of them.
-    use = np.flatnonzero(weight > 0)
-    xy, share = c.xy[use], weight[use]
-    centre = (share @ xy) / total
-    spread = float(np.sqrt((share @ ((xy - centre) ** 2).sum(1)) / total)) + 1.0
-    phi = np.ones((len(use), 3))
-    phi[:, :2] = (xy - centre) / spread
-    # Along an edge motion is unknown: regularise towards none, not towards a drifting guess.
-    hold = np.array([rigidity, rigidity, 0.01]) / slack**2
-    model, w, mean = reweighted_least_squares(
-        phi,
-        c.moved[use],
-        c.information[use],
-        share.astype(np.float64),
-        guess.at(xy),
-        hold,
-        slack,
-        cutoff,
-        rounds,
-    )
-    linear = model[:, :2] / spread
-    matrix = np.concatenate([linear, (model[:, 2] - linear @ centre)[:, None]], axis=1)
-    return Affine(matrix, float(1 / np.sqrt(mean / 2 + 1e-9)), float(w.sum()))
+    return Affine(matrix, sigma, support)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import dist
 
 import numpy as np
 
@@ -29,4 +30,14 @@ class AffineRate:
 
     def velocity(self, where: tuple[float, float]) -> Doubles:
         """(vx, vy) at a position, pixels per second."""
-        return np.asarray(self.matrix[:, :2] @ np.asarray(where) + self.matrix[:, 2])
+        return np.array(self.shift(where))
+
+    def shift(self, where: tuple[float, float]) -> tuple[float, float]:
+        """As `velocity`, without arrays."""
+        x, y = where
+        (a, b, c), (d, e, f) = self.matrix.tolist()
+        return a * x + b * y + c, d * x + e * y + f
+
+    def gap(self, other: AffineRate, where: tuple[float, float]) -> float:
+        """How much it differs from another motion at a position, pixels per second."""
+        return dist(self.shift(where), other.shift(where))

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.features.motion_constraints import Constraints, mahalanobis
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.layers.affine import Affine, fit_affine, widened
+from visup.percepts.motion.layers._dominant_motion_jit import explained_weights, sample_fits
+from visup.percepts.motion.layers.affine import Affine, Doubles, fit_affine, widened
 
 BALANCE_GRID = (6, 8)
+FAR = 12.0  # squared Mahalanobis distance from which a motion does not explain a constraint at all
 
 
 def balanced_weights(
@@ -63,11 +65,12 @@ def fit_dominant(
         if score > best_score:
             best, best_score = guess, score
     if best_score < 0.8 * part.weight.sum():
-        samples = _sample_fits(c, usable[_draw_samples(rng, part.weight)])
-        scores = part.scores(samples)
+        pick = usable[_draw_samples(rng, part.weight)]
+        samples = sample_fits(c.xy, c.moved, c.information, pick)
+        scores = part.affine_scores(samples)
         first = int(scores.argmax())
         if scores[first] > best_score:
-            best = samples[first]
+            best = Affine(samples[first])
     # Hardly regularised: zoom and rotation of the camera must not be damped.
     return fit_affine(c, weight * 20, best, rigidity=0.02, rounds=5, slack=slack, cutoff=2.5)
 
@@ -85,18 +88,13 @@ class _UsableConstraints:
         """Total weight that each of M motions explains, (M,) float32."""
         if any(m.bend is not None for m in models):
             each = [mahalanobis(m.at(self.xy) - self.moved, self.info) for m in models]
-            m2 = np.stack(each)
-        elif not len(models):
-            return np.zeros(0, np.float32)
-        else:
-            x, y = np.ascontiguousarray(self.xy.T)
-            matrices = np.stack([m.matrix for m in models]).astype(np.float32)
-            place = np.stack([x, y, np.ones_like(x)])
-            ex = matrices[:, 0] @ place - self.moved[:, 0]
-            ey = matrices[:, 1] @ place - self.moved[:, 1]
-            a, b, d = np.ascontiguousarray(self.info.T)
-            m2 = (a * ex + 2 * b * ey) * ex + d * ey * ey
-        return np.asarray(np.maximum(0, 1 - m2 / 12.0) @ self.weight)
+            return np.asarray(np.maximum(0, 1 - np.stack(each) / FAR) @ self.weight)
+        return self.affine_scores(np.array([m.matrix for m in models]).reshape(-1, 2, 3))
+
+    def affine_scores(self, matrices: Doubles) -> Floats:
+        """The same of (M, 2, 3) affine motions."""
+        by_coefficient = np.ascontiguousarray(matrices.transpose(1, 2, 0), dtype=np.float32)
+        return explained_weights(self.xy, self.moved, self.info, self.weight, by_coefficient, FAR)
 
 
 def _draw_samples(rng: np.random.Generator, weight: Floats, samples: int = 40) -> NDArray[np.int64]:
@@ -104,23 +102,3 @@ def _draw_samples(rng: np.random.Generator, weight: Floats, samples: int = 40) -
     heap = np.cumsum(weight, dtype=np.float64)
     at = np.searchsorted(heap, rng.random((samples, 4)) * heap[-1], side="right")
     return np.asarray(np.minimum(at, len(weight) - 1))
-
-
-def _sample_fits(c: Constraints, pick: NDArray[np.int64]) -> list[Affine]:
-    """Affine motions through each of (M, 4) samples of constraints."""
-    xy, moved = c.xy[pick].astype(np.float64), c.moved[pick].astype(np.float64)
-    centre = xy.mean(axis=1)
-    phi = np.ones((*pick.shape, 3))
-    phi[..., :2] = (xy - centre[:, None]) / 50.0
-    a, b, d = np.moveaxis(c.information[pick].astype(np.float64), -1, 0)
-    dx, dy = moved[..., 0], moved[..., 1]
-    normal = np.empty((len(pick), 2, 3, 2, 3))
-    for i, j, k in ((0, 0, a), (0, 1, b), (1, 0, b), (1, 1, d)):
-        normal[:, i, :, j] = np.einsum("mn,mni,mnj->mij", k, phi, phi)
-    pull = np.stack([a * dx + b * dy, b * dx + d * dy], axis=1)
-    right = pull @ phi
-    system = normal.reshape(-1, 6, 6) + np.eye(6) * 1e-2
-    model = np.linalg.solve(system, right.reshape(-1, 6, 1)).reshape(-1, 2, 3)
-    linear = model[..., :2] / 50.0
-    shift = model[..., 2] - np.einsum("mij,mj->mi", linear, centre)
-    return [Affine(np.column_stack([m, s])) for m, s in zip(linear, shift, strict=True)]

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.layers.affine import distances
 from visup.percepts.motion.layers.dense_labelling import CLIP, Labelling
-from visup.percepts.motion.layers.layer_discovery import affine_rate, discover_layers, layer_slack
+from visup.percepts.motion.layers.layer_discovery import affine_rate, discover_layers
+from visup.percepts.motion.tracks._track_points_jit import drop_explained
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
     min_region_area,
+    part_motions,
 )
 from visup.percepts.motion.tracks.merge_split import NEAR_STEPS, merged
 from visup.percepts.motion.tracks.salience import (
@@ -34,6 +35,7 @@ from visup.percepts.motion.tracks.track_update import update_track
 LIKELY = 60.0  # log likelihood ratio at which a track that has lasted is confirmed
 SURE = 200.0  # the same for a track that has just appeared
 BEHIND = 0.3  # share of a cell from which an object is expected there behind another
+FAR = 16.0  # squared Mahalanobis distance beyond which a motion does not explain a point
 SLIVER = 3.5  # ratio of length to width beyond which a thin track is no object
 
 
@@ -133,20 +135,13 @@ def _unexplained(
 ) -> NDArray[np.bool_]:
     c = m.constraints
     at = scene.cell_of(c)
-    out = ~owned[at] & (m.background.distances(c) > 16)
-    if not (tracks and out.any()):
-        return np.asarray(out)
-    members = np.stack([t.share for t in tracks], axis=1) > 0.3
-    near = scene.cells.dilated(members, NEAR_STEPS)[at]
-    for k, t in enumerate(tracks):
-        left = np.flatnonzero(out & near[:, k])
-        if not len(left):
-            continue
-        parts = t.predicted(c.lag, c.span_s)
-        some = c.take(left)
-        off = np.min([distances(p, some, layer_slack(p, t.centre)) for p in parts], axis=0)
-        out[left] = off >= 16
-    return np.asarray(out)
+    out = np.asarray(~owned[at] & (m.background.distances(c) > FAR))
+    if tracks and out.any():
+        members = np.stack([t.share for t in tracks], axis=1) > 0.3
+        near = scene.cells.dilated(members, NEAR_STEPS)[at]
+        points = c.xy, c.moved, c.information
+        drop_explained(out, points, near, part_motions(scene, tracks, c), FAR)
+    return out
 
 
 def update(

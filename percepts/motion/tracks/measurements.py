@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,10 +13,11 @@ from visup.percepts.motion.features.motion_constraints import Constraints, Point
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
-from visup.percepts.motion.layers.affine import Affine, log_likelihood
+from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.background_motion import BackgroundMotion
 from visup.percepts.motion.layers.dense_labelling import PointEvidence
 from visup.percepts.motion.layers.layer_discovery import layer_slack
+from visup.percepts.motion.tracks._track_points_jit import Motions, add_track_likelihoods
 from visup.percepts.motion.tracks.track import Indices, Track
 
 REACH_STEPS = 2
@@ -67,6 +69,18 @@ class FrameMeasurements:
         x, y = self.points.xy.astype(np.int64).T
         return np.asarray(self.cells.labels[y, x])
 
+    def parts(self, t: Track, c: Constraints) -> tuple[Affine, ...]:
+        """`Track.predicted` over the baseline of some constraints; cached, since several steps ask for it."""
+        known = self._parts.get((id(t), c.lag))
+        if known is None:
+            known = self._parts[id(t), c.lag] = t, t.predicted(c.lag, c.span_s)
+        return known[1]
+
+    @cached_property
+    def _parts(self) -> dict[tuple[int, int], tuple[Track, tuple[Affine, ...]]]:
+        """The tracks, so that none takes the number of another, and the motions of their parts."""
+        return {}
+
     def cell_of(self, c: Constraints) -> NDArray[np.int32]:
         """Number of the superpixel at each constraint."""
         return np.asarray(self.at[c.index])
@@ -109,6 +123,19 @@ def claimable_cells(
     return scene.cells.dilated(members, REACH_STEPS)
 
 
+def part_motions(scene: FrameMeasurements, tracks: Sequence[Track], c: Constraints) -> Motions:
+    """The motions of the parts of K tracks over the baseline of some constraints, for compiled loops.
+
+    Returns:
+        (P, 2, 3) displacements, (P,) errors to allow for them, and (K + 1,) where the parts of each begin.
+    """
+    parts = [scene.parts(t, c) for t in tracks]
+    slacks = [layer_slack(p, t.centre) for t, own in zip(tracks, parts, strict=True) for p in own]
+    begin = np.cumsum([0, *map(len, parts)])
+    matrices = np.array([p.matrix for own in parts for p in own]).reshape(-1, 2, 3)
+    return matrices, np.array(slacks, dtype=np.float64), begin
+
+
 def point_likelihoods(
     scene: FrameMeasurements,
     tracks: tuple[Track, ...],
@@ -136,14 +163,8 @@ def point_likelihoods(
         c = m.constraints
         has[c.index] = True
         zero = m.background.log_likelihood(c)
-        for k, t in enumerate(tracks, 1):
-            parts = t.predicted(c.lag, c.span_s)
-            within = np.flatnonzero(near[c.index, k - 1])
-            some = c.take(within)
-            each = [log_likelihood(p, some, layer_slack(p, t.centre)) for p in parts]
-            fit = np.full(len(c), 3 * least, dtype=np.float32)
-            fit[within] = np.maximum(np.max(each, axis=0), 3 * least)
-            out[c.index, k] += fit
+        measured, motions = (c.xy, c.moved, c.information), part_motions(scene, tracks, c)
+        add_track_likelihoods(out, c.index, measured, near, motions, 3 * least)
         out[c.index, 0] += np.maximum(zero, 3 * least)
         out[c.index, -1] += least
     return PointEvidence(scene.points, out, has & scene.points.corners())

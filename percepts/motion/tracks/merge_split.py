@@ -7,9 +7,9 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features._superpixels_jit import connected_groups
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.layers._affine_jit import quantile
 from visup.percepts.motion.layers.affine import Affine, distances, fit_affine
@@ -48,14 +48,13 @@ def assign_unknown(
 
     Limbs, wheels and shadows join their object; isolated parts are new objects.
     """
-    unknown = np.flatnonzero(winner == len(tracks) + 1)
-    if not len(unknown):
+    unknown = winner == len(tracks) + 1
+    if not unknown.any():
         return tracks
-    out = list(tracks)
-    count, number = connected_components(scene.cells.link[unknown][:, unknown], directed=False)
+    out, link = list(tracks), scene.cells.link
+    number, count = connected_groups(link.indptr, link.indices, unknown)
     for i in range(count):
-        part = np.zeros(scene.cells.count, dtype=bool)
-        part[unknown[number == i]] = True
+        part = number == i
         ring = scene.cells.dilated(part[:, None], 1)[:, 0] & ~part
         # The expected owner comes first, then the neighbour.
         k = _majority(scene.owner[part], len(tracks), 0.3)
@@ -236,7 +235,7 @@ def _vote(
         if c.lag == 1 and len(scene.measured) > 1:
             continue
         at = scene.cell_of(c)
-        start = a.predicted(c.lag, c.span_s)[0]
+        start = scene.parts(a, c)[0]
         mine, other = in_a[at], in_b[at]
         if not both:
             continue

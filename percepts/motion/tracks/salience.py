@@ -131,7 +131,7 @@ def _candidate_updated(
             if model is not None
         )
         if np.count_nonzero(mine) >= FEWEST:
-            _note(explained, m, _misfit(m, local)[mine])
+            _note(explained, m, _misfit(m, local, np.flatnonzero(mine)))
         if m is scene.measured[0]:
             t = _with_step(t, m, local, scene)
         _note_course(borne, t, m, local, scene)
@@ -245,11 +245,12 @@ def stands_there(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
     return bool(np.hypot(*(moved - ground)) < LEAST_OWN + SWAYS * np.hypot(*ground))
 
 
-def _misfit(m: BaselineMotion, local: Sequence[Affine]) -> NDArray[np.float32]:
-    """Squared distance of each constraint to the background or the surroundings, whichever fits best."""
-    out, c = m.background.distances(m.constraints), m.constraints
+def _misfit(m: BaselineMotion, local: Sequence[Affine], which: Indices) -> NDArray[np.float32]:
+    """Squared distance of some constraints to the background or the surroundings, whichever fits best."""
+    c = m.constraints
+    out, some = m.background.distances(c)[which], c.take(which)
     for model in local:
-        out = np.minimum(out, distances(model, c, background_slack(model, c)))
+        out = np.minimum(out, distances(model, some, background_slack(model, c)))
     return out
 
 

@@ -63,8 +63,7 @@ class PartMotion:
         fresh.sort(key=lambda r: r.span_s)
         best = fresh[0]
         for rate in fresh[1:]:
-            gap = float(np.hypot(*(rate.velocity(where) - best.velocity(where))))
-            if gap < 3 * (rate.sigma + best.sigma) and rate.sigma < best.sigma:
+            if rate.gap(best, where) < 3 * (rate.sigma + best.sigma) and rate.sigma < best.sigma:
                 best = rate
         return best
 
@@ -73,7 +72,7 @@ class PartMotion:
         return PartMotion(MappingProxyType({**self.rates, lag: rate}), support)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: a frame copies each several times
 class Track:
     """One moving object.
 
@@ -171,8 +170,8 @@ class Track:
         fresh.sort(key=lambda r: r.span_s)
         best = fresh[0]
         for rate in fresh[1:]:
-            gap = float(np.hypot(*(rate.velocity(self.centre) - best.velocity(self.centre))))
-            if rate.span_s < BRISK_S and gap < 3 * best.sigma and rate.sigma < best.sigma:
+            near = rate.gap(best, self.centre) < 3 * best.sigma
+            if rate.span_s < BRISK_S and near and rate.sigma < best.sigma:
                 best = rate
         return best.velocity(self.centre)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import dist, hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,12 @@ from numpy.typing import NDArray
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.motion_constraints import Constraints
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.layers.affine import Affine, distances, fit_affine
+from visup.percepts.motion.layers.affine import Affine, fit_affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 from visup.percepts.motion.layers.background_motion import BackgroundMotion
 from visup.percepts.motion.layers.layer_discovery import affine_rate, layer_slack, median_motion
-from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
+from visup.percepts.motion.tracks._track_points_jit import assigned
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Indices, PartMotion, Track
 
 ALIKE_PX_S = 12.0  # pixels per second within which a part moves like a hidden track
@@ -26,10 +28,17 @@ PART_COST = 4.0  # squared distance that a further part of a track must save
 
 def fit_tracks(tracks: tuple[Track, ...], scene: FrameMeasurements) -> tuple[Track, ...]:
     """Refit each track's motion to the constraints inside its outline."""
+    if not tracks:
+        return tracks
     for m in scene.measured:
-        c = m.constraints
-        at = scene.owner[scene.cell_of(c)]
-        tracks = tuple(_fitted(t, m, at == k, scene.time) for k, t in enumerate(tracks, 1))
+        owner = scene.owner[scene.cell_of(m.constraints)]
+        order = np.argsort(owner, kind="stable")
+        ends = np.searchsorted(owner[order], np.arange(1, len(tracks) + 2)).tolist()
+        c, ground = m.constraints.take(order), m.background.distances(m.constraints)[order]
+        tracks = tuple(
+            _fitted(t, m.background, c.take(np.s_[a:b]), ground[a:b], scene.time)
+            for t, a, b in zip(tracks, ends[:-1], ends[1:], strict=True)
+        )
     return tracks
 
 
@@ -38,8 +47,8 @@ def moves_like(motion: PartMotion, other: Track) -> bool:
     rate = motion.best_rate(other.centre)
     if rate is None:
         return False
-    gap = rate.velocity(other.centre) - np.asarray(other.unoccluded_velocity)
-    return bool(np.hypot(*gap) < ALIKE_PX_S + 0.2 * np.hypot(*other.unoccluded_velocity))
+    known = other.unoccluded_velocity
+    return dist(rate.shift(other.centre), known) < ALIKE_PX_S + 0.2 * hypot(*known)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,20 +75,22 @@ class _PartFit:
         return part.with_rate(self.constraints.lag, self.rate, support)
 
 
-def _fitted(t: Track, m: BaselineMotion, mine: NDArray[np.bool_], now: float) -> Track:
+def _fitted(
+    t: Track, background: BackgroundMotion, c: Constraints, to_background: Floats, now: float
+) -> Track:
     """A track with each part fitted to the constraints it explains best.
 
     Args:
         t: The track.
-        m: Motion over one baseline.
-        mine: (N,) bool, the constraints in its outline.
+        background: Of the baseline.
+        c: The N constraints in its outline.
+        to_background: (N,) float32, their squared distances to the background.
         now: Seconds.
     """
-    if not mine.any():
+    if not len(c):
         return t
-    c = m.constraints.take(np.flatnonzero(mine))
     models = t.predicted(c.lag, c.span_s)
-    own, nearest = _assigned(t, models, c, m.background.distances(m.constraints)[mine])
+    own, nearest = _assigned(t, models, c, to_background)
     # A mostly occluded part has few constraints: its known rate is retained.
     least_share = 0.6 if t.mostly_occluded else 0.0
     parts: list[PartMotion] = []
@@ -88,7 +99,7 @@ def _fitted(t: Track, m: BaselineMotion, mine: NDArray[np.bool_], now: float) ->
         fit = _fit_part(c, weight, start, t.centre, now, first=i == 0)
         if i == 0:
             parts.append(fit.renewed(part, least_share) or part)
-        elif (renewed := _further_part(t, part, fit, m.background, least_share)) is not None:
+        elif (renewed := _further_part(t, part, fit, background, least_share)) is not None:
             parts.append(renewed)
     whole = t.whole_rate if len(parts) < 2 else _whole_rate(c, own, models[0], now) or t.whole_rate
     return replace(t, motions=tuple(parts), whole_rate=whole)
@@ -98,14 +109,9 @@ def _assigned(
     t: Track, models: Sequence[Affine], c: Constraints, to_background: Floats
 ) -> tuple[NDArray[np.bool_], Indices]:
     """Which of N constraints a track may be fitted to, (N,) bool; the nearest part of each, (N,)."""
-    off = np.stack([distances(model, c, layer_slack(model, t.centre)) for model in models])
-    # The first part is preferred: an edge along the motion fits any part and must not feed others.
-    off[1:] += PART_COST
-    # Constraints that the background explains, and no part does, must not pull the track along.
-    # When that holds for most of the track, it has stopped instead.
-    own = (off.min(axis=0) < 9) | (to_background > 4)
-    own = own if np.count_nonzero(own) > 0.5 * len(own) else np.ones_like(own)
-    return own, off.argmin(axis=0)
+    matrices = np.array([model.matrix for model in models])
+    slacks = np.array([layer_slack(model, t.centre) for model in models])
+    return assigned((c.xy, c.moved, c.information), to_background, matrices, slacks, PART_COST)
 
 
 def _fit_part(
@@ -178,6 +184,5 @@ def _agrees_across_baselines(
     if not fresh:
         return True
     best = min(fresh, key=lambda r: r.sigma)
-    speed = best.velocity(where)
-    gap = float(np.hypot(*(rate.velocity(where) - speed)))
-    return gap < 3 * (rate.sigma + best.sigma) + 0.5 * float(np.hypot(*speed)) + UNLIKE_PX_S
+    speed = hypot(*best.shift(where))
+    return rate.gap(best, where) < 3 * (rate.sigma + best.sigma) + 0.5 * speed + UNLIKE_PX_S

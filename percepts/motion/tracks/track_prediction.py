@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
+from math import inf
 
-import cv2
 import numpy as np
 
 from visup.agent.model.fast_replace import replace
@@ -62,7 +63,7 @@ def _predicted(
     step_xy = track.instant_velocity() * seconds
     last = track.path[-1] if track.path else (track.initiated, 0.0, 0.0)
     here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
-    path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
+    path = track.path[bisect_right(track.path, (here[0] - PATH_S, inf)) :]
     by = int(pixels[0]), int(pixels[1])
     # An object fades before an occluder hides it: what it still covers counts.
     body = track.share > 0.5
@@ -91,9 +92,17 @@ def shift_map(image: Floats, dx: int, dy: int) -> Floats:
     """An image shifted by whole pixels, filled with zeros."""
     if dx == 0 and dy == 0:
         return image
-    matrix = np.array([[1, 0, dx], [0, 1, dy]], dtype=np.float64)
-    size = (image.shape[1], image.shape[0])
-    return np.asarray(cv2.warpAffine(image, matrix, size, flags=cv2.INTER_NEAREST))
+    out = np.zeros_like(image)
+    height, width = image.shape
+    top, left, bottom, right = (
+        max(dy, 0),
+        max(dx, 0),
+        min(height + dy, height),
+        min(width + dx, width),
+    )
+    if bottom > top and right > left:
+        out[top:bottom, left:right] = image[top - dy : bottom - dy, left - dx : right - dx]
+    return out
 
 
 def label_priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
@@ -106,27 +115,32 @@ def label_priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
     Returns:
         (count, K + 2) float32: background, each track, and unknown motion (zero).
     """
-    out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
-    for k, track in enumerate(tracks, 1):
-        out[:, k] = track.share
-    for track in tracks:
-        if track.occluded is not None:
-            # An occluder is expected only where its own motion takes it.
-            there = cells.mean(track.occluded) > 0.3
-            for k, other in enumerate(tracks, 1):
-                if other is not track and other.predicted_share is not None:
-                    out[there, k] = np.minimum(out[there, k], other.predicted_share[there])
-    free = np.clip(1 - out.sum(axis=1), 0, 1)
-    for k, track in enumerate(tracks, 1):
-        if track.occluded is not None:
-            # A hidden track is expected back where its occluder has left.
-            out[:, k] += free * np.maximum(cells.mean(track.occluded) - out[:, k], 0)
-    out /= np.maximum(out.sum(axis=1, keepdims=True), 1)
-    out[:, 0] = np.clip(1 - out.sum(axis=1), 0, 1)
-    return sharpen(out)
+    # Label by label: NumPy is slow along short rows.
+    out = np.zeros((len(tracks) + 2, cells.count), dtype=np.float32)
+    moved = np.full_like(out, np.inf)
+    for k, t in enumerate(tracks, 1):
+        out[k] = t.share
+        if t.predicted_share is not None:
+            moved[k] = t.predicted_share
+    hidden = [
+        (k, cells.mean(t.occluded)) for k, t in enumerate(tracks, 1) if t.occluded is not None
+    ]
+    for k, mean in hidden:
+        # An occluder is expected only where its own motion takes it.
+        there = np.flatnonzero(mean > 0.3)
+        before = out[k, there]
+        out[:, there] = np.minimum(out[:, there], moved[:, there])
+        out[k, there] = before
+    free = np.clip(1 - out.sum(axis=0), 0, 1)
+    for k, mean in hidden:
+        # A hidden track is expected back where its occluder has left.
+        out[k] += free * np.maximum(mean - out[k], 0)
+    out /= np.maximum(out.sum(axis=0), 1)
+    out[0] = np.clip(1 - out.sum(axis=0), 0, 1)
+    return np.ascontiguousarray(_sharpened(out).T)
 
 
-def sharpen(shares: Floats) -> Floats:
-    """Push label shares (count, K) towards their winner, so that carried beliefs do not fade."""
+def _sharpened(shares: Floats) -> Floats:
+    """Label shares (K, count) pushed towards their winner, so that carried beliefs do not fade."""
     squared = shares * shares
-    return np.asarray(squared / np.maximum(squared.sum(axis=1, keepdims=True), 1e-6))
+    return np.asarray(squared / np.maximum(squared.sum(axis=0), 1e-6))

@@ -14,6 +14,7 @@ from visup.percepts.motion.features._superpixels_jit import half_size_means
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.layers.affine import Affine
+from visup.percepts.motion.tracks._track_points_jit import hidden_before
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
@@ -121,7 +122,7 @@ def dense_likelihood(
     for k, t in enumerate(tracks, 1):
         mine = np.flatnonzero(near[:, k - 1])
         if len(mine):
-            models = t.predicted(c.lag, c.span_s)
+            models = scene.parts(t, c)
             x, y, w, h = own = _halved(cells.box(near[:, k - 1]), cells)
             there = np.s_[y - box[1] : y - box[1] + h, x - box[0] : x - box[0] + w]
             fit = warp_likelihood(scene.image, old, models, own, precision[there])
@@ -140,15 +141,11 @@ def _was_hidden(
     There the background may look different now, so a poor match is no evidence against it.
     """
     cells, background = scene.cells, scene.measured[-1].background.models
-    height, width = cells.labels.shape
     centre = cells.centre[which]
-    out = np.zeros(len(which), dtype=bool)
+    moved, out = model.at(centre), np.zeros(len(which), dtype=bool)
     for ground in background:
-        away = model.at(centre) - ground.at(centre)
-        away += 2.0 * away / np.maximum(np.hypot(away[:, :1], away[:, 1:]), 1e-3)
-        at = np.rint(centre + 1.2 * away).astype(np.int64)
-        x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
-        out |= scene.owner[cells.labels[y, x]] == k
+        away = moved - ground.at(centre)
+        out |= hidden_before(cells.labels, scene.owner, cells.centre, which, away, k)
     return out
 
 
