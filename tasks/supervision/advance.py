@@ -122,8 +122,7 @@ class Advance:
         opens = transition.entered and self._opens(hypothesis, transition)
         # With several alternatives an entry supports none of them: touching may precede coupling or backing
         # off. A holding action does.
-        holds = (self.observe(s).holds is Truth.TRUE for s in transition.entered)
-        if opens and (ways == 1 or all(holds)):
+        if opens and (ways == 1 or all(self._holds(s) for s in transition.entered)):
             return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._goes_on(transition):
             return Support.OVER
@@ -161,10 +160,19 @@ class Advance:
         for transition in transitions:
             if self._goes_round(transition):
                 continue
-            entries = ((s, self.observe(s).entry) for s in transition.entered)
-            if transition.entered and all(self._lasted(s, entry) for s, entry in entries):
+            if transition.entered and all(self._enters(s) for s in transition.entered):
                 met[transition.entered] = self.now
         return tuple(met.items())
+
+    def _holds(self, step: TaskStep) -> bool:
+        """Whether a step holds, or a trend by which it holds has just set in."""
+        seen = self.observe(step)
+        return seen.holds is Truth.TRUE or seen.sudden is not None
+
+    def _enters(self, step: TaskStep) -> bool:
+        """Whether the beginning of a step is observed: by a relation that has lasted, or beyond doubt."""
+        seen = self.observe(step)
+        return seen.sudden is not None or self._lasted(step, seen.entry)
 
     def _lasted(self, step: TaskStep, relation: Relation | None) -> bool:
         """Whether a relation by which a step begins has lasted long enough."""

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
+from visup.rules.coupling.contact import ContactSettings
 from visup.rules.formula.truth import truth_if
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
@@ -20,6 +21,7 @@ from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.verification.kept import NOTHING_KEPT, Kept
 from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
+from visup.tasks.verification.sudden import SuddenTrends
 
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
@@ -27,6 +29,9 @@ TRENDS = ("converging", "diverging")
 
 CARRIED_SPEED = 0.005
 """Least speed at which coupled objects count as moving together, image diagonals per second."""
+
+REST_S = 0.3
+"""How long a relative speed must be low before one body that passed the other rests there."""
 
 RADIAL_SHARE = 0.45
 """Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
@@ -47,6 +52,7 @@ class ActionObservation:
         over: Whether the end condition of its course holds; None when the course has none.
         observed: Whether anything is known about it; False while an actor is not found or its object
             is hidden.
+        sudden: A trend by which it begins that has just set in, and has not lasted yet, or None.
         round: Whether its entry is a trend between two of which one goes round the other.
         paused: Whether the work on it is paused: then there is no observation of it.
         pauses: All pauses of the task so far.
@@ -61,6 +67,7 @@ class ActionObservation:
     decisive: bool = False
     over: Truth | None = None
     observed: bool = False
+    sudden: Relation | None = None
     round: bool = False
     paused: bool = False
     pauses: PauseRecord = NO_PAUSES
@@ -101,6 +108,7 @@ class RelationLookup:
         self._beats: dict[str, tuple[Beats, Truth]] = {}
         self._evaluated: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._sudden = SuddenTrends(mind)
         self._queried: set[str] = set()
         self._after: dict[str, float] = {}
 
@@ -138,7 +146,28 @@ class RelationLookup:
     def _passes_by(self, objects: tuple[int, ...]) -> bool:
         """Whether outlines meet only because one body passes in front of the other."""
         passing = self._mind.relation("passing_by", *objects)
-        return passing is not None and passing.truth is Truth.TRUE
+        if passing is None or passing.truth is not Truth.TRUE:
+            return False
+        return not self._rests(objects)
+
+    def _rests(self, objects: tuple[int, ...]) -> bool:
+        """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
+        speed = kinematics(self._mind).pair("relative_speed", *objects)
+        slow = speed < ContactSettings().passing * image_diagonal(self._mind.frame_size)
+        rest = self.lasting(
+            "rests", objects, Truth.UNKNOWN if math.isnan(speed) else truth_if(slow)
+        )
+        return rest.truth is Truth.TRUE and self.time - rest.since >= REST_S - 1e-9
+
+    def begun(
+        self, names: tuple[str, ...], objects: tuple[int, ...]
+    ) -> tuple[Relation | None, Relation | None]:
+        """The first true one of some relations, and a sudden trend among them; each may be None."""
+        entry = self.first_true(names, objects)
+        if entry is not None:
+            return (None if self._sudden.ends(entry) else entry), None
+        sudden = self._sudden.first(names, objects)
+        return sudden, sudden
 
     def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend is rather one going round the other; False if unknown."""
@@ -263,7 +292,7 @@ def observe(
     if contrary is not None and relations.explains_away(contrary.name, meaning.name, ids):
         contrary = None
     known = (*meaning.helps, *meaning.contrary)
-    entry = relations.first_true(meaning.begins, ids)
+    entry, sudden = relations.begun(meaning.begins, ids)
     return ActionObservation(
         holds=holds,
         held_by=held_by,
@@ -271,6 +300,7 @@ def observe(
         entry=entry,
         contrary=contrary,
         observed=relations.known(known, ids),
+        sudden=sudden,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
     )
 

@@ -142,11 +142,7 @@ def update(
         The new state, with the new status.
     """
     now = moment.now
-    if step.condition("begins") is not None and not monitor.opened:
-        # Until it begins, no observation counts for or against it.
-        monitor = replace(monitor, opened=seen.entry is not None)
-        if not monitor.opened:
-            seen = replace(UNOBSERVED, observed=seen.observed, pauses=seen.pauses)
+    monitor, seen = _beginning(monitor, step, seen)
     if step.delay is not None:
         monitor = _mark_hasty(monitor, step, seen)
     worked = partial(seen.elapsed, step)
@@ -172,6 +168,19 @@ def update(
         fulfilled=False,
         held_s=0.0,
     )
+
+
+def _beginning(
+    monitor: StepMonitor, step: TaskStep, seen: ActionObservation
+) -> tuple[StepMonitor, ActionObservation]:
+    """What counts until a step has begun: nothing before its begin condition, then also a sudden trend."""
+    if monitor.begun is not None:
+        return monitor, seen
+    if step.condition("begins") is not None and not monitor.opened:
+        monitor = replace(monitor, opened=seen.entry is not None)
+        if not monitor.opened:
+            return monitor, replace(UNOBSERVED, observed=seen.observed, pauses=seen.pauses)
+    return monitor, seen if seen.helps is not None else replace(seen, helps=seen.sudden)
 
 
 def _note_reported(monitor: StepMonitor, step: TaskStep, status: Status, now: float) -> StepMonitor:
