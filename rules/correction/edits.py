@@ -188,6 +188,8 @@ def hint_of(line: str, repair: Repair) -> str | None:
             return None
         word = tokens[-1][0]
         gap = " " if new[:1].isalnum() or new[:1] == " " else ""
+        # A sign alone may stand elsewhere as well, so all that is written together with it is named.
+        word = word if word.isalnum() else line[: tokens[-1].end()].split()[-1]
         return f"write `{word}{gap}{new.strip()}` in place of `{word}`"
     if not new.strip() and old.isprintable():
         return f"leave `{' '.join(old.split())}` out"

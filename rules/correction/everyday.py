@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 
@@ -129,3 +130,22 @@ def meant_by(words: Iterable[str]) -> Iterator[tuple[int, str]]:
             yield len(phrase), meant
     if said and said[0] in NUMBERS:
         yield 1, NUMBERS[said[0]]
+
+
+_PARTS_SAID = {"half": "0.5", "quarter": "0.25", "a": "1", "one": "1", "couple": "2", "few": "3"}
+_OF_TIME = {"s": "s", "m": "min", "h": "h"}
+AMOUNT_SAID = re.compile(
+    r"\b(?:(half|quarter)\s+(?:of\s+)?an?|(?:a\s+)?(couple|few)(?:\s+of)?|(an?|one))\s+(second|sec|minute|min|hour)s?\b",
+    re.IGNORECASE,
+)
+"""Amounts of time in words, without a number."""
+
+
+def amount_said(match: re.Match[str]) -> str:
+    """The amount of time that words mean.
+
+    >>> amount_said(AMOUNT_SAID.search("for half a second"))
+    '0.5 s'
+    """
+    word = (match[1] or match[2] or "one").casefold()
+    return f"{_PARTS_SAID[word]} {_OF_TIME[match[4][0].casefold()]}"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from functools import lru_cache
 
 from visup.agent.model.errors import ErrorGroup, SourceLocation, VisupError
 from visup.rules.formula.units import NOWHERE, Span
@@ -112,3 +114,26 @@ def either(words: Iterable[str]) -> str:
     """Words as alternatives: `a`, `a or b`, `a, b or c`."""
     *first, last = words
     return f"{', '.join(first)} or {last}" if first else last
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """All known words if few, else those spelt most similarly."""
+    return _nearest_of(word, tuple(known))
+
+
+@lru_cache(maxsize=4096)  # each tried edit repeats all errors of its file
+def _nearest_of(word: str, names: tuple[str, ...]) -> str:
+    if len(names) <= MOST_LISTED:
+        return listed(names)
+    near = get_close_matches(word, names, n=MOST_LISTED, cutoff=0.0)
+    return f"{listed(near)}, or one of {len(names) - len(near)} more (docs/rules.md)"
+
+
+MOST_LISTED = 8
+"""Most words in a list."""
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words as a list to choose from."""
+    names = list(words)
+    return "one of " + ", ".join(names) if len(names) > 1 else "".join(names) or "nothing"

@@ -15,7 +15,11 @@ from visup.rules.formula.terms import (
     WindowFunction,
 )
 from visup.rules.formula.units import (
+    LENGTH,
+    REAL_LENGTH,
+    REAL_SPEED,
     SHARE,
+    SPEED,
     TIME,
     UNITS,
     Dimension,
@@ -45,9 +49,47 @@ def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault
     if left and right and left != right:
         what = f"{_named(left)} is compared with {_named(right)}"
         wanted = right if _constant(node.left) else left
-        yield node.span, what, units_of(wanted), _with_unit(node, wanted)
+        yield node.span, what, units_of(wanted), _told(_with_unit(node, wanted), {left, right})
+    elif left == right == SHARE:
+        yield from _share(node, vocabulary)
     if node.leave is not None:
         yield from _leave(node, left)
+
+
+def _told(hint: str | None, compared: set[Dimension]) -> str | None:
+    """A hint that says so where a number of the scene cannot become one of the image."""
+    real = {REAL_LENGTH, REAL_SPEED} & compared
+    if hint is None or not real or not {LENGTH, SPEED} & compared:
+        return hint
+    return f"metres cannot be told in pixels without a floor, so choose the number anew; {hint}"
+
+
+def _share(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault]:
+    """An error for a share above 1 without a unit, and for a plain number in per cent.
+
+    `depth_difference(a, b) < 15` would mean 1,500 %, and `signal(battery) > 90 %` would mean 0.9.
+    """
+    sides = (node.left, node.right), (node.right, node.left)
+    for measure, number in sides:
+        if not isinstance(measure, Measure) or not isinstance(number, Number):
+            continue
+        plain = vocabulary.quantities[measure.name].plain
+        if plain == (number.unit == Unit.PERCENT) and (plain or number.base > 1):
+            said = number_text(number.value)
+            meant = said if plain else f"{said} %"
+            what = f"`{number}` without a unit is {number_text(100 * number.base)} %"
+            what = (
+                f"`{measure}` is a plain number, and `{number}` is {number.base:g}"
+                if plain
+                else what
+            )
+            change = str(node).replace(str(number), meant)
+            yield (
+                node.span,
+                what,
+                "a plain number" if plain else "a share in %",
+                f"write `{change}`",
+            )
 
 
 def example_amount(node: Comparison, vocabulary: Vocabulary) -> str:

@@ -16,10 +16,13 @@ from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.model.did_you_mean import closest
 from visup.rules.correction.edits import Repair, edits
+from visup.rules.correction.loss import LITTLE, loss
 from visup.rules.language.keywords import KEYWORDS
 from visup.rules.language.slips import SLIPS
 
 MOST_REPAIRS = 12
+MOST_COMPARED = 4
+"""Edits that make a text correct and are compared by what they lose."""
 MOST_CORRECTIONS = 16
 """Most corrections tried per error, cheapest first."""
 NEAR = 60
@@ -75,13 +78,14 @@ def find_repair(
     at, length = place_of(text, error)
     trial = _RepairTrial(text, at, length, error_of, is_sound)
     usual = trial.best(_candidates(text, at, length))
-    if usual is not None and trial.sound:
+    if usual is not None and trial.lost <= LITTLE:
         return usual
-    further, trial.moved = trial.moved, 0.0
+    sound, further, trial.moved = (trial.lost, usual), trial.moved, 0.0
     since = max(0, min(at - NEAR, text.rfind("\n", 0, at) + 1))
     least = trial.best(islice(corrected(since), MOST_CORRECTIONS))
-    if trial.sound:
-        return least
+    lost, whole = min(sound, (trial.lost, least), key=lambda found: found[0])
+    if lost < inf:
+        return whole
     if usual is not None and further > MUCH_FURTHER:
         return usual
     places = dict.fromkeys((at, max(0, end_before(text, at) - 1)))
@@ -99,7 +103,7 @@ class _RepairTrial:
         error_of: Parses a text.
         is_sound: Whether a text without syntax errors is also semantically correct.
         moved: How many more characters parse after the last chosen edit.
-        sound: Whether an edit was found after which the text is correct.
+        lost: What the last chosen edit loses; infinite unless the text is correct after it.
     """
 
     text: str
@@ -108,10 +112,15 @@ class _RepairTrial:
     error_of: Parses
     is_sound: Callable[[str], bool]
     moved: float = 0.0
-    sound: bool = False
+    lost: float = inf
 
     def best(self, repairs: Iterable[Repair]) -> Repair | None:
-        """The first edit after which the text is correct, else parses, else parses further."""
+        """The first edit after which the text is correct, else parses, else parses further.
+
+        An edit that loses much of the text is taken only if a few others lose no less.
+        """
+        self.lost = inf
+        whole: list[tuple[float, Repair]] = []
         further: Repair | None = None
         readable: Repair | None = None
         slips_first = False
@@ -124,15 +133,19 @@ class _RepairTrial:
             if left is None:
                 self.moved = inf
                 if self.is_sound(changed):
-                    self.sound = True
-                    return repair
+                    whole.append((loss(self.text, changed), repair))
+                    if whole[-1][0] <= LITTLE or len(whole) == MOST_COMPARED:
+                        break
+                    continue
                 readable = readable or repair
                 continue
-            moved = place_of(changed, left)[0] - len(repair.new)
+            moved = place_of(changed, left)[0] - len(repair.new) + len(repair.old)
             if further is None and moved > repair.end + 1 and moved > self.at + self.length:
                 further, self.moved = repair, moved - self.at
-                gained = moved + repair.end - repair.begin - self.at
-                slips_first = readable is None and gained > MUCH_FURTHER
+                slips_first = readable is None and self.moved > MUCH_FURTHER
+        if whole:
+            self.lost, least = min(whole, key=lambda found: found[0])
+            return least
         if slips_first:
             self.moved = MUCH_FURTHER + 1
             return further

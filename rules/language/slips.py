@@ -9,6 +9,10 @@ from itertools import combinations
 from math import degrees
 
 from visup.agent.model.did_you_mean import closest
+from visup.rules.correction.everyday import AMOUNT_SAID, amount_said
+from visup.rules.language.keywords import KEYWORDS
+from visup.rules.language.synonyms import synonym
+from visup.rules.predicates.vocabulary import RULES
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,111 @@ def _grouped(match: re.Match[str], both: str) -> str:
     return both if alone else f"({both})"
 
 
+_SIGNS = {"&&": "and", "||": "or", "∧": "and", "∨": "or", "¬": "not", "!": "not"}
+_SIGN = r"(?:&&|\|\||∧|∨|¬|!(?!=))"
+_A_SIGN = re.compile(rf"\s*({_SIGN})\s*")
+
+
+def _signs_in_words(match: re.Match[str]) -> str:
+    """All signs of logic of a line as words."""
+    said = _A_SIGN.sub(lambda m: f" {_SIGNS[m[1]]} ", match[0])
+    return said if match.string[: match.start()][-1:] not in ("", " ", "(", "\n") else said.lstrip()
+
+
+def _of_signal(match: re.Match[str]) -> str:
+    """A signal compared with a word: whether it is on, off, or has that word as its value."""
+    off = match["word"].casefold() in ("false", "off", "no", "closed")
+    plain = off or match["word"].casefold() in ("true", "on", "yes")
+    said = (
+        f"signal_on({match['name']})" if plain else f"signal_is({match['name']}, {match['word']})"
+    )
+    return (
+        f"not {said}" if off != (match["sign"].startswith("!") or "not" in match["sign"]) else said
+    )
+
+
+def _behind(match: re.Match[str]) -> str:
+    """An argument that stands behind its bracket."""
+    takes = RULES.words[match[1]].takes if match[1] in RULES.words else ()
+    return f"{match[1]}({match[2]}, {match[3]})" if len(takes) == 2 else match[0]
+
+
+def _pronoun(match: re.Match[str]) -> str:
+    """What somebody or nobody does with an object."""
+    verb = synonym(match["verb"], RULES.words) or closest(match["verb"], RULES.words)
+    said = f"(exists other: {verb}(other, {match['what']}))"
+    return f"not {said}" if match["who"].casefold().startswith("no") else said
+
+
+def _changing(match: re.Match[str]) -> str:
+    """A quantity that grows or shrinks."""
+    return f"rate({match[1]}, 1 s) {'>' if re.match('inc|gro|ris|gain|spe', match[2]) else '<'} 0"
+
+
+def _counted(match: re.Match[str]) -> str:
+    """The number of objects, or of those of a name in the plural."""
+    kind = match["kind"]
+    if kind in ("objects", "things", "bodies", "object"):
+        return "objects()"
+    return f"objects_named({kind.removesuffix('s') if len(kind) > 3 else kind})"
+
+
+def _being(match: re.Match[str]) -> str:
+    """`a is arm`: an object of a name, unless it is a word of the language."""
+    name = match["name"]
+    known = name in KEYWORDS or name in RULES.words or synonym(name, RULES.words) is not None
+    said = f"named({match['what']}, {name})"
+    return match[0] if known or name == "another" else f"not {said}" if match["no"] else said
+
+
 SLIPS = (
+    _slip(rf"{_SIGN}(?:[^\n#\"]*{_SIGN})?\s*", _signs_in_words),
+    _slip(r"\bsignal\(\s*\"?(?P<name>\w+)\"?\s*\)\s*(?P<sign>={1,3}|!=|is\s+not\b|is\b)\s*[\"']?"
+          r"(?P<word>[A-Za-z]\w*)[\"']?", _of_signal),
+    _slip(r"(?<=[(,])(\s*)[\"'](\w+)[\"'](?=\s*[,)])", r"\1\2"),
+    _slip(AMOUNT_SAID.pattern, amount_said),
+    _slip(r"=>\s*(?=\d)", ">= "),
+    _slip(rf"({_CALL})\s+U\s+(?=[\w(])", r"\1 until[5 s] "),
+    _slip(rf"({_CALL})\s+S\s+(?=[\w(])", r"\1 since "),
+    _slip(r"\bin\s+(\d+)\s+(?:out\s+)?of\s+(?:the\s+)?(?:last\s+|past\s+|previous\s+)?(\d+)\s*(?:frames?|images?|times)\b",
+          r"in \1 of \2 samples"),
+    _slip(r"\bin\s+(\d+)\s+(?:out\s+)?of\s+(?:the\s+)?(?:last|past|previous)\s+(\d+)\s*(?:samples?\b)?",
+          r"in \1 of \2 samples"),
+    _slip(r"\b(?:changes|changed|toggles|edge|flips)\((\w+\([^()]*\))\)", r"(rising(\1) or falling(\1))"),
+    _slip(r"\b(\w+)\((\w+)\)\s+(?:the\s+)?(?!(?:and|or|for|in|within|since|until|unless|hold|say|implies|iff|xor|leave|release|cooldown)\b)"
+          r"([a-z]\w*)\b(?!\s*[(\w])", _behind),
+    _slip(rf"({_CALL})\s+(?:is\s+|keeps\s+)?(increas\w+|grow\w*|ris(?:es|ing)|gains|speeds\s+up|decreas\w+|shrink\w*"
+          r"|fall(?:s|ing)|drop\w*|slows(?:\s+down)?)(?!\s*\()", _changing),
+    _slip(r"\b(?P<who>nobody|nothing|no\s?one|none|somebody|someone|something|anybody|anything|anyone)\s+(?:is\s+)?"
+          r"(?P<verb>[a-z]\w+)\s+(?:with\s+|by\s+|to\s+)?(?P<what>[a-z]\w?)\b", _pronoun),
+    _slip(r"\b[a-z]+(?:-[a-z]+)+(?=\()", lambda m: m[0].replace("-", "_")),
+    _slip(rf"\|\s*({_CALL})\s*\|", r"abs(\1)"),
+    _slip(rf"\b(max|min)\(\s*({_CALL})\s*,\s*(\d[\d.]*\s*(?:ms|s|min|h))\s*\)",
+          lambda m: f"{'highest' if m[1] == 'max' else 'lowest'}({m[2]}, {m[3]})"),
+    _slip(rf"({_CALL})\.(rate|before|lowest|highest)\(\s*({_AMOUNT})?\s*\)",
+          lambda m: f"{m[2]}({m[1]}, {m[3] or '1 s'})"),
+    _slip(rf"({_CALL})\s+(?:and\s+)?then\s+({_CALL})\s+within\s+({_AMOUNT})", r"\1 and eventually[\3] \2"),
+    _slip(rf"({_CALL})\s+(?:right\s+|just\s+)?after\s+({_CALL})", r"\1 and once \2"),
+    _slip(rf"({_CALL})\s+since\s+(\d[\d.]*\s*(?:ms|s|min|h))\b(?!\s*[\w(])", r"\1 for \2"),
+    _slip(rf"({_CALL})\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+(?:long|straight|in\s+a\s+row)\b", r"\1 for \2"),
+    _slip(r"(?<=[(,])(\s*)(?:the\s+|zone\s+|object\s+)+(?=\w+\s*[,)])", r"\1"),
+    _slip(rf"({_CALL})\s*={{1,3}}\s*({_NUMBER})\s*(?:\+/?-|±)\s*({_NUMBER})\s*({_UNIT})",
+          lambda m: _grouped(m, f"{m[1]} >= {float(m[2]) - float(m[3]):g} {m[4]} and "
+                             f"{m[1]} <= {float(m[2]) + float(m[3]):g} {m[4]}")),
+    _slip(r"\bexpected\(\s*(\w+)\s*\(([^()]*)\)\s*\)", r"expected(\1, \2)"),
+    _slip(r"\b(?:the\s+)?(?:number|count|amount)[ _]+of[ _]+(?P<kind>[a-z]\w*)(?:\(\))?", _counted),
+    _slip(r"\bd\s*/\s*dt\s*\(?(\w+\([^()]*\))\)?", r"rate(\1, 1 s)"),
+    _slip(rf"\b(rate|before|lowest|highest|last)\(\s*({_AMOUNT})\s*,\s*([^()]*(?:\([^()]*\))?)\s*\)",
+          r"\1(\3, \2)"),
+    _slip(r"\b([a-z]\w*)\.(?:pos(?:ition)?\.)?([xy])\b", r"position_\2(\1)"),
+    _slip(r"^(\s*)(unless\s+[^\n]+)\n(\s*)(when\s+[^\n]+)", r"\1\4\n\3\2"),
+    _slip(r"\b(rule\s+\w+)[ -]+(\w+)(?=\()", r"\1_\2"),
+    _slip(r"\b([a-z]\w*)\s+is\s+(?!not\b)([a-z]\w*)\s+(and|or|but)\s+([a-z]\w*)\s+is(?:n't|\s+not)\b(?!\s+[a-z]\w*\s*(?:and|or|$))",
+          r"\2(\1) \3 not \2(\4)"),
+    _slip(r"\b(?P<what>[a-z]\w?)\s+(?:is|==)\s+(?P<no>not\s+)?(?:an?\s+|the\s+)?\"?(?P<name>[a-z]\w{2,})\"?(?!\s*\()",
+          _being),
+    _slip(r"\b([a-z]\w?)\s+(?:is\s+)?(not\s+)?(?:in|inside|within)\s+(?:the\s+)?(?:zone\s+)?([a-z_]\w*)\b(?!\s*[(:])",
+          lambda m: f"{'not ' if m[2] else ''}inside({m[1]}, {m[3]})"),
     _slip(rf"(?P<what>{_CALL})\s+(?:is\s+|stays\s+|lies\s+)?(?P<no>not\s+)?(?:in\s+)?(?:between|from)\s*"
           rf"(?P<open>[\[(])?\s*{_RANGE}(?(open)\s*[\])])", _in_range),
     _slip(rf"(?P<no>\bnot\s+)?\bbetween\(\s*(?P<what>{_CALL})\s*,\s*{_RANGE}\s*\)", _in_range),
@@ -131,7 +239,8 @@ SLIPS = (
     _slip(r"\bout\s+of\b", "of"),
     _slip(r"(\d[\d.]*)\s*rad\b(/s)?", lambda m: f"{degrees(float(m[1])):.3g} deg{m[2] or ''}"),
     _slip(rf"\b(?:count|number|times)\(({_CALL})\)\s*[<>=]+\s*(\d+)", r"\1 in \2 of 10 samples"),
-    _slip(r"\b(?:for|in|within)\s+(\d[\d.]*\s*%)\s+(?=\d)", r"in \1 of "),
+    _slip(r"\b(?:for|in|within)\s+(\d[\d.]*\s*%)\s+(?:of\s+)?(?:the\s+)?(?:last\s+|past\s+)?(?=\d)",
+          r"in \1 of "),
     _slip(rf"\b(once|always|eventually|henceforth)\s+({_AMOUNT})\s+(?=\w)", r"\1[\2] "),
     _slip(r"(\b\w+\(\w+(?:\s*,\s*\w+)*)\s*(?=[<>=!]=?\s*[\d-])", r"\1) "),
     _slip(r"\b(?:kind|name|named|type|class|model)\((\w+)\)\s*(?:==?|\bis\b)\s*\"?([A-Za-z]\w*)\"?",

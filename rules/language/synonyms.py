@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 _MEANT = (
@@ -80,3 +80,47 @@ def synonym(name: str, known: Iterable[str]) -> str | None:
         if meant is not None:
             return meant
     return None
+
+
+OF_TASKS: Mapping[str, str] = MappingProxyType(
+    {
+        "outside": "not reaching",
+        "apart": "not touching",
+        "decoupled": "not coupled",
+        "held_by": "coupled",
+        "present": "not lost",
+        "gone": "lost",
+    }
+)
+"""Actions of tasks that rules have no word for, and what says the same."""
+
+
+_NEGATED = re.compile(r"^(?:un|in|dis|non_?|not_?)(?=[a-z])")
+
+
+def said_otherwise(name: str, objects: Sequence[str], known: Iterable[str]) -> str | None:
+    """What an unknown fact says: an action of tasks, or `is_person(a)`; None if it is neither.
+
+    >>> said_otherwise("outside", ["a", "bay"], ["reaching"])
+    'not reaching(a, bay)'
+    >>> said_otherwise("is_person", ["a"], ["named"])
+    'named(a, person)'
+    >>> said_otherwise("unhealthy", [], ["healthy"])
+    'not healthy()'
+
+    Args:
+        name: The written name.
+        objects: Its arguments.
+        known: The known words.
+    """
+    said, words = ", ".join(objects), tuple(known)
+    if name in OF_TASKS:
+        return f"{OF_TASKS[name]}({said})"
+    opposite = _NEGATED.sub("", name)
+    if opposite != name and opposite in words:
+        return f"not {opposite}({said})"
+    bare = name.removeprefix("is_")
+    if bare in (name, "", *words) or len(objects) != 1:
+        return None
+    meant = synonym(bare, words)
+    return f"named({said}, {bare})" if meant is None else f"{meant}({said})"

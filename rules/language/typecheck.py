@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from difflib import get_close_matches
-from functools import lru_cache
 from itertools import count
 
 from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
@@ -35,7 +33,7 @@ from visup.rules.formula.rebuilding import cut_off
 from visup.rules.formula.terms import Arithmetic, Measure, Variable, WindowFunction
 from visup.rules.formula.units import Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
-from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.rules.language.diagnostics import Diagnostic, Source, listed, nearest
 from visup.rules.language.dimensions import (
     check_constant,
     check_dimensions,
@@ -46,7 +44,7 @@ from visup.rules.language.dimensions import (
     example_amount,
 )
 from visup.rules.language.keywords import KEYWORDS
-from visup.rules.language.synonyms import synonym
+from visup.rules.language.synonyms import said_otherwise, synonym
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits, known_of
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
@@ -91,6 +89,9 @@ class TypeChecker:
         if not rule.variables and (missing := _objects_in(rule, self.vocabulary)):
             what = f"'{rule.name}' has no variables, but names {', '.join(missing)}"
             hint = f"write `{rule.name}({', '.join(missing)})` in place of `{rule.name}()`"
+            if any(len(name) > SHORT_NAME for name in missing):
+                certain = f"`named(a, {missing[0]})`"
+                hint = f"these stand for any objects; {certain} says that a certain one is meant; {hint}"
             yield self.fault(rule.span, what, "the names of its objects", hint)
             return
         reader = _FormulaChecker(self.vocabulary, rule.variables)
@@ -123,7 +124,7 @@ class TypeChecker:
             if word != "is" and word not in rule.variables:
                 what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
                 hint = self._mended_head(rule, word)
-                yield rule.span, what, _listed((*rule.variables, "is")), hint
+                yield rule.span, what, listed((*rule.variables, "is")), hint
 
     def _mended_head(self, rule: Rule, word: str) -> str | None:
         """The head with a name that the formulas use, too; else another name in the sentence."""
@@ -131,9 +132,9 @@ class TypeChecker:
         if word in _objects_in(rule, self.vocabulary) and len(rule.variables) < MAX_VARIABLES:
             more = f"{given}, {word}" if given else word
             return f"write `{rule.name}({more})` in place of `{rule.name}({given})`"
-        return (
-            f"write `{{{rule.variables[0]}}}` in place of `{{{word}}}`" if rule.variables else None
-        )
+        # A long word is no misspelt variable: the sentence keeps it as a word.
+        other = f"{{{rule.variables[0]}}}" if rule.variables and len(word) <= SHORT_NAME else word
+        return f"write `{other}` in place of `{{{word}}}`"
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:
         together = variables_of(rule)
@@ -179,6 +180,9 @@ class _FormulaChecker:
                 yield unit.span, what, "such as 3 px/s", "write `px/s` in place of `px / s`"
                 yield from self.node(left)
                 return
+            case Comparison() if (misread := self.misread(node)) is not None:
+                yield misread
+                return
             case Comparison():
                 yield from check_dimensions(node, self.vocabulary)
                 self.amount = example_amount(node, self.vocabulary)
@@ -196,6 +200,21 @@ class _FormulaChecker:
                 yield from check_time(duration, getattr(node, "name", "last"))
         for part in children(node):
             yield from self.node(part)
+
+    def misread(self, node: Comparison) -> Fault | None:
+        """The error of an object or a signal that is compared with a name; None of other comparisons."""
+        no = "not " if node.operator == "!=" else ""
+        match node.left, node.right:
+            case (Variable(name=one), Variable(name=name)) if one in self.scope:
+                self.used.add(one)
+                what, said = f"'{one}' is an object, and is not compared", f"named({one}, {name})"
+            case (Measure(name="signal", words=(one,)), Variable(name=name)):
+                what, said = "a signal is compared with a word", f"signal_is({one}, {name})"
+            case _:
+                return None
+        if node.operator not in ("==", "!=") or name in (*self.values, *self.scope):
+            return None
+        return node.span, what, f"`{said}`", f"write `{no}{said}`"
 
     def widened(self, short: Quantified, rest: Formula, whole: Quantified) -> Iterator[Fault]:
         """A quantifier that ends too early, and the errors within all that it is about."""
@@ -280,6 +299,8 @@ class _FormulaChecker:
             return
         what = f"'{node.name}' is a name, not a quantity"
         near = did_you_mean(node.name, (*self.values, *self.vocabulary.quantities))
+        if near is None and not self.values and len(node.name) > SHORT_NAME:
+            near = f"write `signal({node.name})` in place of `{node.name}`"
         if near is None:
             meant = self.values[-1] if self.values else self.amount
             near = f"write `{meant}` in place of `{node.name}`"
@@ -294,11 +315,15 @@ class _FormulaChecker:
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
             hint = did_you_mean(synonym(call.name, table) or call.name, table)
-            if call.name in (quantities if fact else words):
+            if fact and (other := said_otherwise(call.name, call.words, words)) is not None:
+                hint = f"write `{other}`"
+            elif call.name in (quantities if fact else words):
                 hint = self._compared(call) if fact else "it is true or false"
+            elif not fact and hint is not None and "'objects'" in hint and len(call.words) == 1:
+                hint = f"write `objects_named({call.words[0]})`"
             elif call.name in self.scope and not call.words:
                 hint = f"write `seen({call.name})` in place of `{call.name}`"
-            yield call.span, f"there is no {kind} '{call.name}'", _nearest(call.name, table), hint
+            yield call.span, f"there is no {kind} '{call.name}'", nearest(call.name, table), hint
             return
         takes = table[call.name].takes
         hint = f"write `{arranged(call.name, call.words, takes, self.scope)}`"
@@ -319,6 +344,8 @@ class _FormulaChecker:
     def _compared(self, call: Predicate | Measure) -> str:
         """A suggestion for a quantity used as a condition."""
         said = f"{call.name}({', '.join(call.words)})"
+        if call.name == "signal":
+            return f"write `signal_on({', '.join(call.words)})` in place of `{said}`"
         measured = Measure(call.name, call.words, call.span)
         amount = example_amount(Comparison(measured, "<", measured), self.vocabulary)
         return f"compare it with a number; write `{said} < {amount}` in place of `{said}`"
@@ -329,7 +356,7 @@ class _FormulaChecker:
             what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
             near = closest(word, known) or next((k for k in known if k not in call.words), None)
             hint = None if near is None else f"write `{near}` in place of `{word}`"
-            yield call.span, what, _listed(known), hint
+            yield call.span, what, listed(known), hint
         elif wanted != "object" and word in self.scope:
             what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
             other = EXAMPLES.get(wanted)
@@ -360,23 +387,5 @@ def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:
     return [w for w in dict.fromkeys(found) if w not in bound]
 
 
-def _nearest(word: str, known: Iterable[str]) -> str:
-    """All known words if few, else those spelt most similarly."""
-    return _nearest_of(word, tuple(known))
-
-
-@lru_cache(maxsize=4096)  # each tried edit repeats all errors of its file
-def _nearest_of(word: str, names: tuple[str, ...]) -> str:
-    if len(names) <= MOST_LISTED:
-        return _listed(names)
-    near = get_close_matches(word, names, n=MOST_LISTED, cutoff=0.0)
-    return f"{_listed(near)}, or one of {len(names) - len(near)} more (docs/rules.md)"
-
-
-MOST_LISTED = 8
-"""Most words in a list."""
-
-
-def _listed(words: Iterable[str]) -> str:
-    names = list(words)
-    return "one of " + ", ".join(names) if len(names) > 1 else "".join(names) or "nothing"
+SHORT_NAME = 2
+"""Most characters of what is taken for a misspelt variable of a rule."""

@@ -387,5 +387,5 @@ RULES = Vocabulary(PREDICATES, QUANTITIES)
 def signals(*names: str) -> Vocabulary:
     """A vocabulary of plain numbers without objects, each written `name()`."""
     nothing: Mapping[str, Any] = MappingProxyType({})
-    table = {n: QuantityDefinition((), SHARE, lambda facts: np.zeros(2), "a signal") for n in names}
-    return Vocabulary(nothing, MappingProxyType(table))
+    one = QuantityDefinition((), SHARE, lambda facts: np.zeros(2), "a signal", plain=True)
+    return Vocabulary(nothing, MappingProxyType(dict.fromkeys(names, one)))

@@ -155,6 +155,11 @@ class NameCheck:
         """Faults of one amount that is not a parameter."""
         if wanted == ANY and amount.unit == Unit.NONE:
             return
+        if wanted == ANY and amount.unit == Unit.PERCENT:
+            what = f"the numbers of signals have no unit, and `{amount}` is {value(amount):g}"
+            change = f"write `{amount.value:g}`"
+            yield self.source.fault("E226", what, amount.span, "a plain number", change)
+            return
         if amount.unit not in UNITS:
             meant = UNITS_MEANT.get(amount.unit.casefold())
             hint = f"did you mean `{meant}`?" if meant else None

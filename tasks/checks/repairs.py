@@ -11,13 +11,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import islice
+from math import inf
 
 from visup.rules.correction.edits import ALIKE, Repair, edits, hint_of
+from visup.rules.correction.loss import LITTLE, loss
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.checks.additions import added
-from visup.tasks.checks.corrections import corrected, said
+from visup.tasks.checks.additions import added, by_names
+from visup.tasks.checks.foreign_forms import FOREIGN_FORMS
+from visup.tasks.checks.spelling import corrected, said
 from visup.tasks.checks.usual_meanings import USUAL, recoveries
 from visup.tasks.diagnostics.recovery import KEYWORDS
 from visup.tasks.grammar.statement import NAME, RESERVED_WORDS
@@ -26,6 +29,8 @@ from visup.tasks.grammar.units import UNITS
 CHARACTERS_TRIED = 60_000
 """Budget for the changes of one file: in a long file with many mistakes only the first have tested hints."""
 MOST_HINTS = 12
+MOST_COMPARED = 4
+"""Changes that help completely and are compared by what they lose."""
 MOST_CORRECTIONS, MOST_READINGS = 12, 3000
 """Per statement: corrections of several words that are tested, and parser states explored to find them."""
 READING_COST = 1
@@ -101,10 +106,15 @@ class _HintTrial:
             hint, helps = self.best(
                 fault, (h for h in hints if not (keep and h.startswith("leave")))
             )
-            if helps == WHOLLY:
+            if helps == WHOLLY and self.lost(fault, hint) <= LITTLE:
                 return hint
             found.append((hint, helps))
+        whole = [hint for hint, helps in found if helps == WHOLLY]
         usual, _, edit = found
+        if whole:
+            # What only leaves a definition unused may lose less than what removes the fault wholly.
+            apart = [usual[0]] if fault.code >= "E2" and usual[1] == IN_PART else []
+            return min((*whole, *apart), key=lambda hint: self.lost(fault, hint))
         return edit[0] if usual[1] <= ONE_STEP < edit[1] else usual[0]
 
     def edited(self, fault: Diagnostic) -> Iterator[str]:
@@ -126,9 +136,10 @@ class _HintTrial:
             yield from islice(corrected(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
 
     def best(self, fault: Diagnostic, hints: Iterable[str]) -> tuple[str | None, int]:
-        """The first hint that helps completely, else the first that helps most; and how much."""
+        """The hint that helps most, and how much; of those that help wholly the first to lose little."""
         partly: str | None = None
         most = NOTHING
+        whole: list[tuple[float, str]] = []
         for hint in hints:
             if len(hint) > LONGEST_HINT or "..." in hint:
                 continue
@@ -137,10 +148,19 @@ class _HintTrial:
                 break
             helps = self.helps(replace(fault, hint=hint))
             if helps == WHOLLY:
-                return hint, WHOLLY
-            if helps > most:
+                whole.append((self.lost(fault, hint), hint))
+                if whole[-1][0] <= LITTLE or len(whole) == MOST_COMPARED:
+                    break
+            elif helps > most:
                 partly, most = hint, helps
+        if whole:
+            return min(whole, key=lambda found: found[0])[1], WHOLLY
         return partly, most
+
+    def lost(self, fault: Diagnostic, hint: str | None) -> float:
+        """What the change of a hint loses of the file."""
+        fix = fix_of(self.text, fault.place, hint)
+        return inf if fix is None else loss(self.text, fix.applied(self.text))
 
     def helps(self, fault: Diagnostic) -> int:
         """How much the change of a hint helps."""
@@ -192,7 +212,8 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
         for match, new in recoveries(text, line):
             yield _placed(text, fault, match, new)
         yield from _misspelt(line, fault.place.column - 1)
-    for usual in USUAL:
+    yield from by_names(text, fault)
+    for usual in (*FOREIGN_FORMS, *USUAL):
         if fault.code not in usual.codes:
             continue
         matches = list(usual.pattern.finditer(line))
@@ -252,7 +273,7 @@ def _edits(fault: Diagnostic) -> Iterator[str]:
     unread = fault.code < "E2"
     for repair in edits(place.text, place.column - 1, place.length, WORDS, unread=unread):
         hint = hint_of(place.text, repair)
-        if hint is not None:
+        if hint is not None and not hint.startswith("leave `::="):  # two stages would be made one
             yield hint
 
 

@@ -16,6 +16,7 @@ from functools import cached_property
 from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.bounds import BoundsCheck
@@ -180,7 +181,8 @@ class _Semantics:
             if name in self.actions or name in told:
                 continue
             told.add(name)
-            near = closest(name, self.actions)
+            near = closest(name, self.actions, 0.8) or synonym(name, self.actions)
+            near = near or closest(name, self.actions)
             shown = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
             width = replace(span, end_line=span.line, end_column=span.column + len(name))
             at = span if self.is_head(span) else width
@@ -252,7 +254,8 @@ class _Semantics:
         for stage in self.parsed.task.stages:
             if stage.name in first:
                 what = f"stage `<{stage.name}>` is defined twice"
-                hint = f"it is also defined in {_line(first[stage.name])}; join both with `|`"
+                where = _line(first[stage.name])
+                hint = f"it is also defined in {where}; if either will do, join both with `|`"
                 yield self.source.fault("E203", what, stage.span, "one rule for each stage", hint)
             first.setdefault(stage.name, stage.span)
         declared: dict[str, Span] = {}

@@ -141,7 +141,8 @@ def clause(text: str) -> RecognisedError | None:
 
 def commas(text: str) -> RecognisedError | None:
     """Missing or misplaced commas."""
-    m = re.search(rf"{NAME}[ ]*\([^()]*?({NAME})[ ]+({NAME})[^()]*\)", text)
+    one = rf"(?!of\b)({NAME})"
+    m = re.search(rf"{NAME}[ ]*\((?:[^()]*[(, ])?{one}[ ]+{one}[^()]*\)", text)
     if m is not None:
         what = f"actors `{m[1]}` and `{m[2]}` are not separated by a comma"
         length = m.end(2) - m.start(1)

@@ -29,6 +29,7 @@ OPENS = re.compile(  # a line that begins a statement, valid or not
 )
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
+SPACED_HEAD = re.compile(r"\s*(?:task\s+)?<\s*([\w .\-]*\w)\s*>\s*::=")
 UNFINISHED = re.compile(
     r"(?:::=|[|&(,]|\b(?:for|within|after|every|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
@@ -89,6 +90,8 @@ def _parse_in_parts(text: str, source: Source) -> ParsedFile:
             faults.append(recognise_error(_near(chunk, e), source) or _unexpected(e, chunk, source))
             first = DECLARES.match(chunk.text)
             defined |= {first[1]} if first else set()
+            spaced = SPACED_HEAD.match(chunk.text)
+            defined |= {re.sub(r"\W+", "_", spaced[1])} if spaced else set()
             used |= set(re.findall(NAME, chunk.text))
     if not faults:  # each part is valid, but not the whole
         faults = [_whole(text, source)]
@@ -223,6 +226,9 @@ KEYWORDS = (
     "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
     "already", "each", "new", "on", "failure", "first", "rests", "from", "part", "of", "the", "other",
 )  # fmt: skip
+NAMES_TOO = ("part", "order", "size", "ground")
+"""Words of the language that are as often the names of things."""
+NEVER_NAMES = tuple(word for word in KEYWORDS if word not in NAMES_TOO)
 
 
 def _unexpected(error: UnexpectedInput, chunk: StatementText, source: Source) -> Diagnostic:

@@ -30,7 +30,7 @@ from visup.rules.formula.nodes import (
     Until,
 )
 from visup.rules.formula.terms import Arithmetic, Measure, PointwiseFunction, Term, WindowFunction
-from visup.rules.formula.units import UNITS, Number, Unit
+from visup.rules.formula.units import SHARE, UNITS, Number, Unit
 from visup.rules.language import rule_builder as build
 from visup.rules.language.cost import cost_of
 from visup.rules.language.parser import load_rules, parse_formula, parse_rules, shipped_rules
@@ -77,7 +77,10 @@ predicates = st.sampled_from(of_two).map(
 def comparisons(draw: st.DrawFn) -> Comparison:
     name = draw(st.sampled_from(sorted(QUANTITIES)))
     dimension = QUANTITIES[name].dimension
-    unit = draw(st.sampled_from([u for u, (d, _) in UNITS.items() if d == dimension]))
+    units = [u for u, (d, _) in UNITS.items() if d == dimension]
+    if dimension == SHARE:  # a plain number is never compared in per cent, a share always is here
+        units = [Unit.NONE if QUANTITIES[name].plain else Unit.PERCENT]
+    unit = draw(st.sampled_from(units))
     bound = Number(draw(st.integers(-300, 300)) / 4, unit)
     operator = draw(st.sampled_from(["<", "<=", ">", ">=", "==", "!="]))
     slack = draw(st.integers(0, 20)) / 2 * (-1 if ">" in operator else 1)

@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 
 from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
-from visup.rules.language import reading, typecheck
+from visup.rules.language import diagnostics, reading
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.vocabulary import RULES as VOCABULARY
@@ -167,6 +167,19 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
         ),
         ("3 px < gap(a, b) < 5 px for 2 s", "(3 px < gap(a, b) and gap(a, b) < 5 px) for 2 s"),
         ("clearly_moving(a) and seen(b)", "moving_clearly(a) and seen(b)"),
+        ("depth_difference(a, b) < 15", "depth_difference(a, b) < 15 %"),
+        ("overlap(a, b) > 50 and seen(a)", "overlap(a, b) > 50 % and seen(a)"),
+        ("objects() > 3 % and seen(a)", "objects() > 3 and seen(a)"),
+        ("signal(battery) > 90 %", "signal(battery) > 90"),
+        ("signal(mode) == auto and seen(a)", "signal_is(mode, auto) and seen(a)"),
+        ("a == arm and seen(b)", "named(a, arm) and seen(b)"),
+        ("is_person(a) and seen(b)", "named(a, person) and seen(b)"),
+        ("outside(a, bay) and seen(b)", "not reaching(a, bay) and seen(b)"),
+        ("expected(touching(a, b))", "expected(touching, a, b)"),
+        ("nobody touches a and seen(b)", "not (exists other: touching(other, a)) and seen(b)"),
+        ("temperature > 60 and seen(a)", "signal(temperature) > 60 and seen(a)"),
+        ("touching(a, b) in 3 of the last 5 frames", "touching(a, b) in 3 of 5 samples"),
+        ("touching(a, b) for half a second", "touching(a, b) for 0.5 s"),
     ],
 )
 def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
@@ -176,6 +189,13 @@ def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
     fix = fix_of(text, error.where, error.hint)
     assert fix is not None
     assert fix.applied(text) == rule(meant)
+
+
+@pytest.mark.parametrize(
+    "share", ["depth_difference(a, b) < 0.15", "overlap(a, b) > 1", "signal(battery) > 90"]
+)
+def test_a_share_of_at_most_one_and_a_plain_number_need_no_unit(share: str) -> None:
+    assert errors_of(rule(f"{share} and touching(a, b)")) == []
 
 
 def test_a_slip_hides_nothing_of_what_else_is_wrong_with_the_rule() -> None:
@@ -240,11 +260,11 @@ def test_names_that_are_unknown_are_compared_once_however_often_they_are_tried(
         compared.append(word)
         return []
 
-    monkeypatch.setattr(typecheck, "get_close_matches", counted)
-    typecheck._nearest_of.cache_clear()
+    monkeypatch.setattr(diagnostics, "get_close_matches", counted)
+    diagnostics._nearest_of.cache_clear()
     rule = 'rule r{0}(a, b): warning\n  when gop(a, b) < 1 px and qqqq{0}(a) > 2 px/s\n  say "x"\n'
     with pytest.raises(VisupError):
         parse_rules("".join(rule.format(n) for n in range(8)))
-    typecheck._nearest_of.cache_clear()
+    diagnostics._nearest_of.cache_clear()
     assert compared
     assert len(compared) == len(set(compared))

@@ -18,7 +18,7 @@ from typing import Any
 from tests.rules.language.test_mistakes import rule
 from tests.tasks.checks.mistakes import good_texts
 from tests.tasks.checks.mistakes.mutations import Slip, slips
-from tests.tasks.checks.test_mistakes_counted import Told, fixes, of_rules, of_tasks
+from tests.tasks.checks.test_mistakes_counted import fixes, of_rules, of_tasks
 from visup.rules.language.parser import parse_rules
 from visup.tasks.checks.diagnose import diagnose
 
@@ -144,12 +144,14 @@ def main() -> None:
     for of_task, one in found:
         missed = options.missed and not (one.told and one.legal)
         if missed or (options.other and one.legal and not one.restored):
-            print("=====", "task" if of_task else "rule", one.slip.kind)
-            _show(one, of_tasks(one.slip.text) if of_task else of_rules(one.slip.text))
+            show(of_task, one)
     print(table(found))
 
 
-def _show(one: Account, told: Sequence[Told]) -> None:
+def show(of_task: bool, one: Account) -> None:
+    """Print the lines that a mistake and its hints have changed, and what was said of it."""
+    told = of_tasks(one.slip.text) if of_task else of_rules(one.slip.text)
+    print("=====", "task" if of_task else "rule", one.slip.kind)
     before, after = one.slip.good.split("\n"), one.mended.split("\n")
     slipped = one.slip.text.split("\n")
     for sign, rows, others in (("good ", before, slipped), ("wrong", slipped, before)):

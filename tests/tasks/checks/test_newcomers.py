@@ -1,0 +1,60 @@
+"""Whole files of newcomers, each with one mistake: hints mend them, mostly to what was meant.
+
+`python -m tests.tasks.checks.mistakes.pairs` tells of all; here are some of each set.
+"""
+
+import pytest
+
+from tests.tasks.checks.mistakes.counted import account_of
+from tests.tasks.checks.mistakes.pairs import SETS, pairs
+from tests.tasks.checks.test_mistakes_counted import fixes, of_tasks
+
+ONE_IN = 4
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_nearly_all_mistakes_of_newcomers_are_mended_mostly_to_what_was_meant(name: str) -> None:
+    some = [(t, slip) for t in (False, True) for slip in [*pairs(name, t)][::ONE_IN]]
+    found = [a for t, slip in some if (a := account_of(slip, t)) is not None]
+    assert all(one.told for one in found)
+    assert sum(one.legal for one in found) >= 0.9 * len(found)
+    assert sum(one.restored for one in found) >= 0.6 * len(found)
+
+
+HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        (f"{HEAD}never touching(x, z) during <a>, <b>\n",
+         f"{HEAD}never touching(x, z) during <a> or <b>\n"),
+        ("<t> ::= touching(gripper of arm of robot, y)\n",
+         "<t> ::= touching(gripper of arm, y) actor arm is part of robot\n"),
+        ("<t> ::= Sequence(<a>, <b>)\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n", HEAD),
+        (f"{HEAD}on_failure(<b>): <a> <b>\n", f"{HEAD}on failure of <b>: <a> <b>\n"),
+        (f"{HEAD}during <a>: never touching(x, z)\n", f"{HEAD}never touching(x, z) during <a>\n"),
+        ("<t> ::= coupled(x, y) for 1 minute and 30 seconds\n", "<t> ::= coupled(x, y) for 90 s\n"),
+        ("<t> ::= gap(x, y) in [20, 100] px\n", "<t> ::= gap(x, y) between 20 px and 100 px\n"),
+        ("<t> ::= spin(x) < 1 rad/s\n", "<t> ::= spin(x) < 57.3 deg/s\n"),
+        ("<t> ::= openness(x) > 0.3\n", "<t> ::= openness(x) > 30 %\n"),
+        ("<t> ::= signal(battery) > 90 %\n", "<t> ::= signal(battery) > 90\n"),
+        ("<t> ::= the hand touches the part for 1 s\n", "<t> ::= touching(hand, part) for 1 s\n"),
+    ],
+)  # fmt: skip
+def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
+    told = of_tasks(written)
+    assert told
+    assert next(fixes(written, told)).applied(written).split() == meant.split()
+
+
+def test_a_stage_that_is_defined_twice_for_two_things_becomes_two_stages() -> None:
+    written = (
+        "<t> ::= <move> <grasp> <move> <drop>\n<move> ::= converging(x, y)\n"
+        "<grasp> ::= coupled(x, y)\n<move> ::= diverging(x, z)\n<drop> ::= decoupled(x, y)\n"
+    )
+    text = written
+    while told := of_tasks(text):
+        text = next(fixes(text, told)).applied(text)
+    assert text.replace("_2", "") == written
+    assert text.count("<move_2>") == 2
