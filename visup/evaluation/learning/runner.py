@@ -16,6 +16,7 @@ from visup.agent.model.errors import TaskError
 from visup.evaluation.figures import Progress, each_in_processes, silent, sums_of
 from visup.evaluation.learning.worlds import world_minds
 from visup.render.worlds.kinds.catalogue import KINDS, known_kinds, random_world
+from visup.rules.predicates.vocabulary import IMPLIED
 from visup.tasks import parse_task
 from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Action, Actors, Comparison, Conditioned, Task, walk
@@ -35,6 +36,8 @@ SEEDS_APART = 10_000
 MOST_DRAWN = 40
 """Most draws for each world wanted, until enough have the same actors."""
 NOT_OVER = "in_progress"
+ActorsAction = tuple[str, frozenset[str]]
+"""An action and its actors, in any order."""
 KEYS = ("accepted", "good", "refused", "bad")
 
 
@@ -76,7 +79,8 @@ def evaluate_learning(
 
     Returns:
         `items` by kind with `accepted` of `good`, `refused` of `bad`, `unlike`: number of actions in which
-        the learned and the written task differ, `task`, and `wrong`: runs that are misjudged; `total`, with
+        the learned and the written task differ, `unlike_in_meaning`: of these, those that no action of the
+        other task implies, `task`, and `wrong`: runs that are misjudged; `total`, with
         `held` of `missions`: kinds in which all good and at least nine of ten bad runs are judged right.
 
     Raises:
@@ -113,8 +117,12 @@ def evaluate_kind(trial: LearningTrial) -> dict[str, Any]:
         meant = world.course.outcome == "ok"
         figures["accepted" if meant else "refused"] += success == meant
         wrong += [] if success == meant else [world.name]
-    unlike = len(actions_of(task) ^ actions_of(parse_task(taught[0].task_text)))
-    return {**figures, "unlike": unlike, "task": learned.text, "wrong": wrong}
+    actions, written = actions_of(task), actions_of(parse_task(taught[0].task_text))
+    unlike = {
+        "unlike": len(actions ^ written),
+        "unlike_in_meaning": len(beyond(actions, written) | beyond(written, actions)),
+    }
+    return {**figures, **unlike, "task": learned.text, "wrong": wrong}
 
 
 def bad_outcomes(kind: str) -> tuple[str, ...]:
@@ -154,7 +162,21 @@ def worlds_of(
     return found
 
 
-def actions_of(task: Task) -> set[tuple[str, frozenset[str]]]:
+def beyond(some: set[ActorsAction], others: set[ActorsAction]) -> set[ActorsAction]:
+    """The actions that none of the others is or implies: who is coupled touches and moves together.
+
+    >>> pair = frozenset({"gripper", "part"})
+    >>> beyond({("touching", pair), ("diverging", pair)}, {("coupled", pair)}) == {("diverging", pair)}
+    True
+    """
+    return {
+        (name, actors)
+        for name, actors in some
+        if not any((n, actors) in others for n in IMPLIED.get(name, frozenset({name})))
+    }
+
+
+def actions_of(task: Task) -> set[ActorsAction]:
     """The actions of a task, with their actors."""
     return {(a.name, frozenset(map(str, a.words))) for a in map(action_of, _facts(task))}
 
