@@ -152,7 +152,7 @@ TASK = """
 <charge> ::= <dock> <full>
 <dock>   ::= converging(vehicle, charger) ends when signal_on(docked)
 <full>   ::= signal(battery) > 90 fails when signal_is(mode, fault)
-never signal(temperature) > 60 % for 2 s
+never signal(temperature) > 60 for 2 s
 """
 
 

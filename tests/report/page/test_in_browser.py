@@ -46,7 +46,7 @@ def test_the_slider_moves_video_figures_and_text(page: Browser) -> None:
     video = "document.querySelector('#cursor video')"
     page.until(f"{video}.readyState >= 1")  # else it cannot be moved yet
     moved_to(page, 4.0)
-    page.until(f"!{video}.seeking")
+    page.until(f"!{video}.seeking && {video}.currentTime > 0")
     share = page.value(f"{video}.currentTime / {video}.duration")
     assert share == pytest.approx(4.0 / data().duration, abs=0.02)
     told = page.value("Number(document.querySelector('.told[aria-current]').dataset.time)")
