@@ -5,7 +5,9 @@ Kim and Demiris, "Learning action symbols for hierarchical grammar induction", 2
 all runs is preserved and any other order left free, as in a task graph.
 
 Read in this order: `traces.py` (a run as intervals), `meetings.py` (contacts, without those of carried
-objects), `relevance.py` (the event sequence of each run), `alignment.py` (removal of repeated events),
-`order.py` (loops and partial order), `periods.py` (periodic loops), `rests.py` (actors that stay at rest),
-`induction.py` (the task file), `judging.py` (a task on a run), `fitting.py`, `coverage.py`, `languages.py`.
+objects), `relevance.py` (the event sequence of each run), `carrying.py` (who is carried, and where to),
+`alignment.py` (removal of repeated events), `order.py` (loops and partial order), `periods.py` (periodic
+loops), `places.py` and `rests.py` (where things end up, who stays or comes to rest), `drafts.py` (a task and
+its text), `induction.py` (the task file), `judging.py` (a task on a run), `fitting.py`, `coverage.py`,
+`languages.py`.
 """

@@ -18,7 +18,7 @@ from visup.tasks.grammar.nodes import (
     walk,
 )
 from visup.tasks.grammar.units import value
-from visup.tasks.learning.induction import deadline
+from visup.tasks.learning.drafts import deadline
 from visup.tasks.learning.judging import JudgedRun
 
 SHORTEST_SHARE = 0.8

@@ -12,7 +12,20 @@ from typing import NamedTuple, TypeVar
 
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.states import TaskStep
-from visup.tasks.grammar.nodes import Actors, Already, Conditioned, Task, Timed, walk
+from visup.tasks.grammar.conditions import action_of, facts_of
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    Already,
+    Comparison,
+    Conditioned,
+    Task,
+    Timed,
+    walk,
+)
+from visup.tasks.grammar.nodes import (
+    Course as Asked,
+)
 from visup.tasks.grammar.structure import key_text
 
 C = TypeVar("C")
@@ -33,13 +46,13 @@ class TaskDifference:
     Attributes:
         only_first: The shortest course that only the first accepts, or None.
         only_second: The shortest that only the second accepts, or None.
-        other: Other differences, a clause each.
+        other: Other differences: whether only the first task has it, what, and the aspect.
         whole: Whether all courses were compared, not only those up to some length.
     """
 
     only_first: Course | None
     only_second: Course | None
-    other: tuple[str, ...]
+    other: tuple[tuple[bool, str, str], ...]
     whole: bool
 
     def __bool__(self) -> bool:
@@ -62,7 +75,8 @@ class TaskDifference:
             yield "both allow the same courses" + (
                 "" if self.whole else ", as far as they were compared"
             )
-        yield from self.other
+        for of_first, what, aspect in self.other:
+            yield f"only {first if of_first else second} has {what} ({aspect})"
 
 
 class _Pair(NamedTuple):
@@ -160,13 +174,32 @@ def label_text(label: Label) -> str:
     return " & ".join(sorted(key_text(action, sorted(who)) for action, who in label))
 
 
-def _other(first: Task, second: Task) -> Iterator[str]:
+def _other(first: Task, second: Task) -> Iterator[tuple[bool, str, str]]:
     for what, of in OTHER:
         one, two = of(first), of(second)
-        for missing in sorted(one - two):
-            yield f"only the first has {missing} ({what})"
-        for missing in sorted(two - one):
-            yield f"only the second has {missing} ({what})"
+        yield from ((True, missing, what) for missing in sorted(one - two))
+        yield from ((False, missing, what) for missing in sorted(two - one))
+
+
+ActorsAction = tuple[str, frozenset[str]]
+"""An action and its actors, in any order."""
+
+
+def actions_of(task: Task) -> set[ActorsAction]:
+    """The actions and comparisons that a task asks for, in whatever order, with their actors."""
+    facts = (f for course in _courses_of(task) for f in _facts(course))
+    return {(a.name, frozenset(map(str, a.words))) for a in map(action_of, facts)}
+
+
+def _facts(course: Asked) -> Iterator[Action | Comparison]:
+    if isinstance(course, Action | Comparison):
+        yield course
+    elif isinstance(course, Conditioned):
+        yield from (f for s in course.conditions for f in facts_of(s.condition))
+
+
+def _asked(task: Task) -> set[str]:
+    return {f"`{key_text(name, sorted(actors))}`" for name, actors in actions_of(task)}
 
 
 def _invariants(task: Task) -> set[str]:
@@ -195,11 +228,16 @@ def _places(task: Task) -> set[str]:
 
 def _all(task: Task, kind: type[C]) -> Iterator[C]:
     """Every course of a kind."""
-    bodies = [s.body for s in task.stages if not isinstance(s.body, Actors)]
-    return (c for b in bodies for c in walk(b) if isinstance(c, kind))
+    return (c for c in _courses_of(task) if isinstance(c, kind))
+
+
+def _courses_of(task: Task) -> Iterator[Asked]:
+    """Every course of a task, and those within it."""
+    return (c for s in task.stages if not isinstance(s.body, Actors) for c in walk(s.body))
 
 
 OTHER: tuple[tuple[str, Callable[[Task], set[str]]], ...] = (
+    ("actions", _asked),
     ("invariants", _invariants),
     ("times", _times),
     ("conditions", _conditions),

@@ -32,6 +32,11 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class Carry(Joint):
+    """One of two carries the other: they move together, and what the carried one does meanwhile."""
+
+
+@dataclass(frozen=True, slots=True)
 class Either:
     """Symbols of which any is evidence of one event."""
 
@@ -195,6 +200,13 @@ def leaves_of(plan: Plan) -> list[Occurrence]:
     if isinstance(plan, Series | Free):
         return [o for p in plan.parts for o in leaves_of(p)]
     return [plan]
+
+
+def final_of(plan: Plan) -> Occurrence | None:
+    """The occurrence with which a plan ends, or None where any of several may be the last."""
+    while isinstance(plan, Series):
+        plan = plan.parts[-1]
+    return None if isinstance(plan, Free) else plan
 
 
 def without(plan: Plan, dropped: Occurrence) -> Plan | None:

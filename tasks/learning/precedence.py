@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from visup.tasks.learning.bodies import moved_s
-from visup.tasks.learning.order import Item, Occurrence, Plan, Series
+from visup.tasks.learning.order import Item, Occurrence, Plan, Series, action_text
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import RunTrace, Symbol
 
@@ -27,10 +27,12 @@ class Precedence:
 
     Attributes:
         contacts: The later contacts, each of a pair.
+        first: The earlier contact, which must come first.
         during: The stages before them.
     """
 
     contacts: tuple[Symbol, ...]
+    first: Symbol
     during: tuple[Occurrence, ...]
 
 
@@ -56,7 +58,8 @@ def precedences(
             for contact in contacts
         )
         if contacts and apart and not early:
-            yield Precedence(contacts, tuple(stages[: stages.index(earlier) + 1]))
+            first = _contacts(earlier[0])[0]
+            yield Precedence(contacts, first, tuple(stages[: stages.index(earlier) + 1]))
 
 
 def invariants(found: Sequence[Precedence], names: Mapping[Occurrence, str]) -> Iterator[str]:
@@ -69,7 +72,10 @@ def invariants(found: Sequence[Precedence], names: Mapping[Occurrence, str]) -> 
     for one in found:
         during = " or ".join(f"<{names[o]}>" for o in one.during)
         for action, actors in one.contacts:
-            yield f"never {action}({', '.join(actors)}) for {TOO_EARLY_S:g} s during {during}"
+            early = f"{action}({', '.join(actors)})"
+            # A stage may be told late, when its contact has long been seen.
+            said = f"({early} and not {action_text(one.first)})"
+            yield f"never {said} for {TOO_EARLY_S:g} s during {during}"
 
 
 def _in_sequence(plan: Plan) -> list[Occurrence]:

@@ -10,8 +10,15 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from visup.tasks.learning.meetings import CLOSE_S, Meeting, Pair, meetings_of, pairs_by_weight
-from visup.tasks.learning.order import Either, Item, Joint
+from visup.tasks.learning.meetings import (
+    CLOSE_S,
+    MEETINGS,
+    Meeting,
+    Pair,
+    meetings_of,
+    pairs_by_weight,
+)
+from visup.tasks.learning.order import Carry, Either, Item, Joint
 from visup.tasks.learning.traces import Happening, RunTrace, Symbol
 
 ENDED_S = 0.3
@@ -28,6 +35,7 @@ class CourseEvent:
         lasts: Whether it lasts to the end of the run.
         beside: Symbols of simultaneous events joined with it.
         instead: Symbols that are evidence of the same event.
+        carries: What the carried one does, of an event in which one carries the other.
     """
 
     happening: Happening
@@ -35,6 +43,7 @@ class CourseEvent:
     lasts: bool = False
     beside: tuple[Symbol, ...] = ()
     instead: tuple[Symbol, ...] = ()
+    carries: Symbol | None = None
 
     @property
     def symbol(self) -> Symbol:
@@ -46,6 +55,8 @@ class CourseEvent:
         """The symbol, or several: all of them, or any."""
         if self.instead:
             return Either((self.symbol, *self.instead))
+        if self.carries is not None:
+            return Carry((self.symbol, self.carries))
         return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
 
 
@@ -106,8 +117,11 @@ def _late(
 def _towards(
     run: RunTrace, rows: Sequence[Meeting], pairs: Collection[Pair]
 ) -> Iterator[CourseEvent]:
-    """Approaches whose meeting is not observed in this run, as when one enters the other and is hidden."""
-    met = {m.pair for m in rows}
+    """Approaches whose meeting is not observed in this run, as when one enters the other and is hidden.
+
+    A meeting that is observed, but not counted since one of the two was carried along, is none of these.
+    """
+    met = {m.pair for m in rows} | {h.symbol[1] for h in run.happenings if h.symbol[0] in MEETINGS}
     for pair in pairs:
         found = [h for h in run.happenings if h.symbol == ("converging", pair)]
         if pair not in met and found:
@@ -150,6 +164,8 @@ def _events(
             if approach is not None and not _held_elsewhere(meeting, begin, meetings):
                 yield CourseEvent(approach, begin)
             yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
+        elif action == "coupled":  # held from the start on
+            yield CourseEvent(Happening((action, pair), begin, end, begun=False), begin, lasts)
         if not lasts and (action == "coupled" or _parts(run, pair, end)):
             parting = "decoupled" if action == "coupled" else "apart"
             yield CourseEvent(Happening((parting, pair), end, run.end), end)
@@ -162,8 +178,9 @@ def _parts(run: RunTrace, pair: Pair, end: float) -> bool:
 
 
 def _held_elsewhere(meeting: Meeting, at: float, meetings: Sequence[Meeting]) -> bool:
-    """Whether a third actor holds one of two when they meet: carrying it there is no stage."""
-    others = (m.coupled for m in meetings if set(m.pair) & set(meeting.pair) and m is not meeting)
+    """Whether a third actor carries one of two when they meet: carrying it there is told as such."""
+    third = (m for m in meetings if set(m.pair) & set(meeting.pair) and m is not meeting)
+    others = (m.coupled for m in third if m.carries)
     return any(spell is not None and spell[0] < at <= spell[1] + CLOSE_S for spell in others)
 
 
@@ -172,7 +189,9 @@ def _approach(run: RunTrace, pair: Pair, touch: float, begin: float) -> Happenin
     found = [
         h
         for h in run.happenings
-        if h.symbol == ("converging", pair) and h.begin <= begin and h.end >= touch - CLOSE_S
+        if h.symbol == ("converging", pair)
+        and h.begin <= begin + AT_ONCE_S
+        and h.end >= touch - CLOSE_S
     ]
     return found[-1] if found else None
 

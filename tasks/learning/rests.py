@@ -1,4 +1,4 @@
-"""Actors that stay at rest in all good runs, and the invariant that they must not be pushed.
+"""Actors that stay at rest in all good runs and must not be pushed, and those that come to rest at the end.
 
 A resting body appears to move when another passes in front of it or is placed on it, so *moving* holds at
 times; but its velocity is then uncertain, whereas that of a pushed body is well known.
@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf, isfinite
 
-from visup.tasks.learning.traces import SUSTAINED_S, RunTrace
+from visup.agent import Mind
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.predicates.vocabulary import QUANTITIES
+from visup.tasks.learning.order import Occurrence
+from visup.tasks.learning.traces import SUSTAINED_S, RunTrace, names_of
 
 REST = 0.02
 """Greatest speed of an actor at rest, image diagonals per second."""
@@ -59,3 +63,72 @@ def rests_of(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[Rest
         if len(speeds) == len(runs) and max(speeds) <= REST * diagonal:
             allowed = max(LEAST_ALLOWED * diagonal, TIMES_SEEN * max(speeds))
             yield Rest(actor, max(speeds), 5 * ceil(allowed / 5))
+
+
+HALT = 0.01
+"""Lowest limit of the speed of who has come to rest, image diagonals per second: what floats bobs."""
+HALT_MARGIN = 1.5
+"""The limit is also at least this many times the greatest speed at the end of a good run."""
+SETTLED_S = 2.0
+"""Who comes to rest at the end of a good run is at rest this long before it ends, seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """An actor that comes to rest in the last stage of all good runs.
+
+    Attributes:
+        actor: Its name.
+        allowed: Speed limit, px/s.
+        rested_s: Shortest time below it at the end of a run, seconds.
+    """
+
+    actor: str
+    allowed: int
+    rested_s: float
+
+    @property
+    def fact(self) -> str:
+        """The comparison, as in a task file."""
+        return f"speed({self.actor}) < {self.allowed} px/s"
+
+
+def halt_of(runs: Sequence[RunTrace], stage: Occurrence) -> Halt | None:
+    """The coming to rest of who moved more of a pair that meets in the last stage, or None.
+
+    Args:
+        runs: Good runs.
+        stage: The last stage.
+    """
+    item = stage[0]
+    if not isinstance(item, tuple) or item[0] != "touching":
+        return None
+    actor = max(item[1], key=lambda a: sum(run.moved_s.get(a, 0.0) for run in runs))
+    rows = [_speeds(run.minds, actor) for run in runs]
+    ends = [
+        v for run, row in zip(runs, rows, strict=True) for t, v in row if t > run.end - SETTLED_S
+    ]
+    diagonal = min(run.diagonal for run in runs)
+    if not ends or None in ends or (most := max(v or 0.0 for v in ends)) > REST * diagonal:
+        return None
+    allowed = ceil(max(HALT * diagonal, HALT_MARGIN * most))
+    return Halt(actor, allowed, min(_rested_s(row, allowed) for row in rows))
+
+
+def _speeds(minds: Sequence[Mind], actor: str) -> list[tuple[float, float | None]]:
+    """Time and greatest likely speed of an actor at each step, px/s; None while it is out of sight."""
+    found = []
+    for mind in minds:
+        facts = Snapshot(mind)
+        numbers = {name: facts.row[n] for n, name in names_of(mind).items() if n in facts.row}
+        speed = (
+            float(QUANTITIES["speed"].look(facts)[1, numbers[actor]]) if actor in numbers else inf
+        )
+        found.append((mind.time, speed if isfinite(speed) else None))
+    return found
+
+
+def _rested_s(speeds: Sequence[tuple[float, float | None]], allowed: float) -> float:
+    """How long a speed was below a limit at the end, seconds."""
+    fast = (t for t, v in reversed(speeds) if v is None or v >= allowed)
+    return speeds[-1][0] - next(fast, speeds[0][0])

@@ -86,6 +86,8 @@ def assembled(name: str, seed: int, order: Sequence[int] = (PART, CRATE)) -> Run
 def test_the_order_of_parts_that_are_put_together_is_kept() -> None:
     learned = learn_task("assemble", [assembled(f"good{k}", k) for k in range(3)])
     task = parse_task(learned.text)
-    assert "never touching(crate, tray) for 2 s during" in learned.text
+    assert (
+        "never (touching(crate, tray) and not touching(part, tray)) for 2 s during" in learned.text
+    )
     assert judged(task, assembled("x", 10).minds).verdict is Verdict.SUCCEEDED
     assert judged(task, assembled("x", 11, (CRATE, PART)).minds).verdict is not Verdict.SUCCEEDED

@@ -254,7 +254,7 @@ def test_times_and_invariants_that_differ_are_told() -> None:
     two = parse_task("<t> ::= touching(a, b) within 9 s")
     said = "\n".join(difference(one, two).lines("A", "B"))
     assert "both allow the same courses" in said
-    assert "only the first has never touching(a, c) (invariants)" in said
+    assert "only A has never touching(a, c) (invariants)" in said
     assert "within 9 s" in said
 
 
@@ -274,6 +274,17 @@ def test_conditions_and_places_that_differ_are_told(more: str, what: str) -> Non
     found = difference(one, two)
     assert found
     assert any(what in line for line in found.lines("A", "B"))
+
+
+def test_the_actions_that_one_alone_asks_for_are_named() -> None:
+    one = parse_task("<t> ::= (touching(a, b) & moving(b)) fails when apart(b, a)")
+    two = parse_task("<t> ::= touching(b, a) coupled(a, b)")
+    named = [line for line in difference(one, two).lines("A", "B") if line.endswith("(actions)")]
+    assert named == [
+        "only A has `apart(a, b)` (actions)",
+        "only A has `moving(b)` (actions)",
+        "only B has `coupled(a, b)` (actions)",
+    ]
 
 
 PAUSE = "pauses when touching(part, tray)"

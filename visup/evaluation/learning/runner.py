@@ -7,7 +7,7 @@ which it has seen. Interrupted runs are excluded.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +18,9 @@ from visup.evaluation.learning.worlds import world_minds
 from visup.render.worlds.kinds.catalogue import KINDS, known_kinds, random_world
 from visup.rules.predicates.vocabulary import IMPLIED
 from visup.tasks import parse_task
-from visup.tasks.grammar.conditions import action_of, facts_of
-from visup.tasks.grammar.nodes import Action, Actors, Comparison, Conditioned, Task, walk
 from visup.tasks.learning.induction import learn_task
 from visup.tasks.learning.judging import judged
+from visup.tasks.learning.languages import ActorsAction, actions_of
 from visup.tasks.learning.traces import trace_of
 
 if TYPE_CHECKING:
@@ -36,8 +35,6 @@ SEEDS_APART = 10_000
 MOST_DRAWN = 40
 """Most draws for each world wanted, until enough have the same actors."""
 NOT_OVER = "in_progress"
-ActorsAction = tuple[str, frozenset[str]]
-"""An action and its actors, in any order."""
 KEYS = ("accepted", "good", "refused", "bad")
 
 
@@ -174,17 +171,3 @@ def beyond(some: set[ActorsAction], others: set[ActorsAction]) -> set[ActorsActi
         for name, actors in some
         if not any((n, actors) in others for n in IMPLIED.get(name, frozenset({name})))
     }
-
-
-def actions_of(task: Task) -> set[ActorsAction]:
-    """The actions of a task, with their actors."""
-    return {(a.name, frozenset(map(str, a.words))) for a in map(action_of, _facts(task))}
-
-
-def _facts(task: Task) -> Iterator[Any]:
-    for stage in task.stages:
-        for course in () if isinstance(stage.body, Actors) else walk(stage.body):
-            if isinstance(course, Action | Comparison):
-                yield course
-            elif isinstance(course, Conditioned):
-                yield from (f for s in course.conditions for f in facts_of(s.condition))

@@ -1,0 +1,188 @@
+"""What follows a coupling and a release: carrying to a destination or away, and drawing back.
+
+Who is coupled and moves along is carried. The stage says so, and where to: to whom is met next, or else
+that the carried one moves. It fails when the two come apart. Nothing is carried where that is met next comes
+by itself, or that somebody else still holds. Each is added only where all runs show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from visup.tasks.learning.meetings import CARRIED_S, MEETINGS, Pair
+from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent
+from visup.tasks.learning.traces import Happening, RunTrace, Span, Symbol
+
+Row = Sequence[CourseEvent]
+NEXT_S = 1e-3
+"""What follows an event directly is this much later, seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Carriage:
+    """One coupling of a run, and what came next.
+
+    Attributes:
+        coupling: Its event.
+        until: When the next event of one of the two begins, or the coupling ends, seconds.
+        to: The pair that meets next while they are coupled: one of the two, and a third.
+    """
+
+    coupling: CourseEvent
+    until: float
+    to: Pair | None
+
+
+def with_carrying(rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
+    """The rows with a stage after each coupling in which one carries the other, and after each release.
+
+    Args:
+        rows: The relevant events of each run, in order.
+        runs: The runs, in the same order.
+    """
+    found = [list(row) for row in rows]
+    for pair in _pairs(rows, "coupled"):
+        found = _carried(found, runs, pair)
+    for pair in _pairs(rows, "decoupled"):
+        found = _drawn_back(found, runs, pair)
+    return found
+
+
+def _pairs(rows: Sequence[Row], action: str) -> list[Pair]:
+    return sorted({e.symbol[1] for row in rows for e in row if e.symbol[0] == action})
+
+
+def _carried(rows: Sequence[Row], runs: Sequence[RunTrace], pair: Pair) -> list[list[CourseEvent]]:
+    """Rows with the carrying of a pair, if each of its couplings shows it in all runs."""
+    carriages = [list(_carriages(row, pair)) for row in rows]
+    spans = [
+        [_together(run, pair, (c.coupling.at, c.until)) for c in mine]
+        for run, mine in zip(runs, carriages, strict=True)
+    ]
+    if not all(span for row in spans for span in row) or any(
+        _comes(run, c) or _held_by_other(row, c)
+        for run, row, mine in zip(runs, rows, carriages, strict=True)
+        for c in mine
+    ):
+        return [list(row) for row in rows]
+    towards = all(
+        c.to is not None and _nearing(run, c.to, (c.coupling.at, c.until))
+        for run, mine in zip(runs, carriages, strict=True)
+        for c in mine
+    )
+    cargo = _cargo(pair, runs, carriages)
+    found = []
+    for row, mine, own in zip(rows, carriages, spans, strict=True):
+        events = [
+            _carrying(c, span, ("converging", c.to) if towards and c.to else ("moving", (cargo,)))
+            for c, span in zip(mine, own, strict=True)
+            if span
+        ]
+        found.append(sorted([*row, *events], key=lambda e: e.at))
+    return found
+
+
+def _carriages(row: Row, pair: Pair) -> Iterator[_Carriage]:
+    for k, event in enumerate(row):
+        if event.symbol != ("coupled", pair):
+            continue
+        later = [e for e in row[k + 1 :] if set(e.symbol[1]) & set(pair)]
+        meets = (
+            e for e in later if e.symbol[0] in MEETINGS and len(set(e.symbol[1]) & set(pair)) == 1
+        )
+        meeting = next(meets, None)
+        if meeting is not None and meeting.at > event.happening.end:
+            meeting = None
+        until = meeting.at if meeting is not None else event.happening.end
+        yield _Carriage(event, until, meeting.symbol[1] if meeting is not None else None)
+
+
+def _comes(run: RunTrace, carriage: _Carriage) -> bool:
+    """Whether the one that is met next comes by itself, as somebody who takes over does."""
+    if carriage.to is None:
+        return False
+    span = carriage.coupling.at, carriage.until
+    (cargo,) = set(carriage.to) & set(carriage.coupling.symbol[1])
+    (other,) = set(carriage.to) - {cargo}
+    return _moved_s(run, other, span) > 0.5 * _moved_s(run, cargo, span)
+
+
+def _moved_s(run: RunTrace, name: str, within: Span) -> float:
+    """How long somebody moved within an interval, seconds."""
+    spans = run.moves.get(name, ())
+    return sum(max(0.0, min(b, within[1]) - max(a, within[0])) for a, b in spans)
+
+
+def _held_by_other(row: Row, carriage: _Carriage) -> bool:
+    """Whether one of two is coupled to a third when they are coupled."""
+    pair, at = set(carriage.coupling.symbol[1]), carriage.coupling.at
+    return any(
+        e.symbol[0] == "coupled"
+        and len(set(e.symbol[1]) & pair) == 1
+        and e.happening.begin < at < e.happening.end
+        for e in row
+    )
+
+
+def _together(run: RunTrace, pair: Pair, within: Span) -> Span | None:
+    """From when to when both of a pair move, or None if that is too short."""
+    one, other = (run.moves.get(name, ()) for name in pair)
+    both = [
+        (max(a, c, within[0]), min(b, d, within[1]))
+        for a, b in one
+        for c, d in other
+        if min(b, d, within[1]) > max(a, c, within[0])
+    ]
+    if sum(b - a for a, b in both) < CARRIED_S:
+        return None
+    return min(a for a, _ in both), max(b for _, b in both)
+
+
+def _nearing(run: RunTrace, pair: Pair, within: Span) -> bool:
+    """Whether two come closer within an interval."""
+    spells = (h for h in run.happenings if h.symbol == ("converging", pair))
+    return any(min(h.end, within[1]) - max(h.begin, within[0]) > AT_ONCE_S for h in spells)
+
+
+def _cargo(pair: Pair, runs: Sequence[RunTrace], carriages: Sequence[Sequence[_Carriage]]) -> str:
+    """Which of two is carried: the one that moves less before they are coupled."""
+
+    def before(name: str) -> float:
+        return sum(
+            max(0.0, min(b, mine[0].coupling.at) - a)
+            for run, mine in zip(runs, carriages, strict=True)
+            if mine
+            for a, b in run.moves.get(name, ())
+        )
+
+    return min(pair, key=before)
+
+
+def _carrying(carriage: _Carriage, span: Span, goal: Symbol) -> CourseEvent:
+    symbol = ("moving_together", carriage.coupling.symbol[1])
+    at = max(span[0], carriage.coupling.at + NEXT_S)
+    return CourseEvent(Happening(symbol, at, span[1]), at, carries=goal)
+
+
+def _drawn_back(
+    rows: Sequence[Row], runs: Sequence[RunTrace], pair: Pair
+) -> list[list[CourseEvent]]:
+    """Rows with the two drawing apart after each release, if all runs show it."""
+    found = []
+    for row, run in zip(rows, runs, strict=True):
+        releases = [e for e in row if e.symbol == ("decoupled", pair)]
+        events = [_drawing_back(run, e, pair) for e in releases]
+        if None in events:
+            return [list(r) for r in rows]
+        found.append(sorted([*row, *(e for e in events if e)], key=lambda e: e.at))
+    return found
+
+
+def _drawing_back(run: RunTrace, release: CourseEvent, pair: Pair) -> CourseEvent | None:
+    spells = (h for h in run.happenings if h.symbol == ("diverging", pair))
+    last = next((h for h in spells if h.end > release.at + AT_ONCE_S), None)
+    if last is None:
+        return None
+    at = max(last.begin, release.at + NEXT_S)
+    return CourseEvent(replace(last, begin=at), at)

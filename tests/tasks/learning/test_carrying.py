@@ -1,0 +1,122 @@
+"""What is learned of carrying, of where things end up, and of who comes to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tests.tasks.scripted import REGION, Script, Spell, play
+from visup.agent import Mind, Outcome, Verdict
+from visup.tasks.checks.load import parse_task
+from visup.tasks.learning.carrying import with_carrying
+from visup.tasks.learning.induction import learn_task
+from visup.tasks.learning.judging import judged
+from visup.tasks.learning.order import Carry
+from visup.tasks.learning.places import Place, places_of
+from visup.tasks.learning.relevance import CourseEvent
+from visup.tasks.learning.rests import halt_of
+from visup.tasks.learning.traces import Happening, RunTrace, Span, trace_of
+
+GRIPPER, PART, FIXTURE = 1, 2, 3
+NAMES = {GRIPPER: {"gripper": 0.9}, PART: {"part": 0.9}, FIXTURE: {"fixture": 0.9}}
+HELD, PLACED = ("gripper", "part"), ("fixture", "part")
+
+
+def event(action: str, pair: tuple[str, ...], begin: float, end: float = 20.0) -> CourseEvent:
+    return CourseEvent(Happening((action, pair), begin, end), begin, end >= 20.0)
+
+
+def course(met: float = 8.0) -> list[CourseEvent]:
+    """The gripper takes the part and puts it on the fixture."""
+    return [
+        event("converging", HELD, 1.0, 3.0),
+        event("coupled", HELD, 3.0, 10.0),
+        event("touching", PLACED, met),
+        event("decoupled", HELD, 10.0),
+    ]
+
+
+def run(moves: Mapping[str, tuple[Span, ...]], *happenings: Happening) -> RunTrace:
+    return RunTrace("run", happenings, 0.0, 20.0, moves=moves, diagonal=600.0)
+
+
+BRINGS: Mapping[str, tuple[Span, ...]] = {"gripper": ((1.0, 8.0),), "part": ((3.5, 8.0),)}
+NEARS = Happening(("converging", PLACED), 4.0, 8.0)
+LEAVES = Happening(("diverging", HELD), 10.0, 14.0)
+
+
+def carries(rows: Sequence[Sequence[CourseEvent]]) -> list[Carry]:
+    return [e.item for row in rows for e in row if isinstance(e.item, Carry)]
+
+
+def test_who_is_coupled_and_moves_along_is_carried_to_whom_it_meets_and_let_go() -> None:
+    rows = with_carrying([course(), course(7.5)], [run(BRINGS, NEARS, LEAVES)] * 2)
+    expected = Carry((("moving_together", HELD), ("converging", PLACED)))
+    assert carries(rows) == [expected, expected]
+    assert [e.symbol[0] for e in rows[0]] == [
+        *("converging", "coupled", "moving_together", "touching", "decoupled", "diverging")
+    ]
+
+
+def test_carrying_is_learned_only_where_all_runs_show_it() -> None:
+    still = run({"gripper": ((1.0, 3.0),)}, NEARS, LEAVES)
+    assert not carries(with_carrying([course(), course()], [run(BRINGS, NEARS), still]))
+    nowhere = [row[:2] for row in (course(), course())]
+    (first, _) = carries(with_carrying(nowhere, [run(BRINGS)] * 2))
+    assert first.parts == (("moving_together", HELD), ("moving", ("part",)))  # the gripper came
+
+
+def test_nothing_is_carried_to_who_comes_by_itself_or_while_another_one_holds_it() -> None:
+    comes = run({**BRINGS, "fixture": ((3.0, 8.0),)}, NEARS)
+    assert not carries(with_carrying([course()], [comes]))
+    held = [event("coupled", ("arm", "part"), 0.0, 15.0), *course()[1:2]]
+    assert HELD not in [c.parts[0][1] for c in carries(with_carrying([held], [run(BRINGS)]))]
+
+
+def lying(name: str, share: float) -> RunTrace:
+    """A part comes to the fixture, meets it after 6 s and lies with a share of its box over it."""
+    boxes = {FIXTURE: (100, 100, 60, 60), PART: (160 - round(40 * share), 100, 40, 40)}
+    spells = [
+        Spell("converging", 2.0, 6.2, (PART, FIXTURE)),
+        Spell("touching", 6.0, 1e9, (PART, FIXTURE)),
+    ]
+    script = Script(
+        tuple(spells), objects={PART: (0.0, 1e9), FIXTURE: (0.0, 1e9)}, identities=NAMES
+    )
+    minds: list[Mind] = []
+
+    def keep(mind: Mind, observation: object) -> Outcome:
+        objects = {
+            n: replace(o, region=replace(REGION, bbox=boxes[n]), last_seen=mind.time)
+            for n, o in mind.objects.items()
+        }
+        minds.append(replace(mind, objects=objects))
+        return Outcome(mind)
+
+    play(keep, script, 12.0, fps=5.0)
+    return trace_of(name, minds)
+
+
+def test_what_lies_beside_its_place_is_refused_though_it_touches_it() -> None:
+    learned = learn_task(
+        "put", [lying(f"good{k}", share) for k, share in enumerate((0.9, 1.0, 0.8))]
+    )
+    assert "overlap(fixture, part) > " in learned.text
+    assert set(learned.good.values()) == {Verdict.SUCCEEDED}
+    task = parse_task(learned.text)
+    assert judged(task, lying("near", 0.75).minds).verdict is Verdict.SUCCEEDED
+    assert judged(task, lying("beside", 0.05).minds).verdict is not Verdict.SUCCEEDED
+
+
+def test_where_outlines_just_touch_their_overlap_tells_nothing() -> None:
+    rows = [[event("touching", PLACED, 6.0)]]
+    assert not list(places_of((("touching", PLACED), 0), rows, [lying("a", 0.05)], []))
+    (place,) = places_of((("touching", PLACED), 0), rows, [lying("a", 0.5)], [])
+    assert isinstance(place, Place)
+    assert np.isclose(place.seen, 800 / (3600 + 1600 - 800))
+
+
+def test_nobody_comes_to_rest_in_a_stage_that_is_no_contact() -> None:
+    assert halt_of([lying("a", 0.5)], (("diverging", PLACED), 0)) is None
