@@ -17,7 +17,7 @@ from visup.tasks.learning.order import Occurrence, Plan, final_of, leaves_of, sy
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import RunTrace, Span, Symbol, names_of
 
-FAR_LESS = 0.5
+FAR_LESS = 0.25
 """A pair is elsewhere when it overlaps by less than this share of the least overlap in a good run."""
 LEAST_OVERLAP = 0.05
 """Less overlap in a good run, as a share of the union, tells nothing: outlines just touch."""

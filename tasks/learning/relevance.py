@@ -161,7 +161,7 @@ def _events(
         lasts = end > run.end - ENDED_S
         if meeting.begun:  # a stage is completed by a change within it
             approach = _approach(run, pair, meeting.touching[0], begin)
-            if approach is not None and not _held_elsewhere(meeting, begin, meetings):
+            if approach is not None and not _held_elsewhere(meeting, begin, meetings, words):
                 yield CourseEvent(approach, begin)
             yield CourseEvent(Happening((action, pair), begin, end), begin, lasts)
         elif action == "coupled":  # held from the start on
@@ -177,10 +177,12 @@ def _parts(run: RunTrace, pair: Pair, end: float) -> bool:
     return any(h.begin <= end + CLOSE_S and h.end >= end - CLOSE_S for h in parting)
 
 
-def _held_elsewhere(meeting: Meeting, at: float, meetings: Sequence[Meeting]) -> bool:
+def _held_elsewhere(
+    meeting: Meeting, at: float, meetings: Sequence[Meeting], words: Mapping[Pair, str]
+) -> bool:
     """Whether a third actor carries one of two when they meet: carrying it there is told as such."""
     third = (m for m in meetings if set(m.pair) & set(meeting.pair) and m is not meeting)
-    others = (m.coupled for m in third if m.carries)
+    others = (m.coupled for m in third if words[m.pair] == "coupled")
     return any(spell is not None and spell[0] < at <= spell[1] + CLOSE_S for spell in others)
 
 
