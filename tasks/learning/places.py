@@ -1,7 +1,8 @@
 """Where things end up: those that stay in contact overlap in the image about as much as in the good runs.
 
 What is put down beside its place may touch it in the image as well. In the end the boxes of two that stay in
-contact must then not overlap far less than in any good run.
+contact must then not overlap far less than in any good run. In a pile each hides the others, by more or less
+as the camera stands, so that nothing is asked of it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from visup.tasks.learning.order import Occurrence, Plan, final_of, leaves_of, sy
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import RunTrace, Span, Symbol, names_of
 
-FAR_LESS = 0.25
+FAR_LESS = 0.5
 """A pair is elsewhere when it overlaps by less than this share of the least overlap in a good run."""
 LEAST_OVERLAP = 0.05
 """Less overlap in a good run, as a share of the union, tells nothing: outlines just touch."""
@@ -87,11 +88,11 @@ def places_of(
     if final is None:
         return
     ends = [(run.end - SETTLED_S, run.end) for run in runs]
-    for occurrence in leaves_of(plan):
-        for symbol in symbols_of(occurrence[0]):
-            at_last = occurrence == final
-            if symbol[0] != "touching" or not all(_stays(row, symbol) for row in rows):
-                continue
+    kept = [(o, s) for o in leaves_of(plan) for s in symbols_of(o[0]) if s[0] == "touching"]
+    kept = [(o, s) for o, s in kept if all(_stays(row, s) for row in rows)]
+    for occurrence, symbol in kept:
+        at_last = occurrence == final
+        if not any(s != symbol and set(s[1]) & set(symbol[1]) for _, s in kept):
             seen = _least_seen(runs, symbol[1], ends if at_last else last)
             if seen >= LEAST_OVERLAP and (symbol == occurrence[0] or not at_last):
                 yield Place(symbol, final, seen)
