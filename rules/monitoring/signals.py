@@ -21,7 +21,9 @@ def later(time: float, before: int | None) -> int:
         now = round(time * TICKS)
     except (OverflowError, TypeError, ValueError):  # infinite, or not a number
         raise SettingsError(
-            f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
+            f"a sample has the time {time if isinstance(time, SupportsFloat) else repr(time)}",
+            expected="seconds, a finite number",
+            hint=_LEAVE_OUT,
         ) from None
     if before is not None and now <= before:
         what = f"a sample at {time:.6g} s comes after one at {before / TICKS:.6g} s"
@@ -41,7 +43,7 @@ def known_interval(value: SignalValue) -> Interval:
     try:
         low, high = value if isinstance(value, tuple) else (value, value)
         low, high = float(low), float(high)
-    except (TypeError, ValueError):  # a word, an array, three bounds
+    except (OverflowError, TypeError, ValueError):  # too large, a word, an array, three bounds
         raise SettingsError(
             f"a signal is {value!r}",
             expected="a number, an interval of two, or None where nothing is known",

@@ -36,6 +36,7 @@ class ActionDefinition:
         progress: Further relations that approach it although it does not hold yet.
         contrary: Relations that mean that it fails.
         expects: Further relations that are expected while it is required.
+        undoes: Relations that have ended when it holds; one that an earlier stage required ends in its turn.
         text: "are `converging`": predicate of the actors when it holds.
         takes: 'object' or 'zone' for each actor; all objects if empty.
         measures: Dimension of a quantity ('length', 'time', ...); empty for a relation.
@@ -52,6 +53,7 @@ class ActionDefinition:
     progress: tuple[str, ...] = ()
     contrary: tuple[str, ...] = ()
     expects: tuple[str, ...] = ()
+    undoes: tuple[str, ...] = ()
     text: str = ""
     takes: tuple[str, ...] = ()
     measures: str = ""
@@ -158,6 +160,7 @@ _TABLE = (
         entry=("decoupled", "diverging"),
         progress=("diverging",),
         expects=("diverging", "touching"),
+        undoes=("coupled",),
         text="decoupled",
         about="they are known not to be connected",
     ),
@@ -166,6 +169,7 @@ _TABLE = (
         holds=("apart",),
         hold_s=0.5,
         expects=("diverging",),
+        undoes=("touching", "coupled", "on"),
         text="apart",
         about="they are known not to touch",
     ),
@@ -178,7 +182,13 @@ _TABLE = (
         about="it is in the scene, seen or hidden",
     ),
     ActionDefinition(
-        "gone", holds=("gone",), arity=1, hold_s=0.5, text="gone", about="it has left the scene"
+        "gone",
+        holds=("gone",),
+        arity=1,
+        hold_s=0.5,
+        undoes=("present",),
+        text="gone",
+        about="it has left the scene",
     ),
     ActionDefinition(
         "inside",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 from visup.tasks.automaton.states import TaskStep
 
@@ -19,12 +20,14 @@ class Backpointer:
         left: When it was completed, seconds.
         before: Its predecessor; None if there is none, or if it is forgotten.
         length: Number of completed steps, including forgotten ones.
+        begun: When it was first observed, or None.
     """
 
     step: TaskStep
     left: float
     before: Backpointer | None
     length: int
+    begun: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +52,15 @@ class Revision:
 
 
 def extended(
-    backpointer: Backpointer | None, left: tuple[TaskStep, ...], now: float
+    backpointer: Backpointer | None,
+    left: tuple[TaskStep, ...],
+    now: float,
+    begun: tuple[float | None, ...] = (),
 ) -> Backpointer | None:
-    """A path extended by the steps completed now; the oldest ones are forgotten."""
-    for step in left:
-        backpointer = Backpointer(
-            step, now, backpointer, backpointer.length + 1 if backpointer else 1
-        )
+    """A path extended by the steps completed now, with when each was observed; the oldest are forgotten."""
+    for step, since in zip_longest(left, begun):
+        length = backpointer.length + 1 if backpointer else 1
+        backpointer = Backpointer(step, now, backpointer, length, since)
     if backpointer is not None and backpointer.length % MOST_BEHIND == 0:
         return _cut(backpointer, MOST_BEHIND)
     return backpointer

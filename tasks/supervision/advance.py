@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
-from visup.tasks.automaton.backpointers import behind, extended
+from visup.tasks.automaton.backpointers import Backpointer, behind, extended
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import lasted, outcome
-from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.reported import ReportedRelations, joined, with_reported
-from visup.tasks.verification.step_model import StepModel
-from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
+from visup.tasks.verification.step_model import Observe, StepModel
+from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered, without_hold
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is reported last
 
 BEFORE_S = 0.5
 """Tolerance for a beginning before its turn, seconds: relations are evaluated with delays of this order."""
-
-Observe = Callable[[TaskStep], ActionObservation]
-"""The present observation of a step."""
 
 Supported = Sequence[tuple[OpenTransition, Support]]
 
@@ -208,13 +204,12 @@ class Advance:
             for i, x in enumerate(leaves(state))
         ]
         left = tuple(x.step for x in transition.left)
-        if self._early(hypothesis, transition):
+        begun_at = tuple(x.payload.begun for x in transition.left)
+        early = self._early(hypothesis, transition)
+        if early:
             under_way = [
-                replace(
-                    x,
-                    payload=replace(x.payload, early=True, held=False, held_s=0.0, fulfilled=False),
-                )
-                if i in begun
+                replace(x, payload=replace(without_hold(x.payload), early=True))
+                if i in begun and x.step in early
                 else x
                 for i, x in enumerate(under_way)
             ]
@@ -222,35 +217,53 @@ class Advance:
             with_leaves(state, iter(under_way)),
             transition.transition.target,
             self._past(hypothesis, transition, {x.step.stage for x in under_way}),
-            backpointer=extended(hypothesis.backpointer, left, self.now),
+            backpointer=extended(hypothesis.backpointer, left, self.now, begun_at),
             gone_on=True,
         )
 
-    def _early(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
-        """Whether all steps that a transition enters have held since before the steps it completes began.
+    def _early(
+        self, hypothesis: TaskHypothesis, transition: OpenTransition
+    ) -> Collection[TaskStep]:
+        """The steps that a transition enters, if all have held since before the steps it completes began.
 
         Actions that last until something else begins (`converging`) may begin before their turn, and so may
-        measurements; an action required before of the same actors continues.
+        measurements. An action required before of the same actors continues, and neither counts nor excuses
+        those beside it, unless it undoes what was required.
         """
         if not transition.entered or any(s.already or s.is_told for s in transition.entered):
-            return False
-        begun = [x.payload.begun for x in transition.left]
-        if any(b is None for b in begun):
-            return False  # not known if the completed steps were never observed
-        turn = min(b for b in begun if b is not None)
-        asked = {frozenset(x.step.actors) for x in transition.left}
-        asked |= {frozenset(b.step.actors) for b in behind(hypothesis.backpointer)}
-        return all(self._before(s, turn, asked) for s in transition.entered)
+            return ()
+        turn = _turn(transition.left)
+        if turn is None:
+            return ()  # not known if the completed steps were never observed
+        now = {frozenset(x.step.actors) for x in transition.left}
+        passed = tuple(behind(hypothesis.backpointer))
+        new = [s for s in transition.entered if not self._continues(s, now, passed)]
+        return new if all(self._before(s, turn) for s in new) else ()
 
-    def _before(self, step: TaskStep, turn: float, asked: set[frozenset[str]]) -> bool:
-        """Whether a step held well before a time without being required by the course."""
+    def _before(self, step: TaskStep, turn: float) -> bool:
+        """Whether a step held well before a time."""
         meaning, seen = self.steps.actions[step.action], self.observe(step)
-        held_by = seen.held_by
-        if meaning.lasts or meaning.measures or held_by is None:
+        if meaning.lasts or meaning.measures or seen.held_by is None:
             return False
-        if seen.elapsed(step, held_by.since, turn) <= BEFORE_S:
+        return seen.elapsed(step, seen.held_by.since, turn) > BEFORE_S
+
+    def _continues(
+        self, step: TaskStep, now: Collection[frozenset[str]], passed: Sequence[Backpointer]
+    ) -> bool:
+        """Whether a step goes on with what was required of the same actors before."""
+        actors = frozenset(step.actors)
+        if actors in now:
+            return True
+        last = next((b for b in passed if frozenset(b.step.actors) == actors), None)
+        held_by = self.observe(step).held_by
+        return last is not None and not (held_by and self._undone(step, held_by.since, last))
+
+    def _undone(self, step: TaskStep, since: float, last: Backpointer) -> bool:
+        """Whether a step has undone, since then, what an earlier one required, after that was seen."""
+        if last.begun is None or since < last.begun:
             return False
-        return frozenset(step.actors) not in asked
+        undoes = self.steps.actions[step.action].undoes
+        return not set(undoes).isdisjoint(self.steps.actions[last.step.action].holds)
 
     def _in_turn(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
         """A beginning step with the time from which its evidence counts and is reported."""
@@ -324,6 +337,17 @@ class Advance:
         """Since when a step's action has been contradicted, or None."""
         contrary = self.observe(step).contrary
         return None if contrary is None else contrary.since
+
+
+def _turn(left: Sequence[Leaf[StepMonitor]]) -> float | None:
+    """When the last of the stages that a transition completes began, or None if that was not observed."""
+    begun: dict[str, float] = {}
+    for leaf in left:
+        stage, since = leaf.step.stage, leaf.payload.begun
+        if since is None:
+            return None
+        begun[stage] = min(since, begun.get(stage, since))
+    return max(begun.values(), default=None)
 
 
 def _earliest_end(left: Leaf[StepMonitor]) -> float:

@@ -26,11 +26,11 @@ from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.automaton.transitions import HiddenState
 from visup.tasks.grammar.nodes import StageCondition, Task
 from visup.tasks.grammar.structure import pause_conditions
-from visup.tasks.supervision.advance import Advance, Observe
+from visup.tasks.supervision.advance import Advance
 from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransitions
 from visup.tasks.verification.settings import TaskSettings
-from visup.tasks.verification.step_model import StepModel
+from visup.tasks.verification.step_model import Observe, StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment
 
 LEAST = 1e-13  # hypotheses with less mass are dropped
@@ -235,12 +235,13 @@ class MonitoredPhases:
         if finished is not None and self._settled(hypothesis, finished, observe, now):
             return hypothesis, 1.0
         done, moment = finished is not None, Moment(now, dt)
-        new = [
+        looked_at = (
             self.steps.looked_at(x, observe(x.step), moment, done) for x in leaves(hypothesis.state)
-        ]
+        )
+        state = self.steps.together(with_leaves(hypothesis.state, looked_at), observe)
+        new = leaves(state)
         fit = math.prod(self.steps.fit(x, observe(x.step), done, dt) for x in new)
         lost = any(x.payload.status in BAD for x in new)
-        state = with_leaves(hypothesis.state, iter(new))
         return replace(hypothesis, state=state, finished=None if lost else finished), fit
 
     def _settled(

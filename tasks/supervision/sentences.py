@@ -112,6 +112,9 @@ def outcome(
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
     if meaning.lasts or monitor.held:
         return Status.DONE, f"{who} {_held(step, meaning, monitor, now, followed, denied)}"
+    if monitor.held_at is not None and not monitor.early:
+        until = f"until {monitor.held_at:.1f} s, not while what is joined to it by `&` was so"
+        return Status.FAILED, f"{who} {was} {meaning.text} {until}"
     if monitor.broken_since is not None:
         return Status.FAILED, f"{who} should be {meaning.text}, but {was} not"
     return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"

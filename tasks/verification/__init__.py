@@ -2,8 +2,8 @@
 
 Read in this order: `observe.py` (the current observation of an action), `stage_conditions.py` (conditions of
 the task on the beginning, end, progress and failure of a step), `step_monitor.py` (the status of a step
-over time), `setting_out.py` (motion onset), `reported.py` (relations of actors as reported),
-`step_model.py` (the likelihood of observations), `settings.py` (the time constants).
+over time), `together.py` (actions joined by `&`), `setting_out.py` (motion onset), `reported.py` (relations
+of actors as reported), `step_model.py` (the likelihood of observations), `settings.py` (the time constants).
 """
 
 from visup.tasks.verification.observe import ActionObservation, observe

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
-from visup.tasks.automaton.states import Leaf
+from visup.tasks.automaton.states import Leaf, State, TaskStep
 from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
+from visup.tasks.verification.together import at_the_same_time
+
+Observe = Callable[[TaskStep], ActionObservation]
+"""The present observation of a step."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,17 @@ class StepModel:
         meaning = self.actions[step.action]
         monitor = update(leaf.payload, step, meaning, seen, moment, self.settings)
         return replace(leaf, payload=monitor)
+
+    def together(self, state: State[StepMonitor], observe: Observe) -> State[StepMonitor]:
+        """A state in which actions joined by `&` have held only if they did at the same time."""
+
+        def gap(step: TaskStep, since: float, until: float) -> float:
+            return observe(step).elapsed(step, since, until) if until > since else 0.0
+
+        return at_the_same_time(state, self._judged, gap, self.settings.contact_s)
+
+    def _judged(self, step: TaskStep) -> bool:
+        return not self.actions[step.action].lasts and not step.is_told
 
     def fit(self, leaf: Leaf[StepMonitor], seen: ActionObservation, done: bool, dt: float) -> float:
         """Likelihood of `dt` seconds of an observation, relative to the best: at most 1, and 1 in a pause."""

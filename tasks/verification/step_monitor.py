@@ -47,6 +47,8 @@ class StepMonitor:
         begun: When it was first observed to hold or progress, or None.
         first_since: Since when the relation of that first observation was true, or None.
         held: Whether it ever held.
+        held_from: Since when it held when it last did, or None.
+        held_at: When it last held, or None.
         held_s: How long it has held without a break.
         broken_since: Since when it has not held, or None.
         fulfilled: Whether it has held for as long as required.
@@ -83,6 +85,8 @@ class StepMonitor:
     begun: float | None = None
     first_since: float | None = None
     held: bool = False
+    held_from: float | None = None
+    held_at: float | None = None
     held_s: float = 0.0
     broken_since: float | None = None
     fulfilled: bool = False
@@ -235,10 +239,16 @@ def _disregard_early(
     held_by = seen.held_by
     monitor = replace(monitor, parted_s=0.0)
     seen = replace(seen, holds=Truth.FALSE, held_by=None, helps=None, entry=None)
-    if held_by is None or worked(monitor.entered, moment.now) < settings.early_s:
+    beyond = worked(monitor.entered, moment.now) - settings.early_s
+    if held_by is None or beyond < 0.0:
         return monitor, seen
-    since = monitor.entered + settings.early_s
-    return monitor, replace(seen, contrary=replace(held_by, since=since))
+    # Reckoned back from now, because there may have been pauses before.
+    return monitor, replace(seen, contrary=replace(held_by, since=moment.now - beyond))
+
+
+def without_hold(monitor: StepMonitor) -> StepMonitor:
+    """A monitor for which the action has not held yet in its turn."""
+    return replace(monitor, held=False, held_s=0.0, fulfilled=False)
 
 
 def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> bool:
@@ -280,7 +290,7 @@ def _note_progress(
         broken = _first(broken, now)
         if seen.elapsed(step, broken, now) >= settings.gap_s:
             held, ceased = 0.0, ceased or monitor.fulfilled
-    helping = seen.helps is not None
+    holding, helping = seen.holds is Truth.TRUE, seen.helps is not None
     required = meaning.hold_s if step.hold_s is None else step.hold_s
     complete = held >= required - 1e-9
     if seen.over is not None:
@@ -291,7 +301,9 @@ def _note_progress(
         first_since=_first(monitor.first_since, seen.helps.since)
         if seen.helps
         else monitor.first_since,
-        held=monitor.held or seen.holds is Truth.TRUE,
+        held=monitor.held or holding,
+        held_from=seen.held_by.since if holding and seen.held_by else monitor.held_from,
+        held_at=now if holding else monitor.held_at,
         held_s=held,
         broken_since=broken,
         fulfilled=monitor.fulfilled or complete,

@@ -8,9 +8,9 @@ from itertools import count
 from visup.agent import Status
 from visup.tasks.automaton.automaton import Automaton
 from visup.tasks.automaton.task_filter import TaskFilter
-from visup.tasks.supervision.advance import Observe
 from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.monitored_phases import MonitoredPhases, SupervisionFilter
+from visup.tasks.verification.step_model import Observe
 
 MOST_HISTORIES = 4_000
 LEAST = 1e-9  # histories with less of the mass are dropped, which the posterior accounts for

@@ -48,6 +48,13 @@ def test_each_outcome_is_told() -> None:
     assert outcome_of(case(formula=empty, semantics=said)) == "other_semantics"
 
 
+def test_windows_after_the_end_of_dense_time_have_the_last_value() -> None:
+    later = {"op": "always", "bounds": [3, 4], "args": [variable("f")]}
+    said = ["future windows are cut at the end of the signals"]
+    dense = case(formula=later, time="dense-held", expected=[[0.5, 3], [1.5, 3]], semantics=said)
+    assert outcome_of(dense) == "agree"
+
+
 def test_a_folder_is_counted_by_peer_and_calculus(tmp_path: Path) -> None:
     (tmp_path / "temporal.json").write_text(json.dumps([case(), case(expected=[[2, 2]])]))
     found = evaluate_peers(tmp_path)

@@ -108,7 +108,9 @@ def ends(case: Case) -> tuple[Before, After]:
     final = ("future windows are cut", "next is", "strong_next")
     before: Before = "cut" if any(w in said for w in first) else "unknown"
     after: After = "cut" if any(w in said for w in final) else "unknown"
-    return before, "lasting" if "last value of a signal lasts on" in said else after
+    # In rtamt's dense time a window that begins after the end has the last value.
+    lasting = ("last value of a signal lasts on", "cut at the end of the signals")
+    return before, "lasting" if any(w in said for w in lasting) else after
 
 
 def _values(case: Case, time: float) -> dict[str, float | Interval | None]:

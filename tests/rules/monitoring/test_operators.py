@@ -283,7 +283,9 @@ def test_a_reversed_interval_is_refused(value: Interval) -> None:
         monitor.step(0.0, {"x": value})
 
 
-@pytest.mark.parametrize("value", ["open", np.array([1.0, 2.0]), (1.0, 2.0, 3.0), ("a", "b"), {}])
+@pytest.mark.parametrize(
+    "value", ["open", np.array([1.0, 2.0]), (1.0, 2.0, 3.0), ("a", "b"), {}, 10**400]
+)
 def test_what_is_no_number_is_refused_in_words(value: Any) -> None:
     for made in (Monitor, DenseTimeMonitor):
         with pytest.raises(SettingsError, match="a signal is"):

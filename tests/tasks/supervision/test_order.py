@@ -136,3 +136,60 @@ def test_what_has_met_does_not_fail_to_approach_by_fingers_that_close(met: bool)
     played = watched(text, Script(tuple(spells), objects=HERE, identities=NAMES), 7.0)
     failing = [e for e in played.events if e.kind == "stage_failing" and "`near`" in e.text]
     assert bool(failing) is not met
+
+
+UNDO = (
+    "<t> ::= <lift> <change> <down>\n<lift> ::= coupled(leg_1, top)\n"
+    "<change> ::= touching(leg_2, top)\n<down> ::= decoupled(leg_1, top)"
+)
+
+
+@pytest.mark.parametrize(("until", "expected"), [(16.0, True), (6.0, False), (4.0, False)])
+def test_what_undoes_an_earlier_stage_has_its_turn_too(until: float, expected: bool) -> None:
+    """Let down before the wheel is changed: the order is not that of the task."""
+    spells = (Spell("coupled", 2.0, until, (TOP, 2)), Spell("touching", 10.0, 1e9, (TOP, 3)))
+    script = Script(spells, objects=HERE, identities=NAMES)
+    assert (verdict(UNDO, script) is Verdict.SUCCEEDED) is expected
+
+
+BOTH = (
+    "<t> ::= <a> <b> <c>\n<a> ::= touching(leg_1, top)\n"
+    "<b> ::= touching(leg_2, top) & touching(leg_3, top)\n<c> ::= apart(leg_1, top)"
+)
+
+
+@pytest.mark.parametrize(("until", "expected"), [(8.0, False), (14.0, True)])
+def test_what_is_joined_by_and_holds_at_the_same_time(until: float, expected: bool) -> None:
+    spells = (
+        Spell("touching", 2.0, 18.0, (TOP, 2)),
+        Spell("touching", 5.0, until, (TOP, 3)),
+        Spell("touching", 12.0, 16.0, (TOP, 4)),
+    )
+    played = watched(BOTH, Script(spells, objects=HERE, identities=NAMES), 40.0)
+    assert (finish(task_of(played)) is Verdict.SUCCEEDED) is expected
+    assert expected is not any("not while what is joined" in e.text for e in played.events)
+
+
+def test_what_goes_on_does_not_excuse_what_was_done_before_its_turn() -> None:
+    """A table that is stood up before its last leg is on, though the legs are required as well."""
+    text = (
+        "<t> ::= <a> <b> <stand>\n<a> ::= touching(leg_1, top)\n<b> ::= touching(leg_2, top)\n"
+        "<stand> ::= touching(leg_3, top) & touching(leg_1, top) & touching(leg_2, top)"
+    )
+    assert verdict(text, scene((2, 3.0), (3, 8.0), (4, 13.0))) is Verdict.SUCCEEDED
+    assert verdict(text, scene((2, 3.0), (4, 8.0), (3, 13.0))) is Verdict.FAILED
+
+
+def test_stages_joined_by_and_go_on_side_by_side() -> None:
+    text = (
+        "<t> ::= (<p> & <q>) <e>\n<p> ::= touching(leg_1, top) apart(leg_1, top)\n"
+        "<q> ::= touching(leg_2, top) apart(leg_2, top)\n<e> ::= touching(leg_3, top)"
+    )
+    for first, second in (((2.0, 9.0), (5.0, 12.0)), ((2.0, 5.0), (9.0, 12.0))):
+        spells = (
+            Spell("touching", *first, (TOP, 2)),
+            Spell("touching", *second, (TOP, 3)),
+            Spell("touching", 16.0, 1e9, (TOP, 4)),
+        )
+        script = Script(spells, objects=HERE, identities=NAMES)
+        assert verdict(text, script) is Verdict.SUCCEEDED

@@ -18,11 +18,11 @@ from visup.tasks.automaton.stage_hmm import ActionStatus
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.grammar.parser import read
-from visup.tasks.supervision.advance import Observe
 from visup.tasks.supervision.hypotheses import TaskHypothesis
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.settings import DEFAULT_SETTINGS
+from visup.tasks.verification.step_model import Observe
 
 recognition_tasks = oracle("recognition_tasks")
 unmerged_filter = oracle("unmerged_filter").unmerged_filter

@@ -1,0 +1,64 @@
+"""Actions of one stage joined by `&`: having held one after the other is not holding at the same time.
+
+Each action has a monitor of its own. The one that ceased before another one began has to hold once more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from visup.agent.model.fast_replace import replace
+from visup.tasks.automaton.states import (
+    Leaf,
+    ParallelState,
+    SequenceState,
+    State,
+    TaskStep,
+    leaves,
+    with_leaves,
+)
+from visup.tasks.verification.step_monitor import StepMonitor, without_hold
+
+Gap = Callable[[TaskStep, float, float], float]
+"""Seconds of work on a step between two times, pauses cut out."""
+
+
+def at_the_same_time(
+    state: State[StepMonitor], judged: Callable[[TaskStep], bool], gap: Gap, tolerance_s: float
+) -> State[StepMonitor]:
+    """A state in which actions that ceased before those beside them began have not held.
+
+    Args:
+        state: The active steps with their monitors.
+        judged: Whether an action must hold at the same time as others; those that last until something else
+            begins need not.
+        gap: Measures the time between the end of one and the beginning of another.
+        tolerance_s: Relations are believed with delays, by which what held at the same time may seem apart.
+    """
+    match state:
+        case SequenceState(head=head):
+            kept = at_the_same_time(head, judged, gap, tolerance_s)
+            return state if kept is head else replace(state, head=kept)
+        case ParallelState(parts=parts):
+            group = [p for p in parts if isinstance(p, Leaf) and judged(p.step)]
+            lapsed = {id(x) for x in group if _alone(x, group, gap, tolerance_s)}
+            if lapsed:
+                new = [_without_hold(x) if id(x) in lapsed else x for x in leaves(state)]
+                return with_leaves(state, iter(new))
+    return state
+
+
+def _alone(
+    leaf: Leaf[StepMonitor], group: Iterable[Leaf[StepMonitor]], gap: Gap, tolerance_s: float
+) -> bool:
+    """Whether an action of the stage began to hold only after this one had ceased."""
+    until = leaf.payload.held_at
+    if not leaf.payload.held or until is None:
+        return False
+    others = (x.payload for x in group if x.step.stage == leaf.step.stage)
+    begun = (o.held_from for o in others if o.held and o.held_from is not None)
+    return any(gap(leaf.step, until, since) > tolerance_s for since in begun)
+
+
+def _without_hold(leaf: Leaf[StepMonitor]) -> Leaf[StepMonitor]:
+    return replace(leaf, payload=without_hold(leaf.payload))
