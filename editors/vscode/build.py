@@ -55,6 +55,7 @@ def build(folder: Path = HERE) -> Path:
     package = json.loads((HERE / "package.json").read_text(encoding="utf-8"))
     target = folder / f"{package['name']}-{package['version']}.vsix"
     manifest = MANIFEST.format(**package, engine=package["engines"]["vscode"])
+    target.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         _put(archive, "[Content_Types].xml", CONTENT_TYPES)
         _put(archive, "extension.vsixmanifest", manifest)
