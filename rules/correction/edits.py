@@ -22,6 +22,7 @@ BEHIND_WORD = ("()", ")")
 BETWEEN = (")", "(", ",", ">", "<", ":")
 UNITS = ("s", "px", "px/s", "%", "samples")
 ALIKE = 0.7
+_OPERAND = re.compile(r"(?:\w+\([^()]*\)|<[^<>]*>|\b\w+)\s*\Z")
 JOINTS = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
 
 
@@ -72,6 +73,7 @@ def edits(
     yield from (Repair(at, at, new) for at, new in _put_in(line, begin, end))
     tokens.sort(key=lambda t: _away(t, begin, end))
     near = tokens[: 2 * NEAR + 1]
+    yield from _moved(line, near, words)
     for _, stop, word in tokens:
         if word[:1].isdigit() and begin <= stop <= end:
             yield from (Repair(stop, stop, f" {unit}") for unit in UNITS)
@@ -86,6 +88,16 @@ def edits(
     yield from (Repair(start, stop, "") for start, stop, _ in near)
     yield from _fillers(line, near, words)
     yield from _left_out(line, begin, end, near)
+
+
+def _moved(
+    line: str, near: Iterable[tuple[int, int, str]], words: Sequence[str]
+) -> Iterator[Repair]:
+    """A word of the language before the call or name that it follows."""
+    for start, stop, word in near:
+        before = _OPERAND.search(line[:start]) if word in words else None
+        if before is not None and line[stop : stop + 1] != "(":
+            yield Repair(before.start(), stop, f"{word} {before[0].rstrip()}")
 
 
 def _ranked(word: str, words: Sequence[str]) -> list[str]:

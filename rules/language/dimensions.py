@@ -126,7 +126,8 @@ def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
     elif (leave.base - node.right.base) * (1 if ">" in node.operator else -1) > 0:
         what = f"'leave {leave}' ends it where it does not yet begin"
         side = "at most" if ">" in node.operator else "at least"
-        yield leave.span, what, f"{side} {node.right}", None
+        given, swapped = f"{node.right} leave {leave}", f"{leave} leave {node.right}"
+        yield leave.span, what, f"{side} {node.right}", f"write `{swapped}` in place of `{given}`"
 
 
 def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimension | None:

@@ -117,5 +117,5 @@ def _replacing(where: SourceLocation, old: re.Match[str], new: str) -> TextFix:
 def _renamed(where: SourceLocation, rest: str, new: str) -> TextFix:
     """Replace the name at the caret; for a call only its name."""
     found = _NAME.match(rest) if _NAME.match(new) else None
-    length = len(found[0]) if found else where.length
+    length = len(found[0]) if found and " " not in new else where.length
     return TextFix(where.line, where.column, length, new)

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.resources import files
-from itertools import chain
+from math import inf
 from typing import Any
 
 from lark import Lark, UnexpectedInput
@@ -16,10 +16,12 @@ from lark import Lark, UnexpectedInput
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SourceLocation
 from visup.rules.correction.edits import Repair, edits, hint_of
+from visup.rules.correction.loss import KNOWN, LITTLE, loss
 from visup.rules.correction.search import corrections
 from visup.rules.language.diagnostics import Diagnostic, Source, either
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.repair import (
+    MOST_COMPARED,
     MOST_REPAIRS,
     WORDS,
     end_before,
@@ -286,15 +288,19 @@ def _with_edit(
     if helps is not None and (helps[0] == 0 or helps <= before):
         return fault
     line, begin, length = place.text, place.column - 1, place.length
-    tries = (usual_slips(line, begin, length), edits(line, begin, length, EDIT_WORDS))
-    best, least = None, before
-    for repair in chain.from_iterable(tries):
+    known = ((repair, KNOWN) for repair in usual_slips(line, begin, length))
+    others = ((repair, 0.0) for repair in edits(line, begin, length, EDIT_WORDS))
+    best, least, fewest = None, (before, inf), MOST_COMPARED
+    for repair, granted in (*known, *others):
         hint = hint_of(place.text, repair)
         fix = None if hint is None else fix_of(block, place, hint)
         found = before if fix is None else tried(fix)
-        if found < least:
-            best, least = hint, found
-        if least == SOUND or (before[0] == 0 and least < before):
+        if fix is None or found >= before:
+            continue
+        lost = loss(block, fix.applied(block)) - granted
+        best, least = min((best, least), (hint, (found, lost)), key=lambda tried: tried[1])
+        fewest -= found == SOUND or before[0] == 0
+        if fewest == 0 or (least[1] <= LITTLE and (found == SOUND or before[0] == 0)):
             break
     if best is None:
         return fault

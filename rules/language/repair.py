@@ -16,7 +16,7 @@ from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.model.did_you_mean import closest
 from visup.rules.correction.edits import Repair, edits
-from visup.rules.correction.loss import LITTLE, loss
+from visup.rules.correction.loss import KNOWN, LITTLE, loss
 from visup.rules.language.keywords import KEYWORDS
 from visup.rules.language.slips import SLIPS
 
@@ -77,19 +77,25 @@ def find_repair(
     """
     at, length = place_of(text, error)
     trial = _RepairTrial(text, at, length, error_of, is_sound)
+    known = trial.best(usual_slips(text, at, length, *_around(text, at)), KNOWN)
+    if trial.lost <= LITTLE:
+        return known
+    sound = (trial.lost, known)
     usual = trial.best(_candidates(text, at, length))
-    if usual is not None and trial.lost <= LITTLE:
+    if trial.lost <= LITTLE:
         return usual
-    sound, further, trial.moved = (trial.lost, usual), trial.moved, 0.0
+    sound = min(sound, (trial.lost, usual), key=lambda found: found[0])
+    further, trial.moved = trial.moved, 0.0
     since = max(0, min(at - NEAR, text.rfind("\n", 0, at) + 1))
     least = trial.best(islice(corrected(since), MOST_CORRECTIONS))
     lost, whole = min(sound, (trial.lost, least), key=lambda found: found[0])
-    if lost < inf:
-        return whole
-    if usual is not None and further > MUCH_FURTHER:
-        return usual
+    if lost <= LITTLE or (lost == inf and usual is not None and further > MUCH_FURTHER):
+        return whole or usual
     places = dict.fromkeys((at, max(0, end_before(text, at) - 1)))
-    return trial.best(r for place in places for r in _edited(text, place)) or usual or least
+    edited = trial.best(r for place in places for r in _edited(text, place))
+    if min(lost, trial.lost) < inf:
+        return whole if lost <= trial.lost else edited
+    return edited or usual or least
 
 
 @dataclass
@@ -114,10 +120,10 @@ class _RepairTrial:
     moved: float = 0.0
     lost: float = inf
 
-    def best(self, repairs: Iterable[Repair]) -> Repair | None:
+    def best(self, repairs: Iterable[Repair], granted: float = 0.0) -> Repair | None:
         """The first edit after which the text is correct, else parses, else parses further.
 
-        An edit that loses much of the text is taken only if a few others lose no less.
+        An edit that loses much more than what is granted is taken only if a few others lose no less.
         """
         self.lost = inf
         whole: list[tuple[float, Repair]] = []
@@ -133,7 +139,7 @@ class _RepairTrial:
             if left is None:
                 self.moved = inf
                 if self.is_sound(changed):
-                    whole.append((loss(self.text, changed), repair))
+                    whole.append((loss(self.text, changed) - granted, repair))
                     if whole[-1][0] <= LITTLE or len(whole) == MOST_COMPARED:
                         break
                     continue
@@ -192,9 +198,14 @@ def usual_slips(
                 yield Repair(match.start(), match.end(), new)
 
 
+def _around(text: str, at: int) -> tuple[int, int]:
+    """The lines around an error in which usual slips are looked for."""
+    high = text.find("\n", at + 160)
+    return text.rfind("\n", 0, max(0, at - 120)) + 1, len(text) if high < 0 else high
+
+
 def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
-    low, high = text.rfind("\n", 0, max(0, at - 120)) + 1, text.find("\n", at + 160)
-    high = len(text) if high < 0 else high
+    low, high = _around(text, at)
     yield from usual_slips(text, at, length, low, high)
     found, before = text[at : at + length], end_before(text, at)
     for word in (found, _word_before(text, before)):
@@ -206,10 +217,10 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
         yield Repair(at, at + 1, " and")
     if found[:1].isdigit():
         yield Repair(before, before, " <")
-    for match in re.finditer(r"\)", text[max(low, text.rfind("\n", 0, before)) : before]):
-        # A bracket may be missing earlier in the line.
-        place = max(low, text.rfind("\n", 0, before)) + match.end()
-        yield Repair(place, place, ")")
+    yield from (
+        Repair(p, p, ")")
+        for p in _ends_of_groups(text, max(low, text.rfind("\n", 0, before)), before)
+    )
     if text[before - 1 : before] in ("<", ">", "="):
         yield from (Repair(before, before, f" {amount}") for amount in AMOUNTS)
     for new in PUT_IN:
@@ -220,6 +231,21 @@ def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
     previous = _word_before(text, before)
     if previous:
         yield Repair(before - len(previous), before, "")
+
+
+def _ends_of_groups(text: str, low: int, high: int) -> list[int]:
+    """Where a bracket may be closed that was left open: first where it groups something for what follows."""
+    places = [low + match.end() for match in re.finditer(r"\)", text[low:high])]
+
+    def groups(place: int) -> bool:
+        inner = text[low:place]
+        joined = re.search(r"\b(?:and|or)\b", inner) is not None
+        return joined and _POSTFIX.match(text, place) is not None
+
+    return sorted(places, key=lambda place: not groups(place))
+
+
+_POSTFIX = re.compile(r"\s*(?:for|within|in|since|until)\b")
 
 
 def _edited(text: str, at: int) -> Iterator[Repair]:

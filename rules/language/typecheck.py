@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Set as AnySet
 from itertools import count
 
 from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
 from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.nodes import (
-    ZERO,
     And,
     Comparison,
     Formula,
@@ -133,7 +132,8 @@ class TypeChecker:
             more = f"{given}, {word}" if given else word
             return f"write `{rule.name}({more})` in place of `{rule.name}({given})`"
         # A long word is no misspelt variable: the sentence keeps it as a word.
-        other = f"{{{rule.variables[0]}}}" if rule.variables and len(word) <= SHORT_NAME else word
+        unsaid = [v for v in rule.variables if v not in mentions(rule.say)] or [*rule.variables]
+        other = f"{{{unsaid[0]}}}" if unsaid and len(word) <= SHORT_NAME else word
         return f"write `{other}` in place of `{{{word}}}`"
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:
@@ -208,6 +208,8 @@ class _FormulaChecker:
             case (Variable(name=one), Variable(name=name)) if one in self.scope:
                 self.used.add(one)
                 what, said = f"'{one}' is an object, and is not compared", f"named({one}, {name})"
+            case (Measure() as measure, Number() as number) if measure.name in self.facts:
+                return self.fact_compared(measure, number)
             case (Measure(name="signal", words=(one,)), Variable(name=name)):
                 what, said = "a signal is compared with a word", f"signal_is({one}, {name})"
             case _:
@@ -215,6 +217,24 @@ class _FormulaChecker:
         if node.operator not in ("==", "!=") or name in (*self.values, *self.scope):
             return None
         return node.span, what, f"`{said}`", f"write `{no}{said}`"
+
+    @property
+    def facts(self) -> AnySet[str]:
+        """Words that are true or false, and no quantities."""
+        return self.vocabulary.words.keys() - self.vocabulary.quantities.keys()
+
+    def fact_compared(self, fact: Measure, number: Number) -> Fault:
+        """The error of what is true or false and is compared; with a quantity of such numbers, if any."""
+        alike = (
+            name
+            for name, known in self.vocabulary.quantities.items()
+            if len(known.takes) == len(fact.words) and known.dimension == number.dimension
+        )
+        words = ", ".join(fact.words)
+        meant = next(alike, None)
+        hint = meant and f"write `{meant}({words})` in place of `{fact.name}({words})`"
+        what = f"'{fact.name}' is true or false, and is not compared"
+        return fact.span, what, "a quantity", hint
 
     def widened(self, short: Quantified, rest: Formula, whole: Quantified) -> Iterator[Fault]:
         """A quantifier that ends too early, and the errors within all that it is about."""
@@ -369,8 +389,7 @@ def _ahead(node: FutureOperator | Until, window: TimeWindow | None, span: Span) 
     word = node.kind if isinstance(node, FutureOperator) else "until"
     if window is None:
         what = f"'{word}' without a window would wait forever"
-        bounded = replace(node, window=TimeWindow(ZERO, Number(5.0, Unit.S)))
-        yield span, what, f"such as {word}[5 s]", f"write `{bounded}`"
+        yield span, what, f"such as {word}[5 s]", f"write `{word}[5 s]` in place of `{word}`"
     else:
         yield from check_window(window, word)
 

@@ -40,7 +40,7 @@ def added(text: str, fault: Diagnostic) -> Iterator[str]:
         yield from (f"add the line `parameter {name} is {amount}`" for amount in AMOUNTS)
     elif fault.code == "E229":
         yield f"add the line `zone {name} is {ZONE}`"
-    elif fault.code == "E205":
+    elif fault.code in ("E205", "E211"):
         yield from _with_actor(text, fault)
     elif fault.code == "E219" and re.search(rf"<\s*{name}\s*>\s*::=", text):
         yield f"write `<{name}>` in place of `{name}`"
@@ -63,7 +63,7 @@ def _with_actor(text: str, fault: Diagnostic) -> Iterator[str]:
     call = _ANY_CALL.match(fault.place.text, begin)
     if call is None:
         return
-    given = re.findall(NAME, call[2])
+    given = list(dict.fromkeys(re.findall(NAME, call[2])))
     calls = [re.findall(NAME, m[2]) for m in _ANY_CALL.finditer(text)]
     named = Counter(a for actors in calls for a in actors)
     met = Counter(a for actors in calls if set(given) & set(actors) for a in actors)
@@ -176,6 +176,11 @@ def line_part(line: str, begin: int, length: int) -> str:
 def _renamed(text: str, fault: Diagnostic) -> Iterator[str]:
     """A second stage of a name is renamed if it is asked for a second time, else left out."""
     head = re.match(rf"\s*<\s*({NAME})\s*>", fault.place.text)
+    if head is not None:
+        stages = re.findall(rf"<\s*({NAME})\s*>(?!\s*::=)", text)
+        known = re.findall(rf"<\s*({NAME})\s*>\s*::=", text)
+        missing = [s for s in dict.fromkeys(stages) if s not in known]
+        yield from (f"write `<{s}>` in place of `<{head[1]}>`" for s in missing)
     if head is not None and len(_references(text, head[1])) > 1:
         yield f"write `<{head[1]}_2>` in place of `<{head[1]}>`"
     elif head is not None:

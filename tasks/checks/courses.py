@@ -108,12 +108,17 @@ class CourseCheck:
             for deadline in deadlines[:1]:
                 if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
                     what = f"what takes at least {least:g} s cannot be over {deadline}"
-                    yield self.source.fault("E208", what, deadline.span, "a longer `within`")
+                    longer = f"write `within {2 * least:g} s` in place of `{deadline}`"
+                    yield self.source.fault(
+                        "E208", what, deadline.span, "a longer `within`", longer
+                    )
             for delay in delays[:1]:
                 most = delay.most or delay.duration
                 if value(self.task.amount(most)) < value(self.task.amount(delay.duration)):
                     what = f"`{delay}` is never: the greatest delay is less than the least"
-                    yield self.source.fault("E208", what, delay.span, "a greater number after `to`")
+                    turned = f"write `after {most} to {delay.duration}` in place of `{delay}`"
+                    expected = "a greater number after `to`"
+                    yield self.source.fault("E208", what, delay.span, expected, turned)
             if holds and self.grammar.is_sequential(course.item):
                 what = f"`{holds[0]}` comes after a sequence"
                 hint = "put `for` after the one that must hold"

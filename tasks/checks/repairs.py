@@ -14,7 +14,7 @@ from itertools import islice
 from math import inf
 
 from visup.rules.correction.edits import ALIKE, Repair, edits, hint_of
-from visup.rules.correction.loss import LITTLE, loss
+from visup.rules.correction.loss import KNOWN, LITTLE, loss
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
@@ -100,21 +100,26 @@ class _HintTrial:
     def mend(self, fault: Diagnostic) -> str | None:
         """A hint that helps: usual meanings before small edits, partial help before none."""
         found: list[tuple[str | None, int]] = []
+        granted = KNOWN
         for hints in (_hints(self.text, fault), self.corrected(fault), self.edited(fault)):
             keep = fault.code < "E2" and bool(found) and found[0][1] > ONE_STEP
             # A usual meaning that helps partly is preferred to deleting words.
             hint, helps = self.best(
-                fault, (h for h in hints if not (keep and h.startswith("leave")))
+                fault, (h for h in hints if not (keep and h.startswith("leave"))), granted
             )
-            if helps == WHOLLY and self.lost(fault, hint) <= LITTLE:
+            if helps == WHOLLY and self.lost(fault, hint) - granted <= LITTLE:
                 return hint
             found.append((hint, helps))
-        whole = [hint for hint, helps in found if helps == WHOLLY]
+            granted = 0.0
         usual, _, edit = found
+        whole = [hint for hint, helps in found if helps == WHOLLY]
         if whole:
             # What only leaves a definition unused may lose less than what removes the fault wholly.
             apart = [usual[0]] if fault.code >= "E2" and usual[1] == IN_PART else []
-            return min((*whole, *apart), key=lambda hint: self.lost(fault, hint))
+            return min(
+                (*whole, *apart),
+                key=lambda hint: self.lost(fault, hint) - (KNOWN if hint == usual[0] else 0.0),
+            )
         return edit[0] if usual[1] <= ONE_STEP < edit[1] else usual[0]
 
     def edited(self, fault: Diagnostic) -> Iterator[str]:
@@ -135,7 +140,9 @@ class _HintTrial:
         if fault.code < "E2":
             yield from islice(corrected(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
 
-    def best(self, fault: Diagnostic, hints: Iterable[str]) -> tuple[str | None, int]:
+    def best(
+        self, fault: Diagnostic, hints: Iterable[str], granted: float
+    ) -> tuple[str | None, int]:
         """The hint that helps most, and how much; of those that help wholly the first to lose little."""
         partly: str | None = None
         most = NOTHING
@@ -148,7 +155,7 @@ class _HintTrial:
                 break
             helps = self.helps(replace(fault, hint=hint))
             if helps == WHOLLY:
-                whole.append((self.lost(fault, hint), hint))
+                whole.append((self.lost(fault, hint) - granted, hint))
                 if whole[-1][0] <= LITTLE or len(whole) == MOST_COMPARED:
                     break
             elif helps > most:
@@ -243,6 +250,10 @@ def _placed(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str
 
 def _misspelt(line: str, at: int) -> Iterator[str]:
     """Replacements of misspelt words of the language, nearest to the caret first."""
+    for pair in re.finditer(r"(?=\b([a-z]+)\s+([a-z]+)\b)", line):
+        turned = f"{pair[2]} {pair[1]}"
+        for meant in get_close_matches(turned, PHRASES, n=1, cutoff=ALIKE):
+            yield f"write `{meant}` in place of `{pair[1]} {pair[2]}`"
     for match in sorted(LONE_WORD.finditer(line), key=lambda m: _distance(m, at)):
         if match[0] in OTHER_WORDS:
             yield _hint(line, match, OTHER_WORDS[match[0]], at)

@@ -6,6 +6,7 @@ that merely follows from another.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AnySet
@@ -226,7 +227,9 @@ class _Semantics:
     def references(self) -> Iterator[Diagnostic]:
         defined = [s.name for s in self.parsed.task.stages]
         heads = self.headless()
-        for name, reference in self.undefined.items():
+        once = {(r.span.line, r.span.column): name for name, r in self.undefined.items()}
+        for name in once.values():  # in a loop the same mistake is made for each actor
+            reference = self.undefined[name]
             if name in heads:
                 what = f"`::=` is missing after `<{name}>`"
                 yield self.source.fault("E102", what, heads[name].span, f"`<{name}> ::= ...`")
@@ -267,8 +270,9 @@ class _Semantics:
             declared.setdefault(actor.name, actor.span)
 
     def unreachable(self) -> Iterator[Diagnostic]:
-        if self.headless():
-            return
+        recovered = {r.stage for r in self.parsed.task.recovered}
+        if self.headless() or recovered & self.undefined.keys():
+            return  # what follows such a failure is not reached either
         missing = {closest(u, self.grammar.stages) for u in self.undefined}
         misread = {
             str(n)
@@ -310,6 +314,7 @@ class _Semantics:
     def idle_actors(self) -> Iterator[Diagnostic]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
         named |= {m for a in named for m in machines_of(self.parsed.task, a)}
+        named |= {a for stage in self.undefined for a in re.findall(r"\w+", stage)}
         for actor in self.parsed.task.actors:
             if actor.span.file or actor.name in named:
                 continue  # an included file may define more than is used
@@ -327,7 +332,8 @@ def _is_misspelling(name: str, other: str) -> bool:
     """Whether one name is probably a misspelling of another; `arm1` is none of `arm2`."""
     if name == other or name.rstrip("0123456789_") == other.rstrip("0123456789_"):
         return False
-    return SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE
+    turned = len(name) > 3 and name[0] == other[0] and sorted(name) == sorted(other)
+    return turned or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE
 
 
 def _count(n: int, what: str) -> str:

@@ -11,7 +11,7 @@ from visup.rules.correction.everyday import NUMBERS
 from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.spelling import plain_call
-from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
+from visup.tasks.diagnostics.course_error_patterns import JOINING, SIGNS_MEANT, is_in_condition
 from visup.tasks.grammar.statement import NAME, PARAMETERS
 
 New = str | Callable[[re.Match[str]], str]
@@ -62,6 +62,12 @@ def _listed(word: str, stages: str) -> str:
     return f"{word} ({', '.join(stages.split())})"
 
 
+def _sign_once(match: re.Match[str]) -> str:
+    """A doubled sign of logic: a word in a condition, else the sign once."""
+    sign = match[0][0]
+    return JOINING[sign] if is_in_condition(match.string, match.start()) else sign
+
+
 def _action_meant(name: str) -> str:
     """The action meant by an everyday word; else the name itself."""
     return STAGES_MEANT.get(name) or synonym(name, ACTIONS) or name
@@ -78,6 +84,8 @@ USUAL = (
     usual("E101 E219 E103", rf"\(\s*({NAME})\s*;\s*({NAME})\s*\)", r"(\1, \2)"),
     usual("E238", rf"\bevery\s+({TIME})\s+to\s+({TIME})", r"every \2 to \1"),
     usual("E238", r"between\s+([\d.]+\s*\S+)\s+and\s+([\d.]+\s*\S+)", r"between \2 and \1"),
+    usual("E101 E103", rf"^\s*(?:do|must|should|shall|may|can)(?:\s*not|n't)\s+({NAME})(?=\s*\()",
+           lambda m: f"never {_action_meant(m[1])}"),
     usual("E103", rf"\bnot\s+({NAME})(?=\s*\()", lambda m: OPPOSITES.get(m[1], m[1])),
     usual("E103 E127", rf"\b(?:historically|always|once|eventually|globally|finally|next)\s+(?={CALL})", ""),
     usual("E103", rf"\b({NAME})(?=\s+(?:{CALL}|<))", lambda m: closest(m[1], PREFIXES) or m[1]),
@@ -119,7 +127,7 @@ USUAL = (
     usual("E101 E103 E119",
            rf"\bbetween\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|,|\.\.)\s*([\d.]+\s*[a-z%/]+)\s+({CALL})",
            r"\3 between \1 and \2"),
-    usual("E101 E103", rf"\b(\d+)\s+times\s+({PARTS})", r"(\2) at least \1 times at most \1 times"),
+    usual("E101 E103", rf"\b(\d+)\s*(?:times|x)\s+({PARTS})", r"(\2) at least \1 times at most \1 times"),
     usual("E127 E134", rf"\brepeat\s+({PARTS})\s+until\s+({PARTS})", r"\1+ \2"),
     usual("E101 E103 E134", r"\b(?:maximum|max|up\s+to|no\s+more\s+than)\s+(\d+)\s+times?\b",
            r"at most \1 times"),
@@ -153,7 +161,7 @@ USUAL = (
     usual("E115", r"\b(for|within|after)\b", r"\1 5 s"),
     usual("E120", r"\s*[.;]\s*$", ""),
     usual("E121", r"//|--|%|/\*", "#"),
-    usual("E122", r"&&|\|\|", lambda m: m[0][0]),
+    usual("E122", r"&&|\|\|", _sign_once),
     usual("E124", rf"\bactor\s+({NAME})\s+(?=\w)(?!is\b)", r"actor \1 is "),
     usual("E124", rf"\bactor\s+({NAME})\s*=\s*", r"actor \1 is "),
     usual("E124", rf"\bactor\s+({NAME})\s+is\s*$", r"actor \1 is \1"),
@@ -166,7 +174,7 @@ USUAL = (
     usual("E127", r"\s*\bperiodically\b", " every 5 s"),
     usual("E101", rf"\bevery\s+({TIME}(?:\s+to\s+{TIME})?)\s+({CALL})", r"\2 every \1"),
     usual("E101", r"\beach(?=\s+\d)", "every"),
-    usual("E101 E119 E116", r"(every [\d.]+)\s*\w*\s*(?:and|or|,|-|\.\.)\s*([\d.]+)\s*(\w+)",
+    usual("E101 E119 E116", r"((?:every|after) [\d.]+)\s*\w*\s*(?:and|or|,|-|\.\.)\s*([\d.]+)\s*(\w+)",
            r"\1 \3 to \2 \3"),
     usual("E208", r"\s*\bpauses\s+when\b.*$", ""),
     usual("E133", rf"\b({SIGN})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
@@ -231,7 +239,6 @@ USUAL = (
     usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),
     usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,[^()]*\)", r"\1(\2)"),
     usual("E206", rf"<({NAME})>\s*::=\s*<\1>\s*([^\n|]+)", r"<\1> ::= \2 <\1>?"),
-    usual("E211", rf"\b({NAME})\(\s*({NAME})\s*,\s*\2\s*\)", r"\1(\2, other)"),
     usual("E218", r"\b(?:seconds?|secs?|sec)\b", "s"),
     usual("E218", r"\b(?:minutes?|mins|m)\b", "min"),
     usual("E218", r"\b(?:pixels?|pix)\b", "px"),
@@ -245,6 +252,7 @@ USUAL = (
     usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px"),
     usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 s"),
     usual("E226", r"([\d.]+)\s*[a-z/%]+", r"\1 px/s"),
+    usual("E227", rf"\bsignal(\(\s*{NAME}\s*\))", r"signal_on\1"),
     usual("E227", rf"({CALL})", r"\1 < 5 px"),
     usual("E227", rf"({CALL})", r"\1 < 5 s"),
     usual("E227", rf"({CALL})", r"\1 < 5 px/s"),
@@ -278,7 +286,7 @@ _FAILURE = r"(?:failures?|fail(?:s|ed|ing)?|errors?)"
 _TARGET = rf"(?:stage\s+)?({CALL}|<\s*{NAME}\s*>|{NAME})"
 _RECOVERY = re.compile(
     rf"\bon[ _]?{_FAILURE}\b\s*(?:(?:of|in|at)\b\s*)?\(?(?:{_TARGET}\s*\)?\s*"
-    r"(?::|->|=>|\bdo\b|\bthen\b)|:)?\s*"
+    r"(?::|->|=>|\bdo\b|\bthen\b|(?=<))|:)?\s*"
     rf"|\b(?:if|when(?:ever)?|once)\s+{_TARGET}\s+(?:has\s+|is\s+)?{_FAILURE}\b\s*(?::|,|->|\bdo\b|\bthen\b)?\s*"
 )
 _STAGE = re.compile(rf"<\s*({NAME})\s*>\s*::=([^\n]*)")

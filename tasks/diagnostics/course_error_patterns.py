@@ -54,10 +54,21 @@ def action_in_angles(text: str) -> RecognisedError | None:
     return RecognisedError("E113", m.start(), len(m[0].rstrip("( ")), what, f"`{m[1]}(...)`")
 
 
+JOINING = {"&": "and", "|": "or"}
+
+
+def is_in_condition(text: str, at: int) -> bool:
+    """Whether an offset is behind `when`, or in an invariant, where conditions are joined by words."""
+    return re.search(r"\bwhen\b[^\n]*$|^\s*(?:never|always)\b[^\n]*$", text[:at]) is not None
+
+
 def operators(text: str) -> RecognisedError | None:
     """Operators of other languages."""
     m = re.search(r"\|\||&&", text)
     if m is not None:
+        if is_in_condition(text, m.start()):
+            what = f"`{m[0]}` is a word in conditions"
+            return RecognisedError("E122", m.start(), 2, what, f"`{JOINING[m[0][0]]}`")
         what = f"`{m[0]}` is written once in this language"
         return RecognisedError("E122", m.start(), 2, what, f"`{m[0][0]}`")
     m = re.search(r"(!|~|¬)(?=\s*[\w(<])", text)
@@ -122,6 +133,11 @@ def clause(text: str) -> RecognisedError | None:
             "E115", m.start(2), len(m[2]), "a duration is never negative", "a number and a unit"
         )
     m = re.search(r"\b(for|within|after|every)\b(?!\s*[\d-])(?!\s*\()", text)
+    if m is not None and re.match(r"for\s+each\b", text[m.start() :]):
+        expected = (
+            "such as `for each leg of (leg_1, leg_2)`, `for each of 4 legs` or `for each new leg`"
+        )
+        return RecognisedError("E115", m.start(1), 3, "`for each` is not complete", expected)
     if m is not None:
         what = f"`{m[1]}` is not followed by a duration"
         return RecognisedError("E115", m.start(1), len(m[1]), what, f"such as `{m[1]} 5 s`")

@@ -254,10 +254,10 @@ def test_names_that_are_unknown_are_compared_once_however_often_they_are_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Each edit that is tried meets all faults of its file anew: a damaged file of 12 kB so took 12 s."""
-    compared: list[str] = []
+    compared: list[tuple[str, str]] = []
 
     def counted(word: str, *given: object, **named: object) -> list[str]:
-        compared.append(word)
+        compared.append((word, str(given)))  # with the relations, or with the quantities
         return []
 
     monkeypatch.setattr(diagnostics, "get_close_matches", counted)

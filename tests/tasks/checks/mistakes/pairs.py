@@ -15,7 +15,7 @@ from tests.tasks.checks.mistakes.counted import Account, account_of, show, table
 from tests.tasks.checks.mistakes.mutations import Slip
 
 FOLDER = Path(__file__).parent / "newcomers"
-SETS = ("fifteenth", "sixteenth", "seventeenth")
+SETS = ("fifteenth", "sixteenth", "seventeenth", "eighteenth", "nineteenth")
 _PAIR = re.compile(r"\[\[(.*?)~>(.*?)\]\](?!\])", re.DOTALL)
 _BETWEEN = re.compile(r"^====\n", re.MULTILINE)
 
