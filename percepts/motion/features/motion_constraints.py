@@ -24,7 +24,7 @@ from visup.percepts.motion.features.work_image import Floats, WorkImage
 Ints = NDArray[np.int64]
 MARGIN = 3  # pixels at the border of the image where no point is taken
 CORNER = 0.1  # least ratio of the eigenvalues of a corner's structure tensor
-AGREED = 0.25  # pixels up to which dense flow and the search for a point agree
+AGREED = 0.25  # pixels up to which the expected place of a point and the search for it agree
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
 
@@ -203,15 +203,15 @@ def _back(
     """Positions of points tracked backward, (N, 1, 2), and their status, (N, 1).
 
     The backward track is nearly known, so it needs no coarse levels. It begins as far off as the guess
-    was, since a search that starts at its answer proves little. For the same reason points where dense
-    flow already agreed are not checked. Over a long baseline, where guesses are poor, the search begins
-    at the original point.
+    was, since a search that starts at its answer proves little. For the same reason points that were found
+    where they were expected, by dense flow or a known motion, are not checked. Over a long baseline, where
+    guesses are poor, the search begins at the original point.
     """
-    start = points.xy.reshape(-1, 1, 2)
-    aside = there - begin if near else np.zeros_like(there)
+    start, off = points.xy.reshape(-1, 1, 2), there - begin
+    aside = off if near else np.zeros_like(off)
     home, back = start.copy(), found.copy()
-    off = np.hypot(aside[..., 0], aside[..., 1]).ravel()
-    checked = np.flatnonzero((found.ravel() > 0) & ~(near & (off < AGREED)))
+    agreed = np.hypot(off[..., 0], off[..., 1]).ravel() < AGREED
+    checked = np.flatnonzero((found.ravel() > 0) & ~agreed)
     if len(checked):
         first = np.ascontiguousarray((start + aside)[checked])
         old, new = images

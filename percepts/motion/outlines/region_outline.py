@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Region
+from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
 HOLE = 0.08  # holes up to this share of the region's area are filled
@@ -142,9 +143,24 @@ def component_areas(mask: NDArray[np.uint8], labels: NDArray[Any], count: int) -
         count: Number of labels.
     """
     if count > 2:
-        return np.bincount(labels.ravel(), minlength=count)
+        return label_areas(labels, count)
     inside = cv2.countNonZero(mask)
     return np.array([mask.size - inside, inside])[:count]
+
+
+@compiled
+def label_areas(labels: NDArray[np.int32], count: int) -> NDArray[np.int64]:
+    """Pixels of each of `count` labels, (count,)."""
+    out = np.zeros(count, np.int64)
+    for y in range(labels.shape[0]):
+        # Run by run: to add to one place again and again is slow.
+        label, begin = labels[y, 0], 0
+        for x in range(labels.shape[1]):
+            if labels[y, x] != label:
+                out[label] += x - begin
+                label, begin = labels[y, x], x
+        out[label] += labels.shape[1] - begin
+    return out
 
 
 def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
 Mask = NDArray[np.bool_]
+FIRST_S = 0.01  # how long a background counts as seen after a single image, seconds
 
 
 class BackgroundPlanes(NamedTuple):
@@ -148,25 +149,24 @@ def pixels_near_sure_ones(
 
 @compiled
 def update_planes(
-    known: BackgroundPlanes, image: Floats, moving: Mask, gone: Mask, pace: LearningRates
-) -> BackgroundPlanes:
-    """The background model after one more (h, w, 3) image.
+    planes: BackgroundPlanes, image: Floats, moving: Mask, gone: Mask, pace: LearningRates
+) -> None:
+    """Update the background model with one more (h, w, 3) image, in place.
 
     Args:
-        known: The previous model.
+        planes: The model.
         image: The image.
         moving: (h, w) where objects are reported: there the background is replaced less easily.
         gone: (h, w) where an object that was part of the background has left.
         pace: Learning rates.
     """
+    mean, other = planes.mean, planes.other
+    variance, seen_s, other_s = planes.variance, planes.seen_s, planes.other_s
     height, width = moving.shape
-    mean, other = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
-    variance, seen_s = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
-    other_s = np.empty((height, width), np.float32)
     for y in range(height):
         for x in range(width):
-            spread, seen, instead = known.variance[y, x], known.seen_s[y, x], known.other_s[y, x]
-            off = _squared_distance(image, known.mean, y, x) / (np.float32(3) * spread)
+            spread, seen, instead = variance[y, x], seen_s[y, x], other_s[y, x]
+            off = _squared_distance(image, mean, y, x) / (np.float32(3) * spread)
             moves, is_known = moving[y, x], seen > 0
             fits = off < pace.fits and not moves and is_known
             away = is_known and not fits
@@ -174,11 +174,11 @@ def update_planes(
             weight = weight if fits else np.float32(0)
             step = np.float32(0)
             if away:
-                alike = _squared_distance(image, known.other, y, x) < pace.alike
+                alike = _squared_distance(image, other, y, x) < pace.alike
                 step = np.float32(0.3 if alike else 1.0)
                 instead = instead + pace.seconds if alike else pace.seconds
             for i in range(3):
-                now, old, before = image[y, x, i], known.mean[y, x, i], known.other[y, x, i]
+                now, old, before = image[y, x, i], mean[y, x, i], other[y, x, i]
                 mean[y, x, i] = old + weight * (now - old)
                 other[y, x, i] = before + step * (now - before)
             # Leaves and water vary strongly and return; a single passing object has little effect.
@@ -194,7 +194,43 @@ def update_planes(
             if instead > enough or (gone[y, x] and is_known):
                 mean[y, x] = other[y, x]
                 variance[y, x], seen_s[y, x], other_s[y, x] = 2 * pace.least, instead, 0.0
-    return BackgroundPlanes(mean, variance, seen_s, other, other_s)
+
+
+@compiled
+def reveal_planes(planes: BackgroundPlanes, image: Floats, bare: Mask, start: float) -> None:
+    """Initialise the background, in place, from a (h, w, 3) image where it was unknown.
+
+    Args:
+        planes: The model.
+        image: The image.
+        bare: (h, w) where no object hides the background.
+        start: Initial variance.
+    """
+    height, width = bare.shape
+    for y in range(height):
+        for x in range(width):
+            if bare[y, x] and planes.seen_s[y, x] <= 0:
+                planes.mean[y, x], planes.other[y, x] = image[y, x], image[y, x]
+                planes.variance[y, x], planes.seen_s[y, x] = start, FIRST_S
+                planes.other_s[y, x] = 0.0
+
+
+@compiled
+def has_exposure(image: Floats, mean: Floats, step: int, even: float) -> bool:
+    """Whether most sampled pixels are less than a share brighter or darker than the background, in each channel.
+
+    Then so is their median, which takes ten times as long to find.
+    """
+    least, most = np.float32(1 - even), np.float32(1 + even)
+    for i in range(3):
+        dark, bright, number = 0, 0, 0
+        for y in range(0, mean.shape[0], step):
+            for x in range(0, mean.shape[1], step):
+                ratio = (image[y, x, i] + np.float32(1)) / (mean[y, x, i] + np.float32(1))
+                dark, bright, number = dark + (ratio <= least), bright + (ratio >= most), number + 1
+        if 2 * (max(dark, bright) + 1) >= number:
+            return False
+    return True
 
 
 @compiled

@@ -11,6 +11,7 @@ from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
 MOST = 60.0  # greatest cost of a pixel, grey levels
+ROUNDING = 1e-6  # by which the cost of a part of the pixels may seem to exceed that of all
 
 
 @compiled
@@ -37,24 +38,57 @@ def best_shift(
     Returns:
         The cost, grey levels, and the shift (x, y); the first one of equal costs.
     """
-    height, width = free.shape
+    numbers = np.zeros((step, step), np.int64)
+    for j in range(shape.shape[0]):
+        for i in range(shape.shape[1]):
+            numbers[j % step, i % step] += shape[j, i]
+    compared = numbers.max()
+    # No shift that costs more than none at all can be the best.
+    bound = _cost(image, free, shape, tone, corner, (step, compared, np.inf))
     best, best_x, best_y = np.inf, 0, 0
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
-            left, top = corner[0] + dx, corner[1] + dy
-            total, number = 0.0, 0
-            for j in range(max(-top, 0), min(shape.shape[0], height - top), step):
-                for i in range(max(-left, 0), min(shape.shape[1], width - left), step):
-                    if not shape[j, i]:
-                        continue
-                    y, x = top + j, left + i
-                    gap = abs(image[y, x, 0] - tone[j, i, 0])
-                    gap += abs(image[y, x, 1] - tone[j, i, 1])
-                    gap += abs(image[y, x, 2] - tone[j, i, 2])
-                    total += MOST - (MOST - min(gap / 3, MOST)) * free[y, x]
-                    number += 1
-            if number:
-                cost = total / number + 0.5 * hypot(dx, dy)
-                if cost < best:
-                    best, best_x, best_y = cost, dx, dy
+            far, place = 0.5 * hypot(dx, dy), (corner[0] + dx, corner[1] + dy)
+            cost = far + _cost(image, free, shape, tone, place, (step, compared, bound - far))
+            if cost < best:
+                best, best_x, best_y = cost, dx, dy
+                bound = min(bound, best)
     return best, best_x, best_y
+
+
+@compiled
+def _cost(
+    image: Floats,
+    free: Floats,
+    shape: NDArray[np.bool_],
+    tone: Floats,
+    corner: tuple[int, int],
+    limits: tuple[int, int, float],
+) -> float:
+    """Mean cost of the pixels of a template in one place; infinite when it has none in the image.
+
+    Args:
+        image: As in `best_shift`, as are the next four.
+        free: How far each pixel is free.
+        shape: The template.
+        tone: Its tones.
+        corner: Its place.
+        limits: Stride; most pixels that are compared; a cost above which only some greater one is returned.
+    """
+    step, compared, bound = limits
+    height, width = free.shape
+    left, top = corner
+    total, number = 0.0, 0
+    for j in range(max(-top, 0), min(shape.shape[0], height - top), step):
+        for i in range(max(-left, 0), min(shape.shape[1], width - left), step):
+            if not shape[j, i]:
+                continue
+            y, x = top + j, left + i
+            gap = abs(image[y, x, 0] - tone[j, i, 0])
+            gap += abs(image[y, x, 1] - tone[j, i, 1])
+            gap += abs(image[y, x, 2] - tone[j, i, 2])
+            total += MOST - (MOST - min(gap / 3, MOST)) * free[y, x]
+            number += 1
+        if total > (bound + ROUNDING) * compared:
+            return np.inf
+    return total / number if number else np.inf

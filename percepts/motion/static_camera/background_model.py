@@ -18,12 +18,15 @@ from numpy.typing import NDArray
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera._background_model_jit import (
+    FIRST_S,
     BackgroundPlanes,
     LearningRates,
     ShadowLimits,
     foreground_pixels,
+    has_exposure,
     normalised_distances,
     pixels_near_sure_ones,
+    reveal_planes,
     shadow_pixels,
     update_planes,
 )
@@ -38,13 +41,14 @@ SHADE = 0.6  # least brightness in a shadow, as a share of the background's
 HUE = 0.055  # greatest difference of colour in a shadow, as a share of brightness
 RARE = 10.0  # squared distance, in variances, at which a pixel's effect on the variance is clipped
 EVEN = 0.03  # relative change of exposure that is ignored
+SAMPLED = 4  # every how many pixels along x and y the exposure is estimated from
 LIT = 1.12  # greatest brightness in reflected light, as a share of the background's
 CAST = ShadowLimits(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
-    """State of the background model.
+    """State of the background model; its arrays are its own, and updated in place.
 
     Attributes:
         mean: (h, w, 3) float32, background tone, grey levels.
@@ -64,7 +68,9 @@ class BackgroundModel:
 def initial_model(image: Floats) -> BackgroundModel:
     """The model after a single (h, w, 3) image."""
     bare = np.zeros(image.shape[:2], np.float32)
-    return BackgroundModel(image, bare + NOISE**2, bare + 0.01, image, bare)
+    return BackgroundModel(
+        image.copy(), bare + NOISE**2, bare + np.float32(FIRST_S), image.copy(), bare
+    )
 
 
 def with_unknown(background: BackgroundModel, where: Mask) -> BackgroundModel:
@@ -72,16 +78,9 @@ def with_unknown(background: BackgroundModel, where: Mask) -> BackgroundModel:
     return replace(background, seen_s=np.where(where, 0, background.seen_s).astype(np.float32))
 
 
-def with_revealed(background: BackgroundModel, image: Floats, bare: Mask) -> BackgroundModel:
-    """The background, initialised from an image where it was unknown and no object hides it."""
-    new = bare & (background.seen_s <= 0)
-    if not new.any():
-        return background
-    fresh = initial_model(image)
-    planes = [getattr(background, f.name).copy() for f in fields(background)]
-    for plane, f in zip(planes, fields(background), strict=True):
-        plane[new] = getattr(fresh, f.name)[new]
-    return BackgroundModel(*planes)
+def reveal_background(background: BackgroundModel, image: Floats, bare: Mask) -> None:
+    """Initialise the background, in place, from an image where it was unknown and no object hides it."""
+    reveal_planes(_planes(background), image, bare, NOISE**2)
 
 
 def shadow_mask(background: BackgroundModel, image: Floats) -> Mask:
@@ -105,18 +104,15 @@ def update_background(
     moving: Mask,
     seconds: float,
     gone: Mask | None = None,
-) -> BackgroundModel:
-    """The background after one more image.
+) -> None:
+    """Update the background, in place, with one more image.
 
     Args:
-        background: The previous model.
+        background: The model.
         image: (h, w, 3) float32.
         moving: (h, w) bool, where objects are reported: there the background is replaced less easily.
         seconds: Since the last image.
         gone: (h, w) bool, where an object that was part of the background has left: it is forgotten.
-
-    Returns:
-        The new background.
     """
     pace = LearningRates(
         seconds,
@@ -128,11 +124,12 @@ def update_background(
         (8 * NOISE) ** 2,
         3 * (FAR * NOISE) ** 2,
     )
-    known = BackgroundPlanes(*(getattr(background, f.name) for f in fields(background)))
     nowhere = np.zeros(moving.shape, dtype=bool)
-    return BackgroundModel(
-        *update_planes(known, image, moving, nowhere if gone is None else gone, pace)
-    )
+    update_planes(_planes(background), image, moving, nowhere if gone is None else gone, pace)
+
+
+def _planes(background: BackgroundModel) -> BackgroundPlanes:
+    return BackgroundPlanes(*(getattr(background, f.name) for f in fields(background)))
 
 
 def edge_strength(image: Floats, box: tuple[int, int, int, int]) -> Floats:
@@ -146,8 +143,9 @@ def edge_strength(image: Floats, box: tuple[int, int, int, int]) -> Floats:
 
 def match_exposure(background: BackgroundModel, image: Floats) -> BackgroundModel:
     """The background at the exposure of an image, estimated as the median ratio of tones."""
-    step = 4
-    rest, now = background.mean[::step, ::step], image[::step, ::step]
+    if has_exposure(image, background.mean, SAMPLED, EVEN):
+        return background
+    rest, now = background.mean[::SAMPLED, ::SAMPLED], image[::SAMPLED, ::SAMPLED]
     ratio = np.median((now + 1.0) / (rest + 1.0), axis=(0, 1))
     if np.abs(ratio - 1).max() < EVEN:
         return background

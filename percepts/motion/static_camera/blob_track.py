@@ -106,7 +106,7 @@ def find_blobs(
 ) -> Foreground:
     """Foreground blobs of at least `least` pixels, with small gaps closed and holes filled."""
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 5))
-    closed = cv2.morphologyEx(change.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+    closed = cv2.morphologyEx(change.view(np.uint8), cv2.MORPH_CLOSE, kernel)
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     filled = np.zeros(closed.shape, np.uint8)
     cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
@@ -114,7 +114,7 @@ def find_blobs(
     keep = component_areas(filled, labels, count) >= least
     keep[0] = False
     number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
-    return Foreground(image, number[labels], int(keep.sum()), time, seconds)
+    return Foreground(image, np.take(number, labels), int(keep.sum()), time, seconds)
 
 
 def template_window(

@@ -16,6 +16,7 @@ from scipy.optimize import linear_sum_assignment
 
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.outlines.region_outline import label_areas
 from visup.percepts.motion.static_camera.blob_track import (
     BlobTrack,
     BlobTracks,
@@ -94,7 +95,7 @@ def _predicted(s: BlobTrack, seconds: float) -> BlobTrack:
 
 def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
     """The blobs that each object claims by its prediction; otherwise a free one by assignment."""
-    areas = np.bincount(view.labels.ravel(), minlength=view.count + 1)
+    areas = label_areas(view.labels, view.count + 1)
     claims: list[list[int]] = []
     for s in ahead:
         at, own = template_window(s, view.labels.shape)

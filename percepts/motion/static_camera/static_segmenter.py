@@ -22,8 +22,8 @@ from visup.percepts.motion.static_camera.background_model import (
     foreground_mask,
     initial_model,
     match_exposure,
+    reveal_background,
     update_background,
-    with_revealed,
     with_unknown,
 )
 from visup.percepts.motion.static_camera.blob_filters import is_deep_shadow, is_ghost, merge_parts
@@ -147,7 +147,8 @@ class StaticCameraSegmenter:
                 swept = swept_mask(here, r, age, shape[1] / frame.size[0])
                 background = with_unknown(background, swept & ~here & change)
         reported = region_mask(regions, frame.size, shape)
-        self._background = with_revealed(background, image, ~reported)
+        self._background = background
+        reveal_background(background, image, ~reported)
 
     def _is_static(self, static: bool | None, seconds: float) -> bool:
         """Whether the camera is static, as far as known; otherwise the state is reset."""
@@ -180,9 +181,9 @@ class StaticCameraSegmenter:
         known = tuple(s for s in known if s not in ghosts)
         reported = blob_mask([s for s in known if s.id], change.shape)
         protected = (cv2.dilate(reported.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
-        self._background = update_background(
-            background, image, protected, seconds, blob_mask(ghosts, change.shape)
-        )
+        self._background = background
+        gone = blob_mask(ghosts, change.shape) if ghosts else None
+        update_background(background, image, protected, seconds, gone)
         self._tracks = tuple(
             s
             for s in known
