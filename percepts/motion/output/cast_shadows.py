@@ -40,6 +40,7 @@ OTHER_TEXTURE = 0.2  # correlation below which it does not
 BARE_EVEN, BARE_HUE = 1.25, 0.03  # the same limits where the ground has no texture
 FOR, AGAINST = 1.0, 1.5  # weight of a frame
 BOUNDS = (-6.0, 3.0)
+TURNS = 4  # frames from one look to the next at a region that is certainly none
 SURE = 2.0  # evidence from which a region counts as a shadow
 STEP_PX = 0.5  # the ground is warped where it is off by this much: each warp blurs it
 MOST = 256  # most regions with stored evidence
@@ -70,6 +71,7 @@ class CastShadowFilter:
     def __init__(self) -> None:
         self._ground: BareGround | None = None
         self._evidence: dict[int, float] = {}
+        self._frames = 0
 
     def step(
         self,
@@ -92,6 +94,7 @@ class CastShadowFilter:
         Returns:
             The remaining regions, in the same order.
         """
+        self._frames += 1
         ground = self._ground
         if ground is None or ground.bare.shape != image.shape:
             nowhere = np.full_like(image, np.nan)
@@ -100,7 +103,10 @@ class CastShadowFilter:
         if not static:
             ground = _aligned(ground, scene)
         for r in regions:
-            self._weigh(r, image, ground, frame)
+            # What has long been no shadow is looked at in turn with others.
+            settled = self._evidence.get(r.id, 0.0) <= BOUNDS[0]
+            if not settled or (self._frames + r.id) % TURNS == 0:
+                self._weigh(r, image, ground, frame)
         if frame.time - ground.since >= DELAY_S:
             ground = _updated(ground, image, _covered(regions, frame, image), frame.time)
         self._ground = ground

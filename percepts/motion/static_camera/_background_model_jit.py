@@ -217,9 +217,9 @@ def reveal_planes(planes: BackgroundPlanes, image: Floats, bare: Mask, start: fl
 
 @compiled
 def has_exposure(image: Floats, mean: Floats, step: int, even: float) -> bool:
-    """Whether most sampled pixels are less than a share brighter or darker than the background, in each channel.
+    """Whether most sampled pixels are about as bright as the background, in each channel.
 
-    Then so is their median, which takes ten times as long to find.
+    They are at most a share `even` brighter or darker; then so is their median, which takes longer to find.
     """
     least, most = np.float32(1 - even), np.float32(1 + even)
     for i in range(3):

@@ -164,7 +164,8 @@ def update(
     at = labelling.winner[scene.at]
     out = []
     for k, t in enumerate(tracks, 1):
-        gain = np.clip(likelihood[:, k] - likelihood[:, 0], -CLIP, CLIP)[at == k]
+        own = likelihood[at == k]
+        gain = np.clip(own[:, k] - own[:, 0], -CLIP, CLIP)
         t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
         out.append(update_track(t, k, labelling, scene.cells, scene.time, least))
     return tuple(out)

@@ -82,8 +82,16 @@ class FrameMeasurements:
         return {}
 
     def cell_of(self, c: Constraints) -> NDArray[np.int32]:
-        """Number of the superpixel at each constraint."""
-        return np.asarray(self.at[c.index])
+        """Number of the superpixel at each constraint; cached, since each track asks for it."""
+        known = self._cells_of.get(id(c))
+        if known is None:
+            known = self._cells_of[id(c)] = c, np.asarray(self.at[c.index])
+        return known[1]
+
+    @cached_property
+    def _cells_of(self) -> dict[int, tuple[Constraints, NDArray[np.int32]]]:
+        """The constraints, so that none takes the number of others, and their superpixels."""
+        return {}
 
 
 def min_region_area(scene: FrameMeasurements, settings: MotionSettings) -> float:

@@ -115,9 +115,9 @@ def split_occluded(tracks: Tracks, scene: FrameMeasurements, winner: Indices) ->
         if not t.id or not t.mostly_occluded or t.occluded is None:
             continue
         there = scene.cells.mean(t.occluded) > 0.5
-        for k, o in enumerate(tracks):
-            claimed = there & (winner == k + 1)
-            if k != j and claimed.any() and _moves_as(t, o, claimed, scene):
+        for label in np.unique(winner[there]).tolist():
+            k, claimed = label - 1, there & (winner == label)
+            if 0 <= k < len(tracks) and k != j and _moves_as(t, tracks[k], claimed, scene):
                 out[j] = replace(
                     out[j], share=np.where(claimed, 1, out[j].share).astype(np.float32)
                 )
@@ -169,7 +169,6 @@ def merge_tracks(
     grown = _without_edge_between(scene, winner, len(tracks))
     seen = members.any(axis=0)
     touch = (touch | touch.T) & seen & seen[:, None]
-    moving = _moving(scene, members)
     out = _with_separation_time(tracks, (seen & seen[:, None]) & ~touch, scene.seconds)
     for j in range(len(tracks) - 1, 0, -1):
         for i in np.flatnonzero(touch[:j, j]):
@@ -182,8 +181,7 @@ def merge_tracks(
             if grown[i, j] or inside[i, j] or inside[j, i]:
                 votes += 1.0
             else:
-                both = tuple(bool(m[i] and m[j]) for m in moving)
-                votes += _vote(scene, a, members[:, i], members[:, j], both)
+                votes += _vote(scene, a, members[:, i], members[:, j])
             votes = max(votes, -VOTES)
             out[i] = replace(a, merge_votes=_with(a.merge_votes, b.key, votes))
             if votes >= VOTES:
@@ -227,18 +225,17 @@ def _vote(
     a: Track,
     in_a: NDArray[np.bool_],
     in_b: NDArray[np.bool_],
-    moving: tuple[bool, ...],
 ) -> float:
     votes = 0.0
-    for m, both in zip(scene.measured, moving, strict=True):
+    for m in scene.measured:
         c = m.constraints
         if c.lag == 1 and len(scene.measured) > 1:
             continue
         at = scene.cell_of(c)
-        start = scene.parts(a, c)[0]
         mine, other = in_a[at], in_b[at]
-        if not both:
+        if not (_moves(m, mine) and _moves(m, other)):
             continue
+        start = scene.parts(a, c)[0]
         same = same_motion(c, mine, other, start, layer_slack(start, a.centre))
         votes += 0.0 if same is None else (1.0 if same else -1.0)
     return votes
@@ -256,14 +253,6 @@ def _without_edge_between(
     out = np.zeros((count, count), dtype=bool)
     out[a[both], b[both]] = True
     return out
-
-
-def _moving(scene: FrameMeasurements, members: NDArray[np.bool_]) -> list[list[bool]]:
-    """Which of K tracks with (count, K) members move measurably, over each baseline."""
-    return [
-        [_moves(m, mine) for mine in members[scene.cell_of(m.constraints)].T]
-        for m in scene.measured
-    ]
 
 
 def _moves(m: BaselineMotion, which: NDArray[np.bool_]) -> bool:

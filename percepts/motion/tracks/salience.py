@@ -67,8 +67,9 @@ def update_salience(
     adjacent = scene.cells.dilated(members, 1)
     rings = scene.cells.dilated(adjacent, RING_STEPS - 1) & ~adjacent & (winner == 0)[:, None]
     ring_of = dict(zip(young, rings.T, strict=True))
+    shares = [_shares_explained(m, scene, winner, len(tracks)) for m in scene.measured]
     return tuple(
-        _confirmed_updated(t, k, scene, winner)
+        _confirmed_updated(t, k, scene, winner, [by_track[k] for by_track in shares])
         if t.id
         else _candidate_updated(t, k, scene, winner, ring_of[k])
         for k, t in enumerate(tracks, 1)
@@ -104,13 +105,25 @@ def has_absorbed_background(t: Track, scene: FrameMeasurements) -> bool:
     return rests_always and area > GROWN * max(t.moving_area, 1.0)
 
 
-def _confirmed_updated(t: Track, k: int, scene: FrameMeasurements, winner: Indices) -> Track:
+def _shares_explained(
+    m: BaselineMotion, scene: FrameMeasurements, winner: Indices, count: int
+) -> list[float | None]:
+    """Share of the constraints of each label that the background explains; None where they are few."""
+    at = winner[scene.cell_of(m.constraints)]
+    number = np.bincount(at, minlength=count + 2)
+    fits = np.bincount(at[m.background.distances(m.constraints) < FITS], minlength=count + 2)
+    pairs = zip(fits.tolist(), number.tolist(), strict=True)
+    return [fit / all_ if all_ >= FEWEST else None for fit, all_ in pairs]
+
+
+def _confirmed_updated(
+    t: Track, k: int, scene: FrameMeasurements, winner: Indices, shares: Sequence[float | None]
+) -> Track:
     """Record how well the background explains an object, over each baseline."""
     explained = dict(t.background_fit)
-    for m in scene.measured:
-        mine = winner[scene.cell_of(m.constraints)] == k
-        if np.count_nonzero(mine) >= FEWEST:
-            _note(explained, m, m.background.distances(m.constraints)[mine])
+    for m, share in zip(scene.measured, shares, strict=True):
+        if share is not None:
+            _note(explained, m, share)
     area = t.moving_area
     if min(explained.values(), default=1.0) < EXPLAINED:
         area = float(scene.cells.area[winner == k].sum())
@@ -131,7 +144,8 @@ def _candidate_updated(
             if model is not None
         )
         if np.count_nonzero(mine) >= FEWEST:
-            _note(explained, m, _misfit(m, local, np.flatnonzero(mine)))
+            misfit = _misfit(m, local, np.flatnonzero(mine))
+            _note(explained, m, float(np.mean(misfit < FITS)))
         if m is scene.measured[0]:
             t = _with_step(t, m, local, scene)
         _note_course(borne, t, m, local, scene)
@@ -168,9 +182,8 @@ def _note_course(
     borne[_octave(m)] = float(np.hypot(*net)) / max(way, 1e-6)
 
 
-def _note(explained: dict[int, float], m: BaselineMotion, misfit: NDArray[np.float32]) -> None:
+def _note(explained: dict[int, float], m: BaselineMotion, share: float) -> None:
     """Update the running share of explained points over a baseline."""
-    share = float(np.mean(misfit < FITS))
     before = explained.get(_octave(m), share)
     explained[_octave(m)] = before + FOLLOW * (share - before)
 

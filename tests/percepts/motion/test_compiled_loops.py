@@ -22,8 +22,10 @@ from visup.percepts.motion.layers._affine_jit import (
     reweighted_least_squares,
     squared_misfits,
 )
+from visup.percepts.motion.static_camera._background_model_jit import has_exposure
 from visup.percepts.motion.static_camera._templates_jit import best_shift
 from visup.percepts.motion.static_camera.background_model import (
+    EVEN,
     FAR,
     NOISE,
     RARE,
@@ -102,6 +104,20 @@ def test_the_picture_learns_pixel_by_pixel_as_it_does_image_by_image(seed: int) 
     update_background(known, image, moving, seconds, gone)
     for f in fields(known):
         assert np.allclose(getattr(known, f.name), getattr(expected, f.name), atol=1e-3), f.name
+
+
+@given(st.integers(0, 999), st.floats(0.9, 1.1))
+@settings(deadline=None, max_examples=30)
+def test_exposure_that_is_told_to_be_even_has_an_even_median(seed: int, gain: float) -> None:
+    rng = np.random.default_rng(seed)
+    mean = rng.integers(0, 250, (*SHAPE, 3)).astype(np.float32)
+    image = (gain * mean + rng.normal(0, 2, mean.shape)).astype(np.float32)
+    ratio = (image[::4, ::4] + 1) / (mean[::4, ::4] + 1)
+    off = np.abs(np.median(ratio, axis=(0, 1)) - 1).max()
+    if has_exposure(image, mean, 4, EVEN):
+        assert off < EVEN
+    if abs(gain - 1) > 0.06:
+        assert not has_exposure(image, mean, 4, EVEN)
 
 
 def slowly_learnt(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -10,8 +12,11 @@ from hypothesis import strategies as st
 
 from tests.percepts.motion.clips import texture
 from visup.agent import Frame
+from visup.percepts.motion.outlines.region_outline import describe_mask
+from visup.percepts.motion.output import cast_shadows
 from visup.percepts.motion.output.cast_shadows import (
     BareGround,
+    CastShadowFilter,
     _bare_part,
     comparable_image,
     shadow_evidence,
@@ -85,3 +90,22 @@ def test_a_smaller_image_has_the_tones_of_the_frame(size: tuple[int, int]) -> No
     assert max(found.shape[:2]) <= 384
     back = cv2.resize(found, size, interpolation=cv2.INTER_LINEAR)
     assert np.abs(back - frame).mean() < 3
+
+
+def test_what_is_certainly_no_shadow_is_looked_at_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks: list[int] = []
+
+    def opaque(*_: object) -> float:
+        looks.append(0)
+        return -1.5
+
+    monkeypatch.setattr(cast_shadows, "shadow_evidence", opaque)
+    region = describe_mask(WHERE, (0, 0), SHAPE[::-1]).region(1, (0.0, 0.0), 1.0, 1.0)
+    shadows, image = CastShadowFilter(), np.zeros((*SHAPE, 3), np.uint8)
+    unused: Any = None  # before a static camera the measurements are not asked for
+    for n in range(41):
+        frame = Frame(n, n / 25, image)
+        small = comparable_image(frame)
+        assert shadows.step(frame, small, unused, [region], static=True) == (region,)
+    # In four frames the evidence is as low as it can be; a fourth of the other 36.
+    assert len(looks) == 4 + 9
