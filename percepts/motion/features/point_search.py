@@ -21,7 +21,6 @@ STEPS_FAR = (
 NEARBY = (
     1.0  # pixels; within 2, one point in ten more is found, and more of them differ from OpenCV's
 )
-MOST_WIDELY = 250  # most points over a long baseline that are searched for beyond that
 Found = tuple[Floats, NDArray[np.uint8], Floats]
 
 __all__ = ["WINDOW", "search", "search_widely"]
@@ -37,8 +36,7 @@ def search(
         target: The image to search.
         start: (N, 1, 2) float32, their positions, whole pixels.
         begin: (N, 1, 2) float32, where they are expected.
-        levels: Levels of a pyramid, besides the image itself, for points that are not found nearby; over a
-            long baseline for some evenly spread ones, so that the time of a frame stays bounded.
+        levels: Levels of a pyramid, besides the image itself, for points that are not found nearby.
         near: Whether the images are adjacent: then fewer iterations do.
 
     Returns:
@@ -50,8 +48,6 @@ def search(
     end, nearby, misfit = search_nearby(own, target.grey, start[:, 0], begin[:, 0], limits)
     end, found, misfit = end[:, None], nearby.astype(np.uint8)[:, None], misfit[:, None]
     rest = np.flatnonzero(~nearby)
-    if not near:
-        rest = rest[:: max(1, -(-len(rest) // MOST_WIDELY))]
     if len(rest):
         end[rest], found[rest], misfit[rest] = search_widely(
             source, target, start[rest], begin[rest], levels, near=near

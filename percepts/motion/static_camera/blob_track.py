@@ -114,7 +114,7 @@ def find_blobs(
     keep = component_areas(filled, labels, count) >= least
     keep[0] = False
     number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
-    return Foreground(image, np.take(number, labels), int(keep.sum()), time, seconds)
+    return Foreground(image, number[labels], int(keep.sum()), time, seconds)
 
 
 def template_window(

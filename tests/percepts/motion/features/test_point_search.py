@@ -17,12 +17,7 @@ from visup.percepts.motion.features._point_search_jit import (
     search_nearby,
 )
 from visup.percepts.motion.features.motion_constraints import find_points
-from visup.percepts.motion.features.point_search import (
-    MOST_WIDELY,
-    NEARBY,
-    search,
-    search_widely,
-)
+from visup.percepts.motion.features.point_search import NEARBY, search, search_widely
 from visup.percepts.motion.features.work_image import WorkImage, prepare_image
 
 SHAPE = (96, 128)
@@ -136,13 +131,3 @@ def window(image: NDArray[np.uint8], at: NDArray[np.float64]) -> NDArray[np.floa
 def inside(at: NDArray[np.floating]) -> bool:
     height, width = SHAPE
     return bool(HALF <= at[0] < width - HALF - 1 and HALF <= at[1] < height - HALF - 1)
-
-
-def test_over_a_long_baseline_only_some_points_are_searched_for_widely() -> None:
-    source, target = moved(3, (4.0, 0.0))
-    start = np.tile(points_in(source)[:, None], (6, 1, 1))
-    assert len(start) > 2 * MOST_WIDELY
-    # Expected where they were, and so all further away than is searched nearby.
-    for near, fewest, most in ((True, 0.5 * len(start), len(start)), (False, 1, MOST_WIDELY)):
-        _, found, _ = search(source, target, start, start.copy(), 2, near=near)
-        assert fewest <= np.count_nonzero(found) <= most
