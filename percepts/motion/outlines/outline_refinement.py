@@ -1,30 +1,47 @@
 """Outline refinement: pixels near an outline are reassigned to the side whose tones they resemble.
 
 Cells are several pixels wide, and some lie across the border of an object: a dark sky, a gap between
-legs. Along the outline, the tones inside and outside are described by local mean and variance, and
-nearby pixels are reclassified (after Lankton and Tannenbaum, Localizing region-based active contours,
-2008, with local Gaussians as in Wang, He, Mishra and Li, 2009). Where both sides look alike nothing
-changes.
+legs. Two descriptions of either side say to which a pixel belongs: mean and variance of tones in a
+window (after Lankton and Tannenbaum, Localizing region-based active contours, 2008, with local Gaussians
+as in Wang, He, Mishra and Li, 2009), and histograms of the colours of the object and of what surrounds it
+(pixel-wise posteriors, Bibby and Reid 2008). Neighbours that look alike pull each other to one side, so
+that the border comes to lie where tones change (the energy of Rother, Kolmogorov and Blake, GrabCut,
+2004, by mean field instead of a cut). Since both descriptions hang on the outline, all is done twice.
+Where both sides look alike hardly anything changes.
 """
 
 from __future__ import annotations
-
-from math import exp, log
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.outlines._outline_refinement_jit import (
+    Places,
+    histogram_log_odds,
+    likeness_of_neighbours,
+    mean_field,
+    places_of,
+    window_log_odds,
+)
 
+ROUNDS = 2  # times that the sides are described and the outline is moved
 WINDOW = 21  # pixels: side of the window whose tones are compared
 SAMPLED = (WINDOW // 2 + 1, WINDOW // 2 + 1)  # the same in the image at half the size
 BAND = 5  # pixels from the outline within which pixels may change sides
+RING = 12  # pixels beyond the outline that count as surroundings
 LEAST = 0.08  # share of the window that each side must fill
 NOISE = 6.0  # least standard deviation of tones
+MOST = 3.0  # log odds that either description may give to a pixel at most
+LOCAL = 2.0  # weight of the log odds by tones in the window
+COLOURS = 1.5  # weight of the log odds by colours
 STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
-MOST = 3.0  # log odds that tones may add to a pixel at most
+ALIKE = 16.0  # log odds that a neighbour just alike and sure of its side adds
+SWEEPS = 3  # passes of mean field in a round
+Means = tuple[Floats, Floats]
+"""(h / 2, w / 2, 3) means of tones in windows, and of their squares."""
+
 CONTEXT = WINDOW // 2 + BAND
 """Margin around the object that a crop for refinement needs, pixels."""
 
@@ -39,93 +56,62 @@ def refine_outline(share: Floats, tone: NDArray[np.uint8]) -> Floats:
     Returns:
         (h, w) float32; above one half inside.
     """
-    odds = inside_log_odds(share, tone)
-    if not odds.any():
-        return share
-    return _with_odds(
-        share, odds, np.asarray(cv2.GaussianBlur(odds, (3, 3), 0.8), dtype=np.float32)
-    )
+    every = window_means(_halved(tone))
+    for _ in range(ROUNDS):
+        inside = (share > 0.5).view(np.uint8)
+        near = places_of(_grown(inside, BAND) != _shrunk(inside, BAND))
+        if not len(near):
+            return share
+        local = local_log_odds(inside, near, tone, every)
+        colours = histogram_log_odds(near, inside, _grown(inside, RING), tone, MOST)
+        known = np.clip(share[near[:, 0], near[:, 1]], 0.02, 0.98)
+        prior = np.log(known / (1 - known))
+        odds = LOCAL * local + COLOURS * colours + STEEP * prior
+        alike = likeness_of_neighbours(near, tone)
+        share = mean_field(share, near, odds, alike, ALIKE, SWEEPS)
+    return share
 
 
-def inside_log_odds(share: Floats, tone: NDArray[np.uint8]) -> Floats:
-    """Log odds of the pixels near an outline to be inside, by their tone.
+def local_log_odds(
+    inside: NDArray[np.uint8], near: Places, tone: NDArray[np.uint8], every: Means
+) -> Floats:
+    """Log odds of pixels to be inside, by the tones on either side in a window around them.
 
     Args:
-        share: (h, w) float32 probability of an object.
+        inside: (h, w) 1 inside, 0 elsewhere.
+        near: (N, 2) rows and columns of the pixels.
         tone: (h, w, 3) uint8.
+        every: From `window_means` of all tones.
 
     Returns:
-        (h, w) float32; 0 away from the outline.
+        (N,) float32; 0 where a side fills too little of the window.
     """
-    inside = (share > 0.5).view(np.uint8)
-    kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
-    near = cv2.dilate(inside, kernel) != cv2.erode(inside, kernel)
-    # For means over a window, every other pixel is enough.
-    some = np.ascontiguousarray(inside[::2, ::2])
+    some = _halved(inside)
     full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
-    tones = np.ascontiguousarray(tone[::2, ::2])
-    mine = np.asarray(cv2.bitwise_and(tones, tones, mask=some), dtype=np.uint8)
-    return _odds(near, full, tone, _means(mine), _means(tones))
+    mine = np.asarray(cv2.bitwise_and(_halved(tone), _halved(tone), mask=some), dtype=np.uint8)
+    return window_log_odds(near, full, tone, window_means(mine), every, (LEAST, NOISE, MOST))
 
 
-def _means(tones: NDArray[np.uint8]) -> tuple[Floats, Floats]:
-    """Means of tones, and of their squares, in the window around each pixel."""
+def window_means(tones: NDArray[np.uint8]) -> Means:
+    """Means of tones at half the size, and of their squares, in the window around each pixel."""
     return (
         np.asarray(cv2.boxFilter(tones, cv2.CV_32F, SAMPLED), dtype=np.float32),
         np.asarray(cv2.sqrBoxFilter(tones, cv2.CV_32F, SAMPLED), dtype=np.float32),
     )
 
 
-@compiled
-def _odds(
-    near: NDArray[np.bool_],
-    full: Floats,
-    tone: NDArray[np.uint8],
-    inside: tuple[Floats, Floats],
-    all_: tuple[Floats, Floats],
-) -> Floats:
-    """Log odds, by tone, that pixels near an outline are inside, (h, w) float32; 0 elsewhere.
-
-    Args:
-        near: (h, w) bool, the pixels.
-        full: (h / 2, w / 2) share of the window around each that is inside.
-        tone: (h, w, 3).
-        inside: (h / 2, w / 2, 3) means over the window of the tones inside, 0 taken for others, and
-            of their squares.
-        all_: The same of all tones.
-    """
-    mine, mine_squared = inside
-    every, every_squared = all_
-    out = np.zeros(near.shape, np.float32)
-    for y in range(near.shape[0]):
-        for x in range(near.shape[1]):
-            v, u = y // 2, x // 2
-            part = float(full[v, u])
-            if not near[y, x] or part <= LEAST or part >= 1 - LEAST:
-                continue
-            away, wide = 0.0, 1.0
-            for i in range(3):
-                one, two = mine[v, u, i] / part, mine_squared[v, u, i] / part
-                within = max(two - one * one, 0.0) + NOISE**2
-                gap = tone[y, x, i] - one
-                one = (every[v, u, i] - mine[v, u, i]) / (1 - part)
-                two = (every_squared[v, u, i] - mine_squared[v, u, i]) / (1 - part)
-                beyond = max(two - one * one, 0.0) + NOISE**2
-                far = tone[y, x, i] - one
-                away += far * far / beyond - gap * gap / within
-                wide *= beyond / within
-            # The channels are strongly correlated: their mean, not their sum.
-            out[y, x] = max(-MOST, min(MOST, 0.5 * (away + log(wide)) / 3))
-    return out
+def _halved(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Every other pixel, which is enough for means over a window."""
+    return np.ascontiguousarray(image[::2, ::2])
 
 
-@compiled
-def _with_odds(share: Floats, informative: Floats, odds: Floats) -> Floats:
-    """Shares updated by the smoothed log odds where they are informative."""
-    out = share.copy()
-    for y in range(share.shape[0]):
-        for x in range(share.shape[1]):
-            if informative[y, x]:
-                known = max(0.02, min(0.98, share[y, x]))
-                out[y, x] = 1 / (1 + exp(-odds[y, x] - STEEP * log(known / (1 - known))))
-    return out
+def _grown(mask: NDArray[np.uint8], by: int) -> NDArray[np.uint8]:
+    return np.asarray(cv2.dilate(mask, _square(by)), dtype=np.uint8)
+
+
+def _shrunk(mask: NDArray[np.uint8], by: int) -> NDArray[np.uint8]:
+    return np.asarray(cv2.erode(mask, _square(by)), dtype=np.uint8)
+
+
+def _square(by: int) -> NDArray[np.uint8]:
+    return np.ones((2 * by + 1, 2 * by + 1), np.uint8)

@@ -8,13 +8,24 @@ from hypothesis import strategies as st
 
 from tests.percepts.motion.clips import texture
 from visup.evaluation.motion.mask_scores import iou
+from visup.percepts.motion.outlines._outline_refinement_jit import (
+    BINS,
+    histogram_log_odds,
+    likeness_of_neighbours,
+    mean_field,
+    places_of,
+    taken_side,
+)
 from visup.percepts.motion.outlines.outline_refinement import (
     BAND,
     LEAST,
+    MOST,
     NOISE,
+    ROUNDS,
     SAMPLED,
-    inside_log_odds,
+    local_log_odds,
     refine_outline,
+    window_means,
 )
 
 SHAPE = (70, 90)
@@ -33,6 +44,12 @@ def painted(mask: np.ndarray, inner: int, outer: int, seed: int = 1) -> np.ndarr
     rng = np.random.default_rng(seed)
     grey = np.where(mask, inner, outer) + rng.normal(0, 3, SHAPE)
     return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def ring_of(inside: np.ndarray) -> np.ndarray:
+    """Pixels beside an outline."""
+    kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
+    return np.asarray(cv2.dilate(inside, kernel) != cv2.erode(inside, kernel))
 
 
 @settings(deadline=None, max_examples=20)
@@ -62,15 +79,17 @@ def test_only_pixels_beside_the_outline_may_change(x: int, y: int, radius: int, 
     share = shares(disc(x, y, radius))
     tone = np.repeat(texture(seed, SHAPE)[..., None], 3, axis=2)
     inside = (share > 0.5).astype(np.uint8)
-    kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
+    # Each round begins at the outline that the round before has drawn.
+    kernel = np.ones((2 * ROUNDS * BAND + 1, 2 * ROUNDS * BAND + 1), np.uint8)
     far = cv2.dilate(inside, kernel) == cv2.erode(inside, kernel)
     assert np.array_equal(refine_outline(share, tone)[far], share[far])
 
 
-def test_where_both_sides_look_alike_nothing_changes() -> None:
+def test_where_both_sides_look_alike_hardly_anything_changes() -> None:
+    """Only the steps of a drawn circle are smoothed."""
     share = shares(disc(45, 35, 18))
     plain = np.full((*SHAPE, 3), 90, np.uint8)
-    assert np.array_equal(refine_outline(share, plain) > 0.5, share > 0.5)
+    assert iou(refine_outline(share, plain) > 0.5, share > 0.5) > 0.95
 
 
 @pytest.mark.parametrize("mask", [np.zeros(SHAPE, bool), np.ones(SHAPE, bool)])
@@ -84,16 +103,16 @@ def test_what_has_no_outline_stays(mask: np.ndarray) -> None:
 def test_odds_are_those_of_two_gaussians_in_the_window(seed: int) -> None:
     """Against sums over every other pixel of every window, pixel by pixel."""
     rng = np.random.default_rng(seed)
-    share = shares(disc(45, 35, 20))
     tone = rng.integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
-    found = inside_log_odds(share, tone)
-    some, inside = tone[::2, ::2], (share > 0.5).astype(np.uint8)[::2, ::2]
-    half = SAMPLED[0] // 2
+    inside = disc(45, 35, 20).view(np.uint8)
+    near = places_of(ring_of(inside))
+    found = local_log_odds(inside, near, tone, window_means(np.ascontiguousarray(tone[::2, ::2])))
+    some, half = tone[::2, ::2], SAMPLED[0] // 2
     wide = cv2.copyMakeBorder(some, half, half, half, half, cv2.BORDER_REFLECT_101).astype(float)
-    mask = cv2.copyMakeBorder(inside, half, half, half, half, cv2.BORDER_REFLECT_101) > 0
-    told = np.flatnonzero(found)
-    for place in rng.choice(told, 12, replace=False):
-        y, x = divmod(int(place), SHAPE[1])
+    sides = np.ascontiguousarray(inside[::2, ::2])
+    mask = cv2.copyMakeBorder(sides, half, half, half, half, cv2.BORDER_REFLECT_101) > 0
+    for place in rng.choice(np.flatnonzero(found), 12, replace=False):
+        y, x = near[place]
         v, u = y // 2, x // 2
         window, own = (a[v : v + SAMPLED[0], u : u + SAMPLED[0]] for a in (wide, mask))
         assert LEAST < own.mean() < 1 - LEAST
@@ -103,4 +122,46 @@ def test_odds_are_those_of_two_gaussians_in_the_window(seed: int) -> None:
             gap = (tone[y, x] - side.mean(axis=0)) ** 2
             cost.append(0.5 * (gap / variance + np.log(variance)).sum() / 3)
         expected = float(np.clip(cost[1] - cost[0], -3, 3))
-        assert found[y, x] == pytest.approx(expected, abs=0.02)
+        assert found[place] == pytest.approx(expected, abs=0.02)
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(0, 1000))
+def test_odds_are_those_of_the_colours_of_the_object_and_its_surroundings(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    tone = rng.choice(np.array([10, 30, 200], np.uint8), (*SHAPE, 3))
+    inside, ring = disc(45, 35, 15).view(np.uint8), disc(45, 35, 25).view(np.uint8)
+    near = places_of(ring_of(inside))
+    found = histogram_log_odds(near, inside, ring, tone, MOST)
+    colours = tone // (256 // BINS)
+    mine, others = colours[inside > 0], colours[(ring > 0) & (inside == 0)]
+    for place in rng.choice(len(near), 12, replace=False):
+        colour = colours[tuple(near[place])]
+        within, beyond = (float((c == colour).all(axis=1).mean()) for c in (mine, others))
+        unseen = 0.1 / len(mine)
+        expected = float(np.clip(np.log((within + unseen) / (beyond + unseen)), -MOST, MOST))
+        assert found[place] == pytest.approx(expected, abs=1e-3)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 1000), st.integers(6, 18))
+def test_a_border_is_drawn_where_neighbours_differ_though_evidence_errs(
+    seed: int, edge: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    true = np.broadcast_to(np.arange(24) < edge, (9, 24))
+    tone = np.repeat(np.where(true, 60, 160).astype(np.uint8)[..., None], 3, axis=2)
+    near = places_of(np.ones(true.shape, bool))
+    told = np.where(rng.random(true.shape) < 0.2, ~true, true)
+    odds = np.where(told, np.float32(1), np.float32(-1)).ravel()
+    share = np.full(true.shape, 0.5, np.float32)
+    found = mean_field(share, near, odds, likeness_of_neighbours(near, tone), 4.0, 20)
+    assert np.mean((found > 0.5) != true) < 0.03 < np.mean(told != true)
+
+
+def test_sides_are_the_tangent_of_half_the_odds_nearly() -> None:
+    odds = np.linspace(-40, 40, 801)
+    sides = np.array([taken_side(o) for o in odds])
+    assert np.abs(sides - np.tanh(odds / 2)).max() < 0.024
+    assert (np.diff(sides) >= 0).all()
+    assert np.abs(sides).max() <= 1
