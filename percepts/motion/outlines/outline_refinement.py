@@ -37,7 +37,7 @@ MOST = 3.0  # log odds that either description may give to a pixel at most
 LOCAL = 2.0  # weight of the log odds by tones in the window
 COLOURS = 1.5  # weight of the log odds by colours
 STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
-ALIKE = 16.0  # log odds that a neighbour just alike and sure of its side adds
+ALIKE = 32.0  # log odds that a neighbour just alike and sure of its side adds
 SWEEPS = 3  # passes of mean field in a round
 Means = tuple[Floats, Floats]
 """(h / 2, w / 2, 3) means of tones in windows, and of their squares."""
