@@ -40,7 +40,7 @@ def window_log_odds(
     tone: NDArray[np.uint8],
     inside: tuple[Floats, Floats],
     every: tuple[Floats, Floats],
-    limits: tuple[float, float, float],
+    limits: tuple[float, float, float, float],
 ) -> Floats:
     """Log odds, by the tones in the window around each, that pixels are inside, (N,) float32.
 
@@ -54,7 +54,7 @@ def window_log_odds(
         limits: Share of the window that each side must fill, least standard deviation of tones, most
             log odds.
     """
-    least, noise, most = limits
+    least, noise, most, both = limits
     out = np.zeros(len(near), np.float32)
     for n in range(len(near)):
         y, x = near[n]
@@ -64,11 +64,13 @@ def window_log_odds(
             continue
         away, wide = 0.0, 1.0
         for i in range(3):
-            one, two = inside[0][v, u, i] / part, inside[1][v, u, i] / part
+            mean, square = every[0][v, u, i], every[1][v, u, i]
+            one = (inside[0][v, u, i] + both * mean) / (part + both)
+            two = (inside[1][v, u, i] + both * square) / (part + both)
             within = max(two - one * one, 0.0) + noise**2
             gap = tone[y, x, i] - one
-            one = (every[0][v, u, i] - inside[0][v, u, i]) / (1 - part)
-            two = (every[1][v, u, i] - inside[1][v, u, i]) / (1 - part)
+            one = (mean - inside[0][v, u, i] + both * mean) / (1 - part + both)
+            two = (square - inside[1][v, u, i] + both * square) / (1 - part + both)
             beyond = max(two - one * one, 0.0) + noise**2
             far = tone[y, x, i] - one
             away += far * far / beyond - gap * gap / within
@@ -84,17 +86,18 @@ def histogram_log_odds(
     inside: NDArray[np.uint8],
     ring: NDArray[np.uint8],
     tone: NDArray[np.uint8],
-    most: float,
+    limits: tuple[float, float],
 ) -> Floats:
     """Log odds, by histograms of the object and of what surrounds it, that pixels are inside, (N,) float32.
 
     Args:
-        near: The pixels.
+        near: The pixels; none speaks for itself.
         inside: (h, w), not 0 inside.
         ring: (h, w), not 0 inside and in the surroundings.
         tone: (h, w, 3).
-        most: Most log odds.
+        limits: Pixels that speak for neither side, added to each bin; most log odds.
     """
+    neither, most = limits
     mine, others = np.zeros(BINS**3, np.float32), np.zeros(BINS**3, np.float32)
     for y in range(inside.shape[0]):
         for x in range(inside.shape[1]):
@@ -103,11 +106,16 @@ def histogram_log_odds(
             elif ring[y, x]:
                 others[bin_of(tone[y, x])] += 1
     within, beyond = max(mine.sum(), np.float32(1)), max(others.sum(), np.float32(1))
-    unseen = 0.1 / max(within, 50.0)
+    part, rest = within / (within + beyond), beyond / (within + beyond)
     out = np.empty(len(near), np.float32)
     for n in range(len(near)):
-        at = bin_of(tone[near[n, 0], near[n, 1]])
-        odds = log((mine[at] / within + unseen) / (others[at] / beyond + unseen))
+        y, x = near[n]
+        at = bin_of(tone[y, x])
+        own = 1 if inside[y, x] else 0
+        other = 1 if ring[y, x] and not own else 0
+        odds = log(
+            ((mine[at] - own) / part + neither) / ((others[at] - other) / rest + neither)
+        )
         out[n] = max(-most, min(most, odds))
     return out
 

@@ -34,6 +34,8 @@ RING = 12  # pixels beyond the outline that count as surroundings
 LEAST = 0.08  # share of the window that each side must fill
 NOISE = 6.0  # least standard deviation of tones
 MOST = 3.0  # log odds that either description may give to a pixel at most
+BOTH = 0.1  # share of the window that describes both sides
+NEITHER = 20.0  # pixels that speak for neither side, added to each bin of the histograms
 LOCAL = 2.0  # weight of the log odds by tones in the window
 COLOURS = 1.5  # weight of the log odds by colours
 STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
@@ -63,7 +65,7 @@ def refine_outline(share: Floats, tone: NDArray[np.uint8]) -> Floats:
         if not len(near):
             return share
         local = local_log_odds(inside, near, tone, every)
-        colours = histogram_log_odds(near, inside, _grown(inside, RING), tone, MOST)
+        colours = histogram_log_odds(near, inside, _grown(inside, RING), tone, (NEITHER, MOST))
         known = np.clip(share[near[:, 0], near[:, 1]], 0.02, 0.98)
         prior = np.log(known / (1 - known))
         odds = LOCAL * local + COLOURS * colours + STEEP * prior
@@ -89,7 +91,7 @@ def local_log_odds(
     some = _halved(inside)
     full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
     mine = np.asarray(cv2.bitwise_and(_halved(tone), _halved(tone), mask=some), dtype=np.uint8)
-    return window_log_odds(near, full, tone, window_means(mine), every, (LEAST, NOISE, MOST))
+    return window_log_odds(near, full, tone, window_means(mine), every, (LEAST, NOISE, MOST, BOTH))
 
 
 def window_means(tones: NDArray[np.uint8]) -> Means:
