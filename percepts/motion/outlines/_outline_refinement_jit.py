@@ -113,9 +113,7 @@ def histogram_log_odds(
         at = bin_of(tone[y, x])
         own = 1 if inside[y, x] else 0
         other = 1 if ring[y, x] and not own else 0
-        odds = log(
-            ((mine[at] - own) / part + neither) / ((others[at] - other) / rest + neither)
-        )
+        odds = log(((mine[at] - own) / part + neither) / ((others[at] - other) / rest + neither))
         out[n] = max(-most, min(most, odds))
     return out
 
@@ -124,7 +122,7 @@ def histogram_log_odds(
 def bin_of(tone: NDArray[np.uint8]) -> int:
     """The bin of a colour in a histogram."""
     width = 256 // BINS
-    return ((tone[0] // width) * BINS + tone[1] // width) * BINS + tone[2] // width
+    return int(((tone[0] // width) * BINS + tone[1] // width) * BINS + tone[2] // width)
 
 
 @compiled
