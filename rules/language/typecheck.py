@@ -7,7 +7,7 @@ from collections.abc import Set as AnySet
 from itertools import count
 
 from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
-from visup.agent.model.did_you_mean import closest, did_you_mean
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.formula.nodes import (
     And,
     Comparison,
@@ -31,8 +31,8 @@ from visup.rules.formula.nodes import (
 from visup.rules.formula.rebuilding import cut_off
 from visup.rules.formula.terms import Arithmetic, Measure, Variable, WindowFunction
 from visup.rules.formula.units import Number, Span, Unit
-from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
-from visup.rules.language.diagnostics import Diagnostic, Source, listed, nearest
+from visup.rules.language.calls import check_call
+from visup.rules.language.diagnostics import Diagnostic, Source, listed
 from visup.rules.language.dimensions import (
     check_constant,
     check_dimensions,
@@ -43,9 +43,8 @@ from visup.rules.language.dimensions import (
     example_amount,
 )
 from visup.rules.language.keywords import KEYWORDS
-from visup.rules.language.synonyms import said_otherwise, synonym
 from visup.rules.language.transform import Fault
-from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits, known_of
+from visup.rules.monitoring.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
 from visup.rules.wording.sentences import mentions
 
@@ -163,7 +162,7 @@ class _FormulaChecker:
     def node(self, node: Node) -> Iterator[Fault]:
         match node:
             case Predicate() | Measure():
-                yield from self.call(node)
+                yield from self.called(node)
             case Quantified():
                 yield from self.quantified(node)
                 return
@@ -312,7 +311,7 @@ class _FormulaChecker:
         if node.name in self.values:
             return
         if node.name in self.vocabulary.quantities:
-            yield from self.call(Measure(node.name, (), node.span))
+            yield from self.called(Measure(node.name, (), node.span))
             if not self.vocabulary.quantities[node.name].takes:
                 what = f"'{node.name}' is a quantity, and is written with parentheses"
                 yield node.span, what, f"{node.name}()", f"write `{node.name}()`"
@@ -327,61 +326,9 @@ class _FormulaChecker:
         expected = "a quantity or a number, or what `let` names"
         yield node.span, what, expected, near
 
-    def call(self, call: Predicate | Measure) -> Iterator[Fault]:
+    def called(self, call: Predicate | Measure) -> Iterator[Fault]:
         self.used |= set(call.words) & set(self.scope)
-        words, quantities = self.vocabulary.words, self.vocabulary.quantities
-        fact = isinstance(call, Predicate)
-        table = words if fact else quantities
-        kind = "relation or fact" if fact else "quantity"
-        if call.name not in table:
-            hint = did_you_mean(synonym(call.name, table) or call.name, table)
-            if fact and (other := said_otherwise(call.name, call.words, words)) is not None:
-                hint = f"write `{other}`"
-            elif call.name in (quantities if fact else words):
-                hint = self._compared(call) if fact else "it is true or false"
-            elif not fact and hint is not None and "'objects'" in hint and len(call.words) == 1:
-                hint = f"write `objects_named({call.words[0]})`"
-            elif call.name in self.scope and not call.words:
-                hint = f"write `seen({call.name})` in place of `{call.name}`"
-            yield call.span, f"there is no {kind} '{call.name}'", nearest(call.name, table), hint
-            return
-        takes = table[call.name].takes
-        hint = f"write `{arranged(call.name, call.words, takes, self.scope)}`"
-        if len(takes) != len(call.words):
-            what = f"'{call.name}' takes {len(takes)} argument(s), not {len(call.words)}"
-            yield call.span, what, f"{call.name}({', '.join(takes)})", hint
-            return
-        for wanted, word in zip(takes, call.words, strict=True):
-            for span, what, expected, own in self.argument(call, wanted, word):
-                sorted_out = any(fits(wanted, w, self.scope) for w in call.words)
-                yield span, what, expected, hint if sorted_out else own
-        names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
-        if len(set(names)) < len(names):
-            hint = f"write `{call.name}({', '.join(distinct(call.words, self.scope))})`"
-            what = f"'{call.name}' is given the same object twice"
-            yield call.span, what, "two different objects", hint
-
-    def _compared(self, call: Predicate | Measure) -> str:
-        """A suggestion for a quantity used as a condition."""
-        said = f"{call.name}({', '.join(call.words)})"
-        if call.name == "signal":
-            return f"write `signal_on({', '.join(call.words)})` in place of `{said}`"
-        measured = Measure(call.name, call.words, call.span)
-        amount = example_amount(Comparison(measured, "<", measured), self.vocabulary)
-        return f"compare it with a number; write `{said} < {amount}` in place of `{said}`"
-
-    def argument(self, call: Predicate | Measure, wanted: str, word: str) -> Iterator[Fault]:
-        known = known_of(wanted, word, self.scope)
-        if word not in known:
-            what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
-            near = closest(word, known) or next((k for k in known if k not in call.words), None)
-            hint = None if near is None else f"write `{near}` in place of `{word}`"
-            yield call.span, what, listed(known), hint
-        elif wanted != "object" and word in self.scope:
-            what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
-            other = EXAMPLES.get(wanted)
-            hint = None if other is None else f"write `{other}` in place of `{word}`"
-            yield call.span, what, None, hint or "rename the variable"
+        yield from check_call(call, self.vocabulary, self.scope)
 
 
 def _ahead(node: FutureOperator | Until, window: TimeWindow | None, span: Span) -> Iterator[Fault]:

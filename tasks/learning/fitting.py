@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import floor
 
 from visup.rules.formula.units import Number, Span
+from visup.tasks.analysis.judging import JudgedRun
 from visup.tasks.grammar.nodes import (
     Actors,
     Conditioned,
@@ -19,7 +20,6 @@ from visup.tasks.grammar.nodes import (
 )
 from visup.tasks.grammar.units import value
 from visup.tasks.learning.drafts import deadline
-from visup.tasks.learning.judging import JudgedRun
 
 SHORTEST_SHARE = 0.8
 """A fitted `for` is this share of the shortest duration in a good run."""

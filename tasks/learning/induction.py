@@ -13,6 +13,7 @@ from functools import partial
 
 from visup.agent import Status, Verdict
 from visup.agent.model.errors import TaskError
+from visup.tasks.analysis.judging import JudgedRun, judged
 from visup.tasks.checks.load import parse_task
 from visup.tasks.grammar.nodes import Actor
 from visup.tasks.learning.alignment import aligned
@@ -23,7 +24,6 @@ from visup.tasks.learning.drafts import (
     event_of,
     stage_names,
 )
-from visup.tasks.learning.judging import JudgedRun, judged
 from visup.tasks.learning.order import (
     Item,
     Occurrence,

@@ -24,14 +24,12 @@ LEAST_OVERLAP = 0.05
 """Less overlap in a good run, as a share of the union, tells nothing: outlines just touch."""
 PLACED_S = 0.2
 """How long two must be elsewhere, seconds: boxes jump while one is half hidden."""
-
-
 SETTLED_S = 2.0
 """What meets in the last stage lies where it belongs this long before the end of a run, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FinalOverlap:
     """How much a pair in contact overlaps in the end.
 
     Attributes:
@@ -75,7 +73,7 @@ def places_of(
     rows: Sequence[Sequence[CourseEvent]],
     runs: Sequence[RunTrace],
     last: Sequence[Span],
-) -> Iterator[Place]:
+) -> Iterator[FinalOverlap]:
     """The places of those that meet and stay in contact in all runs.
 
     Args:
@@ -95,7 +93,7 @@ def places_of(
         if not any(s != symbol and set(s[1]) & set(symbol[1]) for _, s in kept):
             seen = _least_seen(runs, symbol[1], ends if at_last else last)
             if seen >= LEAST_OVERLAP and (symbol == occurrence[0] or not at_last):
-                yield Place(symbol, final, seen)
+                yield FinalOverlap(symbol, final, seen)
 
 
 def _least_seen(runs: Sequence[RunTrace], pair: Sequence[str], within: Sequence[Span]) -> float:

@@ -8,8 +8,8 @@ import pytest
 
 from tests.paths import ROOT
 from visup.rules.formula.units import TICKS, UNITS
-from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES
 from visup.rules.language.parser import parse_rules, shipped_rules
+from visup.rules.monitoring.cost import MAX_STATE, MAX_VARIABLES
 from visup.rules.monitoring.samples import MIN_SPACING, SAMPLE_HOLD
 from visup.rules.predicates.certainty import KEEP_OUT
 from visup.rules.predicates.snapshot import SIGMAS

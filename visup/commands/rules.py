@@ -52,8 +52,8 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
 @app.command("list")
 def list_rules(files: Files = None, as_json: AsJson = False) -> None:
     """List rules: severity, memory bound and delay of each."""
-    from visup.rules.language.cost import cost_of
     from visup.rules.language.parser import load_rules, shipped_rules
+    from visup.rules.monitoring.cost import cost_of
 
     found = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
     if as_json:
@@ -185,7 +185,7 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
 
 
 def _cost(rule: Rule) -> str:
-    from visup.rules.language.cost import cost_of
+    from visup.rules.monitoring.cost import cost_of
 
     cost = cost_of(rule)
     late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported immediately"

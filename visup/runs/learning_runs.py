@@ -8,8 +8,8 @@ from visup.agent import Mind
 from visup.agent.storage.journal_reader import Recording
 from visup.runs.replay import replay, settings_for
 from visup.tasks import load_tasks
+from visup.tasks.analysis.judging import JudgedRun, judged
 from visup.tasks.grammar.nodes import Actor, Task
-from visup.tasks.learning.judging import JudgedRun, judged
 from visup.tasks.learning.traces import RunTrace, trace_of
 
 

@@ -32,7 +32,6 @@ from visup.rules.formula.nodes import (
 from visup.rules.formula.terms import Arithmetic, Measure, PointwiseFunction, Term, WindowFunction
 from visup.rules.formula.units import SHARE, UNITS, Number, Unit
 from visup.rules.language import rule_builder as build
-from visup.rules.language.cost import cost_of
 from visup.rules.language.parser import load_rules, parse_formula, parse_rules, shipped_rules
 from visup.rules.language.rule_builder import (
     always,
@@ -45,6 +44,7 @@ from visup.rules.language.rule_builder import (
     quantity,
 )
 from visup.rules.language.rule_builder import s as seconds
+from visup.rules.monitoring.cost import cost_of
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES, signals
 

@@ -14,10 +14,10 @@ from visup.agent import Mind, Observation
 from visup.agent.model.errors import ErrorGroup, RuleError
 from visup.rules.dense_time import judge_recording
 from visup.rules.formula.nodes import Formula
-from visup.rules.language.cost import cost_of
 from visup.rules.language.keywords import FUNCTIONS, KEYWORDS
 from visup.rules.language.parser import parse_formula, parse_rules
 from visup.rules.language.rule_builder import fact, let, noted, px, quantity, rule, s
+from visup.rules.monitoring.cost import cost_of
 from visup.rules.monitoring.intervals import UNKNOWN
 from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals

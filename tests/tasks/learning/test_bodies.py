@@ -10,9 +10,9 @@ from tests.tasks.learning.test_learning import ARM, CRATE, PART, TRAY, run_of
 from tests.tasks.scripted import Spell
 from visup.agent import Verdict
 from visup.tasks import parse_task
+from visup.tasks.analysis.judging import judged
 from visup.tasks.learning.bodies import as_one_body
 from visup.tasks.learning.induction import learn_task
-from visup.tasks.learning.judging import judged
 from visup.tasks.learning.order import Either
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import Happening, RunTrace

@@ -9,12 +9,12 @@ import numpy as np
 
 from tests.tasks.scripted import REGION, Script, Spell, play
 from visup.agent import Mind, Outcome, Verdict
+from visup.tasks.analysis.judging import judged
 from visup.tasks.checks.load import parse_task
 from visup.tasks.learning.carrying import with_carrying
 from visup.tasks.learning.induction import learn_task
-from visup.tasks.learning.judging import judged
 from visup.tasks.learning.order import Carry
-from visup.tasks.learning.places import Place, places_of
+from visup.tasks.learning.places import FinalOverlap, places_of
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.rests import halt_of
 from visup.tasks.learning.traces import Happening, RunTrace, Span, trace_of
@@ -114,7 +114,7 @@ def test_where_outlines_just_touch_their_overlap_tells_nothing() -> None:
     rows = [[event("touching", PLACED, 6.0)]]
     assert not list(places_of((("touching", PLACED), 0), rows, [lying("a", 0.05)], []))
     (place,) = places_of((("touching", PLACED), 0), rows, [lying("a", 0.5)], [])
-    assert isinstance(place, Place)
+    assert isinstance(place, FinalOverlap)
     assert np.isclose(place.seen, 800 / (3600 + 1600 - 800))
 
 

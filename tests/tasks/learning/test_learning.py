@@ -14,11 +14,11 @@ from tests.tasks.scripted import Script, Spell, play
 from visup.agent import Mind, Outcome, Verdict
 from visup.agent.model.errors import TaskError
 from visup.tasks import parse_task
-from visup.tasks.learning.coverage import coverage_of, share_covered
+from visup.tasks.analysis.coverage import coverage_of, share_covered
+from visup.tasks.analysis.judging import judged
+from visup.tasks.analysis.languages import difference
 from visup.tasks.learning.fitting import fitted_amounts, with_amounts
 from visup.tasks.learning.induction import learn_task
-from visup.tasks.learning.judging import judged
-from visup.tasks.learning.languages import difference
 from visup.tasks.learning.order import (
     Free,
     Loop,

@@ -12,8 +12,8 @@ from visup.terminal.console import echo, echo_json
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from visup.tasks.analysis.judging import JudgedRun
     from visup.tasks.grammar.nodes import Task
-    from visup.tasks.learning.judging import JudgedRun
 
 Runs = Annotated[
     list[Path], typer.Argument(help="Run folders of `visup watch`, or their journals.")
@@ -90,8 +90,8 @@ def coverage(file: OneTask, runs: Runs, as_json: AsJson = False) -> None:
 
     Exit code: 1 if a stage was never completed.
     """
+    from visup.tasks.analysis.coverage import coverage_of, share_covered
     from visup.tasks.checks.load import load_task
-    from visup.tasks.learning.coverage import coverage_of, share_covered
 
     task = load_task(file)
     stages = coverage_of(task, _judged(task, runs))
@@ -122,8 +122,8 @@ def diff(
 
     Exit code: 0 if they are equivalent, 1 if they are not.
     """
+    from visup.tasks.analysis.languages import difference
     from visup.tasks.checks.load import load_task
-    from visup.tasks.learning.languages import difference
 
     found = difference(load_task(first), load_task(second))
     lines = list(found.lines(f"`{first}`", f"`{second}`"))

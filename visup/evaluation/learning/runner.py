@@ -18,9 +18,9 @@ from visup.evaluation.learning.worlds import world_minds
 from visup.render.worlds.kinds.catalogue import KINDS, known_kinds, random_world
 from visup.rules.predicates.vocabulary import IMPLIED
 from visup.tasks import parse_task
+from visup.tasks.analysis.judging import judged
+from visup.tasks.analysis.languages import ActorsAction, actions_of
 from visup.tasks.learning.induction import learn_task
-from visup.tasks.learning.judging import judged
-from visup.tasks.learning.languages import ActorsAction, actions_of
 from visup.tasks.learning.traces import trace_of
 
 if TYPE_CHECKING:

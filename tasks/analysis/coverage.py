@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from visup.agent import Status
+from visup.tasks.analysis.judging import JudgedRun
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import stage_names
-from visup.tasks.learning.judging import JudgedRun
 
 
 @dataclass(frozen=True, slots=True)

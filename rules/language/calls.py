@@ -1,0 +1,87 @@
+"""Check of calls: relations, facts and quantities with their arguments; every error with a fix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from visup.agent.model.did_you_mean import closest, did_you_mean
+from visup.rules.formula.nodes import Comparison, Predicate
+from visup.rules.formula.terms import Measure
+from visup.rules.language.diagnostics import listed, nearest
+from visup.rules.language.dimensions import example_amount
+from visup.rules.language.synonyms import said_otherwise, synonym
+from visup.rules.language.transform import Fault
+from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits, known_of
+from visup.rules.predicates.vocabulary import Vocabulary
+
+Call = Predicate | Measure
+
+
+def check_call(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Iterator[Fault]:
+    """Errors of a name and of its arguments.
+
+    Args:
+        call: A relation, fact or quantity with its arguments.
+        vocabulary: What there is.
+        scope: Variables of the rule that are known here.
+    """
+    table = vocabulary.words if isinstance(call, Predicate) else vocabulary.quantities
+    if call.name not in table:
+        yield _unknown(call, vocabulary, scope)
+        return
+    takes = table[call.name].takes
+    hint = f"write `{arranged(call.name, call.words, takes, scope)}`"
+    if len(takes) != len(call.words):
+        what = f"'{call.name}' takes {len(takes)} argument(s), not {len(call.words)}"
+        yield call.span, what, f"{call.name}({', '.join(takes)})", hint
+        return
+    for wanted, word in zip(takes, call.words, strict=True):
+        for span, what, expected, own in _argument(call, wanted, word, scope):
+            sorted_out = any(fits(wanted, w, scope) for w in call.words)
+            yield span, what, expected, hint if sorted_out else own
+    names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
+    if len(set(names)) < len(names):
+        hint = f"write `{call.name}({', '.join(distinct(call.words, scope))})`"
+        what = f"'{call.name}' is given the same object twice"
+        yield call.span, what, "two different objects", hint
+
+
+def _unknown(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Fault:
+    words, quantities = vocabulary.words, vocabulary.quantities
+    fact = isinstance(call, Predicate)
+    table = words if fact else quantities
+    kind = "relation or fact" if fact else "quantity"
+    hint = did_you_mean(synonym(call.name, table) or call.name, table)
+    if fact and (other := said_otherwise(call.name, call.words, words)) is not None:
+        hint = f"write `{other}`"
+    elif call.name in (quantities if fact else words):
+        hint = _compared(call, vocabulary) if fact else "it is true or false"
+    elif not fact and hint is not None and "'objects'" in hint and len(call.words) == 1:
+        hint = f"write `objects_named({call.words[0]})`"
+    elif call.name in scope and not call.words:
+        hint = f"write `seen({call.name})` in place of `{call.name}`"
+    return call.span, f"there is no {kind} '{call.name}'", nearest(call.name, table), hint
+
+
+def _compared(call: Call, vocabulary: Vocabulary) -> str:
+    """A suggestion for a quantity used as a condition."""
+    said = f"{call.name}({', '.join(call.words)})"
+    if call.name == "signal":
+        return f"write `signal_on({', '.join(call.words)})` in place of `{said}`"
+    measured = Measure(call.name, call.words, call.span)
+    amount = example_amount(Comparison(measured, "<", measured), vocabulary)
+    return f"compare it with a number; write `{said} < {amount}` in place of `{said}`"
+
+
+def _argument(call: Call, wanted: str, word: str, scope: tuple[str, ...]) -> Iterator[Fault]:
+    known = known_of(wanted, word, scope)
+    if word not in known:
+        what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
+        near = closest(word, known) or next((k for k in known if k not in call.words), None)
+        hint = None if near is None else f"write `{near}` in place of `{word}`"
+        yield call.span, what, listed(known), hint
+    elif wanted != "object" and word in scope:
+        what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
+        other = EXAMPLES.get(wanted)
+        hint = None if other is None else f"write `{other}` in place of `{word}`"
+        yield call.span, what, None, hint or "rename the variable"
