@@ -8,6 +8,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +22,13 @@ from visup.agent.model.errors import DatabaseError, SettingsError
 from visup.agent.storage.text_file import read_bounded
 from visup.percepts.picture_size import check_picture_size
 from visup.percepts.shape.building.build_parts import BuildPart, is_made, parts_of, read_part
-from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
+from visup.percepts.shape.building.closed_views import without_gaps
+from visup.percepts.shape.building.mesh_views import (
+    RenderedView,
+    half_sphere_directions,
+    load_mesh,
+    render_views,
+)
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.database.view_directions import merge_symmetric
 from visup.percepts.shape.index.view_records import NewView
@@ -138,14 +145,24 @@ def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
 
 
 def rendered(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
-    """Views of a mesh file from these directions (V, 3), as `mesh_views` but without merging."""
-    views = []
+    """Views of a mesh file from these directions (V, 3), as `mesh_views` but without merging.
+
+    A view with narrow gaps is followed by the same view without them.
+    """
+    views: list[NewView] = []
     for seen in render_views(load_mesh(mesh), directions):
-        silhouette = normalise(seen.mask)
-        if silhouette is not None:
-            x, y, z = (float(c) for c in seen.direction)
-            views.append(NewView(mesh.stem, (x, y, z), seen.area, shape_of(silhouette)))
+        closed = without_gaps(seen.mask)
+        views += _view_of(mesh.stem, seen)
+        if closed is not None:
+            views += _view_of(mesh.stem, replace(seen, mask=closed))
     return views
+
+
+def _view_of(name: str, seen: RenderedView) -> Iterator[NewView]:
+    silhouette = normalise(seen.mask)
+    if silhouette is not None:
+        x, y, z = (float(c) for c in seen.direction)
+        yield NewView(name, (x, y, z), seen.area, shape_of(silhouette))
 
 
 def silhouette_views(
