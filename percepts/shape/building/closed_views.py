@@ -28,7 +28,7 @@ def without_gaps(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
 
     Example:
         >>> comb = np.zeros((40, 40), bool)
-        >>> comb[:, ::4] = comb[:5] = True
+        >>> comb[:, ::3] = comb[:5] = True
         >>> closed = without_gaps(comb)
         >>> closed is not None and bool(closed[20, 10:30].all())
         True
