@@ -59,12 +59,20 @@ class Advance:
         if ends and hypothesis.finished is None:
             hypothesis = replace(hypothesis, finished=self.now)
         ways = len({t.entered for t in transitions if not t.ends})
-        found = ((t, self._support(hypothesis, t, ways)) for t in transitions if not t.ends)
+        # A course that may end needs no further round of its last step.
+        onward = [t for t in transitions if not t.ends and not (ends and _again(t))]
+        found = ((t, self._support(hypothesis, t, ways)) for t in onward)
         supported = [(t, support) for t, support in found if support]
-        # If all steps are over by themselves, only the end of the course justifies staying.
-        forced = not ends and any(s >= Support.OVER and self._all_over(t) for t, s in supported)
+        due = 0.0  # share of another round, which waits until the last one has ceased
+        if all(s <= Support.OVER for _, s in supported):
+            due = sum(t.share for t in transitions if _waits(t) and self._all_over(t))
+        # If all steps are over by themselves, only the end of the course or another round justifies
+        # staying.
+        forced = not (ends or due) and any(
+            s >= Support.OVER and self._all_over(t) for t, s in supported
+        )
         gone = 0.0
-        for transition, chance in self._chances(hypothesis, supported, ends, forced):
+        for transition, chance in self._chances(hypothesis, supported, due, ends, forced):
             if chance > 0.0:
                 gone += chance
                 yield self._moved(hypothesis, transition), chance
@@ -82,9 +90,14 @@ class Advance:
         return any(self.observe(x.step).paused for x in transition.left)
 
     def _chances(
-        self, hypothesis: TaskHypothesis, supported: Supported, ends: bool, forced: bool
+        self,
+        hypothesis: TaskHypothesis,
+        supported: Supported,
+        due: float,
+        ends: bool,
+        forced: bool,
     ) -> Iterator[tuple[OpenTransition, float]]:
-        shares = sum(t.share for t, _ in supported) or 1.0
+        shares = due + sum(t.share for t, _ in supported) or 1.0
         for transition, support in supported:
             if forced:
                 yield transition, transition.share / shares * self._skipped(transition)
@@ -113,7 +126,8 @@ class Advance:
         finished = self._all_over(transition)
         if self._goes_round(transition):
             return Support.NONE
-        if not finished and all(_goes_on(s, transition.left) for s in transition.entered):
+        goes_on = all(_goes_on(s, transition.left) for s in transition.entered)
+        if goes_on and (not finished or _waits(transition)):
             return Support.NONE
         opens = transition.entered and self._opens(hypothesis, transition)
         # With several alternatives an entry supports none of them: touching may precede coupling or backing
@@ -154,7 +168,7 @@ class Advance:
         """When the entry to each transition was last observed, including now."""
         met = dict(hypothesis.met)
         for transition in transitions:
-            if self._goes_round(transition):
+            if self._goes_round(transition) or _waits(transition):
                 continue
             if transition.entered and all(self._enters(s) for s in transition.entered):
                 met[transition.entered] = self.now
@@ -365,3 +379,13 @@ def _may_end(transition: OpenTransition) -> bool:
 def _goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
     """Whether a step requires an action that already holds: it can begin only after that has ended."""
     return any(step.same_as(x.step) and not x.payload.ceased for x in left)
+
+
+def _again(transition: OpenTransition) -> bool:
+    """Whether a transition begins another round of the steps that it completes."""
+    return bool(transition.entered) and {x.step for x in transition.left} == set(transition.entered)
+
+
+def _waits(transition: OpenTransition) -> bool:
+    """Whether a transition begins another round while all that the last one required may still hold."""
+    return _again(transition) and all(_goes_on(s, transition.left) for s in transition.entered)

@@ -138,3 +138,61 @@ def test_a_run_that_is_taken_up_again_in_a_round_goes_on_as_if_it_had_not_been_l
         outcome = reasoner(now, Observation(index, index / 4.0, (640, 480)))
         mind, events = outcome.mind, [*events, *outcome.events]
     assert events == [e for e in whole.events if e.time > 4.0]
+
+
+def repeated(text: str, touches: Sequence[tuple[float, float]], last_s: float | None) -> Played:
+    """A task about contacts `<a>` between arm and bin, and `<c>` between arm and part."""
+    spells = [Spell("touching", *touch, (ARM, BIN)) for touch in touches]
+    if last_s is not None:
+        spells.append(Spell("touching", last_s, 1e9, (ARM, FIRST)))
+    names = {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}, FIRST: {"part": 0.9}}
+    here = dict.fromkeys(names, (0.0, 1e9))
+    stages = "\n<a> ::= touching(arm, bin)\n<b> ::= apart(arm, bin)\n<c> ::= touching(arm, part)"
+    used = "\n".join(x for x in stages.splitlines() if x[:3] in text)
+    script = Script(tuple(spells), objects=here, identities=names)
+    return play(task_reasoner([parse_task(f"<t> ::= {text}\n{used}")]), script, 24.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "least"),
+    [
+        ("<a> at least 2 times", 2),
+        ("<a> at least 3 times", 3),
+        ("<a> at least 2 times at most 3 times", 2),
+        ("<a> at most 3 times", 1),
+        ("<a>+", 1),
+        ("(<a> <b>) at least 2 times", 2),
+    ],
+)
+@pytest.mark.parametrize("seen", [1, 2, 3])
+def test_a_round_that_is_missing_is_not_passed_over(times: str, least: int, seen: int) -> None:
+    touches = [(2.0 + 4.0 * k, 4.0 + 4.0 * k) for k in range(seen)]
+    played = repeated(f"{times} <c>", touches, 2.0 + 4.0 * seen)
+    assert (verdict(played) is Verdict.SUCCEEDED) is (seen >= least)
+
+
+@pytest.mark.parametrize("clause", ["", " for 2 s"])
+def test_what_goes_on_is_one_round_however_long_it_lasts(clause: str) -> None:
+    text = f"<a>{clause} at least 2 times <c>"
+    assert verdict(repeated(text, [(2.0, 12.0)], 14.0)) is not Verdict.SUCCEEDED
+    assert verdict(repeated(text, [(2.0, 6.0), (8.0, 12.0)], 14.0)) is Verdict.SUCCEEDED
+
+
+@pytest.mark.parametrize(("text", "least"), [("<a>+", 1), ("<a> at least 2 times", 2)])
+@pytest.mark.parametrize("seen", [1, 2, 3])
+def test_a_task_that_ends_with_rounds_has_succeeded_once(text: str, least: int, seen: int) -> None:
+    played = repeated(text, [(2.0 + 4.0 * k, 4.0 + 4.0 * k) for k in range(seen)], None)
+    told = [e for e in played.events if e.kind == "verdict"]
+    assert [e.data["verdict"] for e in told] == ["succeeded"] * (seen >= least)
+
+
+def test_an_actor_whose_turn_is_missing_is_not_passed_over() -> None:
+    text = "<t> ::= for each thing of (bin, part) <meet(thing)> <leave>\n"
+    text += "<meet(thing)> ::= touching(arm, thing)\n<leave> ::= apart(arm, bin) for 2 s"
+    names = {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}, FIRST: {"part": 0.9}}
+    spells = [Spell("touching", 2.0, 4.0, (ARM, FIRST)), Spell("touching", 6.0, 8.0, (ARM, BIN))]
+    for count, expected in ((1, False), (2, True)):
+        here = dict.fromkeys(names, (0.0, 1e9))
+        script = Script(tuple(spells[:count]), objects=here, identities=names)
+        played = play(task_reasoner([parse_task(text)]), script, 20.0)
+        assert (verdict(played) is Verdict.SUCCEEDED) is expected
