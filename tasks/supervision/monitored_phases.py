@@ -154,7 +154,7 @@ class MonitoredPhases:
         """
         if len(posterior.hypotheses) == 1:
             return
-        look = self.hmm.look_s
+        look = self.hmm.look_s - 1e-9  # times of frames are rounded
         nodes = dict.fromkeys(w.value.node for w in posterior.hypotheses.values())
         for step in dict.fromkeys(s for node in nodes for s in self._due(node)):
             seen = observe(step)

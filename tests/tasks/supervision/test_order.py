@@ -193,3 +193,18 @@ def test_stages_joined_by_and_go_on_side_by_side() -> None:
         )
         script = Script(spells, objects=HERE, identities=NAMES)
         assert verdict(text, script) is Verdict.SUCCEEDED
+
+
+@pytest.mark.parametrize("lasts", [0.5, 2.0])
+def test_what_follows_eight_touches_in_any_order_is_reached(lasts: float) -> None:
+    """A touch counts against the courses without it from its 0.4th second on, however times are rounded."""
+    order = (9, 6, 4, 2, 8, 3, 5, 7)
+    names = {TOP: {"top": 0.9}, **{k: {f"leg_{k - 1}": 0.9} for k in range(2, 11)}}
+    text = "<t> ::= any order (" + ", ".join(f"<s{k}>" for k in sorted(order)) + ") <c>\n"
+    text += "\n".join(f"<s{k}> ::= touching(leg_{k - 1}, top)" for k in order)
+    text += "\n<c> ::= touching(leg_9, top)"
+    meetings = [(leg, 2.0 + 2 * k, 2.0 + 2 * k + lasts) for k, leg in enumerate(order)]
+    meetings.append((10, 20.0, 1e9))
+    spells = tuple(Spell("touching", since, until, (TOP, leg)) for leg, since, until in meetings)
+    script = Script(spells, objects=dict.fromkeys(names, (0.0, 1e9)), identities=names)
+    assert verdict(text, script, 24.0) is Verdict.SUCCEEDED
