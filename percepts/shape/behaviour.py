@@ -203,7 +203,8 @@ class ShapeBehaviour:
             return tuple(hypotheses)
 
         def more(name: str) -> list[SizedHypothesis]:
-            wanted = self._refiner.settings.starts
+            # A view may be stored in two forms, of which one start is made.
+            wanted = 2 * self._refiner.settings.starts
             found = database.query(silhouette, top=wanted, restrict={name})
             return [(_hypothesis(region, m), m.view.area) for m in found.matches]
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.orientation import orientations, views
 from visup.agent.model.records import Frame, Hypothesis, Region
+from visup.percepts.shape.index.view_records import Direction
 from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.refinement.pose_fit import (
     COARSE,
@@ -195,10 +196,9 @@ class PoseRefiner:
 
 
 def _orientations(hypotheses: Sequence[Hypothesis]) -> list[tuple[int, NDArray[np.float64]]]:
-    """(view, orientation) of each view with a known orientation, once."""
-    once = {
-        (h.view, h.direction): (h.view, orientations(h.direction, h.rotation))
-        for h in hypotheses
-        if h.direction is not None and h.rotation is not None
-    }
+    """(view, orientation) of each direction that is known, once: a view may be stored in two forms."""
+    once: dict[Direction, tuple[int, NDArray[np.float64]]] = {}
+    for h in hypotheses:
+        if h.direction is not None and h.rotation is not None and h.direction not in once:
+            once[h.direction] = (h.view, orientations(h.direction, h.rotation))
     return list(once.values())
