@@ -150,6 +150,8 @@ FOREIGN_FORMS: tuple[UsualMeaning, ...] = (
     usual("E101 E103",
           rf"\bsignal\(\s*[\"']?({NAME})[\"']?\s*\)\s*(?:={{1,3}}|\bis\b)\s*[\"']?({NAME})[\"']?",
           _of_signal),
+    # A signal needs no declaration.
+    usual("E101", rf"^\s*signals?\s*:?\s+({NAME}(?:\s*,\s*{NAME})*)\s*$", r"# given as a signal: \1"),
     usual("E133 E101", rf"\bwhen\s+(not\s+)?({NAME})\b(?!\s*[\w(<>.])", r"when \1signal_on(\2)"),
     usual("E107 E101 E103", rf"(?<=::=)\s*({NAME})(?=\s*[<>]=?\s*[\d.])", r" signal(\1)"),
     usual("E101 E201 E205", rf"\b({NAME})\.({NAME})\(\s*({NAME})\s*\)", r"\2(\1, \3)"),

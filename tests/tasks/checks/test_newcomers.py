@@ -39,6 +39,7 @@ HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
         ("<t> ::= spin(x) < 1 rad/s\n", "<t> ::= spin(x) < 57.3 deg/s\n"),
         ("<t> ::= openness(x) > 0.3\n", "<t> ::= openness(x) > 30 %\n"),
         ("<t> ::= signal(battery) > 90 %\n", "<t> ::= signal(battery) > 90\n"),
+        (f"signal battery\n{HEAD}", f"# given as a signal: battery\n{HEAD}"),
         ("<t> ::= the hand touches the part for 1 s\n", "<t> ::= touching(hand, part) for 1 s\n"),
     ],
 )  # fmt: skip
