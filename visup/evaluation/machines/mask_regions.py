@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from visup.agent import Directive, Frame, Health, HealthStatus, Hypothesis, Observation, Percept
 from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.model.errors import SettingsError
+from visup.evaluation.machines.mask_camera import SceneCamera
 from visup.evaluation.missions.files import read_json
 from visup.evaluation.simulation.truth_masks import LAG_S, TrueMask, moved_since, true_mask
 from visup.percepts.opencv_names import opencv_name
@@ -80,7 +81,7 @@ def has_masks(folder: Path) -> bool:
 
 
 def mask_behaviours(folder: Path) -> list[Behaviour]:
-    """Ideal perception of a world: the region of each role by its name.
+    """Ideal perception of a world: the region of each role by its name, and the camera's motion.
 
     Raises:
         SettingsError: The truth cannot be read.
@@ -88,7 +89,8 @@ def mask_behaviours(folder: Path) -> list[Behaviour]:
     truth = read_json(folder / "truth.json")
     roles: Mapping[str, str] = truth.get("roles") or {n: n for n in truth["labels"]}
     labels = {role: int(truth["labels"][name]) for role, name in roles.items()}
-    return role_behaviours(partial(read_mask, folder), labels, float(truth["fps"]))
+    mask = partial(read_mask, folder)
+    return [SceneCamera(mask), *role_behaviours(mask, labels, float(truth["fps"]))]
 
 
 def role_behaviours(
