@@ -130,7 +130,7 @@ class RelationLookup:
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
         meets = name == "touching" and found is not None and found.truth is Truth.TRUE
-        if meets and found is not None and self._passes_by(objects):
+        if meets and found is not None and (self._passes_by(objects) or self._carried_past(objects)):
             return replace(found, truth=Truth.UNKNOWN)
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
@@ -149,6 +149,17 @@ class RelationLookup:
         if passing is None or passing.truth is not Truth.TRUE:
             return False
         return not self._rests(objects)
+
+    def _carried_past(self, objects: tuple[int, ...]) -> bool:
+        """Whether one of two whose outlines meet is being carried on by a third body."""
+        if self._mind.truth("in_contact", *objects) is Truth.TRUE:
+            return False
+        pair = set(objects)
+        return any(
+            len(pair & set(c.objects)) == 1
+            and self._mind.truth("coupled", *c.objects) is Truth.TRUE
+            for c in self._mind.couplings
+        )
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
         """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
