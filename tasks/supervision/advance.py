@@ -233,7 +233,14 @@ class Advance:
             self._past(hypothesis, transition, {x.step.stage for x in under_way}),
             backpointer=extended(hypothesis.backpointer, left, self.now, begun_at),
             gone_on=True,
+            lasting="" if opened else self._lasting(transition, {x.step.stage for x in under_way}),
         )
+
+    def _lasting(self, transition: OpenTransition, under_way: Collection[str]) -> str:
+        """The stage that a transition completes though it lasts until the next one begins, or empty."""
+        left = (x for x in transition.left if x.step.stage not in under_way)
+        lasts = (x.step.stage for x in left if self.steps.actions[x.step.action].lasts)
+        return next((s for s in lasts if not self._all_over(transition)), "")
 
     def _early(
         self, hypothesis: TaskHypothesis, transition: OpenTransition

@@ -214,7 +214,7 @@ def _pause(hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot) -> Pa
     """The pause of a stage whose active steps are all paused, or None."""
     steps = (x.step for x in leaves(hypothesis.state) if x.step.stage == stage)
     pauses = [snapshot.pauses.now(s.pauses) for s in steps]
-    return pauses[0] if all(p is not None for p in pauses) else None
+    return pauses[0] if pauses and all(p is not None for p in pauses) else None
 
 
 def _outcome(posterior: TaskHypotheses) -> tuple[Verdict, float, TaskHypothesis]:

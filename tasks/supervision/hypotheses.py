@@ -14,7 +14,7 @@ from visup.agent import StageBelief, Status
 from visup.tasks.automaton.backpointers import Backpointer
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.automaton.task_filter import TaskPosterior
-from visup.tasks.verification.step_monitor import StepMonitor
+from visup.tasks.verification.step_monitor import BAD, StepMonitor
 
 # The status of a stage is the first of these among its steps.
 WORST_FIRST = (
@@ -64,6 +64,8 @@ class TaskHypothesis:
         considered: Transitions not taken, by the steps they enter, with the strength of their support.
         backpointer: Completed steps and their times.
         gone_on: Whether it has completed a step.
+        lasting: The stage completed last, if it lasts until the next one begins and that was not observed to;
+            else empty.
     """
 
     state: State[StepMonitor]
@@ -74,6 +76,7 @@ class TaskHypothesis:
     considered: tuple[tuple[tuple[TaskStep, ...], Support], ...] = ()
     backpointer: Backpointer | None = None
     gone_on: bool = False
+    lasting: str = ""
 
     @property
     def begun(self) -> bool:
@@ -91,13 +94,25 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 
 
 def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
-    """Active stage -> its step with the worst status, in the order of the text."""
+    """Active stage -> its step with the worst status, in the order of the text.
+
+    What goes wrong before a stage has begun goes wrong in the stage that lasts until then.
+    """
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
         other = found.get(leaf.step.stage)
         if other is None or _worse(leaf, other):
             found[leaf.step.stage] = leaf
-    return found
+    if not hypothesis.lasting:
+        return found
+    return {hypothesis.lasting if _fails_unbegun(x) else s: x for s, x in found.items()}
+
+
+def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:
+    """Whether a step is contradicted before it ever held."""
+    monitor = leaf.payload
+    failing = monitor.status in BAD and monitor.fault is not None
+    return failing and not (monitor.held or monitor.late or monitor.early)
 
 
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:

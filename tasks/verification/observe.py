@@ -33,6 +33,12 @@ CARRIED_SPEED = 0.005
 REST_S = 0.3
 """How long a relative speed must be low before one body that passed the other rests there."""
 
+LET_GO_GAP = 0.01
+"""Gap of two coupled bodies from which one has let go of the other, image diagonals."""
+
+LET_GO_SHARE = 1.0
+"""The same by their relative speed, as a share of the slower one's speed."""
+
 RADIAL_SHARE = 0.45
 """Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
 flies round another it reaches 0.4."""
@@ -130,7 +136,7 @@ class RelationLookup:
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
         meets = name == "touching" and found is not None and found.truth is Truth.TRUE
-        if meets and found is not None and (self._passes_by(objects) or self._carried_past(objects)):
+        if meets and found is not None and self._goes_past(objects):
             return replace(found, truth=Truth.UNKNOWN)
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
@@ -150,16 +156,24 @@ class RelationLookup:
             return False
         return not self._rests(objects)
 
-    def _carried_past(self, objects: tuple[int, ...]) -> bool:
-        """Whether one of two whose outlines meet is being carried on by a third body."""
-        if self._mind.truth("in_contact", *objects) is Truth.TRUE:
-            return False
+    def _goes_past(self, objects: tuple[int, ...]) -> bool:
+        """Whether outlines meet only because one body moves on past the other, or is carried past it.
+
+        What is carried touches where it comes to rest, or where it is let go of.
+        """
         pair = set(objects)
-        return any(
-            len(pair & set(c.objects)) == 1
-            and self._mind.truth("coupled", *c.objects) is Truth.TRUE
-            for c in self._mind.couplings
-        )
+        held = [c.objects for c in self._mind.couplings if len(pair & set(c.objects)) == 1]
+        if not held:
+            return self._passes_by(objects)
+        settled = self._mind.truth("in_contact", *objects) is Truth.TRUE
+        return not settled and any(self._carries(*other) for other in held)
+
+    def _carries(self, a: int, b: int) -> bool:
+        """Whether two that are coupled also move as one just now: one that is let go of does not."""
+        now = kinematics(self._mind)
+        meet = now.pair("gap", a, b) <= LET_GO_GAP * image_diagonal(self._mind.frame_size)
+        speed = min(now.one("speed", a), now.one("speed", b))
+        return meet and not now.pair("relative_speed", a, b) > LET_GO_SHARE * speed
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
         """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
