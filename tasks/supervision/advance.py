@@ -54,7 +54,7 @@ class Advance:
         transitions = [t for t in transitions if not self._awaits(t)]
         barred = tuple(t.entered for t in transitions if self._is_paused(t))
         transitions = [t for t in transitions if not self._is_paused(t)]
-        hypothesis = replace(hypothesis, met=self._met(hypothesis, transitions))
+        hypothesis = self._met(hypothesis, transitions)
         ends = any(t.ends and _may_end(t) for t in transitions)
         if ends and hypothesis.finished is None:
             hypothesis = replace(hypothesis, finished=self.now)
@@ -164,25 +164,40 @@ class Advance:
 
     def _met(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
-    ) -> tuple[tuple[tuple[TaskStep, ...], float], ...]:
-        """When the entry to each transition was last observed, including now."""
-        met = dict(hypothesis.met)
+    ) -> TaskHypothesis:
+        """A hypothesis with the entries to next steps, and to transitions, that are observed now."""
+        entries, met = dict(hypothesis.entries), dict(hypothesis.met)
         for transition in transitions:
             if self._goes_round(transition) or _waits(transition):
                 continue
-            if transition.entered and all(self._enters(s) for s in transition.entered):
+            for step in transition.entered:
+                entry = self._entry(step)
+                if entry is not None:
+                    entries[step] = entry.since, self.now
+            if self._coincide([entries.get(s) for s in transition.entered]):
                 met[transition.entered] = self.now
-        return tuple(met.items())
+        return replace(hypothesis, entries=tuple(entries.items()), met=tuple(met.items()))
+
+    def _coincide(self, entries: Sequence[tuple[float, float] | None]) -> bool:
+        """Whether the entries of steps that begin together were observed at the same time, just now.
+
+        One may no longer be certain when another one is confirmed.
+        """
+        known = [e for e in entries if e is not None]
+        if not known or len(known) < len(entries):
+            return False
+        last = min(until for _, until in known)
+        return self.now - last <= BEFORE_S and max(since for since, _ in known) <= last
 
     def _holds(self, step: TaskStep) -> bool:
         """Whether a step holds, or a trend by which it holds has just set in."""
         seen = self.observe(step)
         return seen.holds is Truth.TRUE or seen.sudden is not None
 
-    def _enters(self, step: TaskStep) -> bool:
-        """Whether the beginning of a step is observed: by a relation that has lasted, or beyond doubt."""
+    def _entry(self, step: TaskStep) -> Relation | None:
+        """The relation by which the beginning of a step is observed: one that has lasted, or is beyond doubt."""
         seen = self.observe(step)
-        return seen.sudden is not None or self._lasted(step, seen.entry)
+        return seen.entry if seen.sudden is not None or self._lasted(step, seen.entry) else None
 
     def _lasted(self, step: TaskStep, relation: Relation | None) -> bool:
         """Whether a relation by which a step begins has lasted long enough."""

@@ -60,7 +60,9 @@ class TaskHypothesis:
         node: Number of the state (see `Automaton`).
         past: Completed stages with their latest beliefs.
         finished: When the task was completed, or None.
-        met: Possible next steps whose entry was observed, with the time of the last observation.
+        entries: Possible next steps whose entry was observed: since when, and when last, seconds.
+        met: Transitions, by the steps they enter, all of whose entries were observed at the same time, with the
+            time when that was last so.
         considered: Transitions not taken, by the steps they enter, with the strength of their support.
         backpointer: Completed steps and their times.
         gone_on: Whether it has completed a step.
@@ -72,6 +74,7 @@ class TaskHypothesis:
     node: int
     past: tuple[StageBelief, ...] = ()
     finished: float | None = None
+    entries: tuple[tuple[TaskStep, tuple[float, float]], ...] = ()
     met: tuple[tuple[tuple[TaskStep, ...], float], ...] = ()
     considered: tuple[tuple[tuple[TaskStep, ...], Support], ...] = ()
     backpointer: Backpointer | None = None

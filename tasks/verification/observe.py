@@ -11,6 +11,7 @@ from types import MappingProxyType
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import ContactSettings
+from visup.rules.coupling.evidence import COUPLING
 from visup.rules.formula.truth import truth_if
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
@@ -165,8 +166,10 @@ class RelationLookup:
         held = [c.objects for c in self._mind.couplings if len(pair & set(c.objects)) == 1]
         if not held:
             return self._passes_by(objects)
-        settled = self._mind.truth("in_contact", *objects) is Truth.TRUE
-        return not settled and any(self._carries(*other) for other in held)
+        evidence = self._mind.recall(COUPLING).get((min(pair), max(pair)))
+        contact = None if evidence is None else evidence.contact
+        moves_on = contact is not None and (contact.passing or not contact.known)
+        return moves_on and any(self._carries(*other) for other in held)
 
     def _carries(self, a: int, b: int) -> bool:
         """Whether two that are coupled also move as one just now: one that is let go of does not."""
