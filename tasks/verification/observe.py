@@ -174,9 +174,13 @@ class RelationLookup:
     def _carries(self, a: int, b: int) -> bool:
         """Whether two that are coupled also move as one just now: one that is let go of does not."""
         now = kinematics(self._mind)
-        meet = now.pair("gap", a, b) <= LET_GO_GAP * image_diagonal(self._mind.frame_size)
         speed = min(now.one("speed", a), now.one("speed", b))
-        return meet and not now.pair("relative_speed", a, b) > LET_GO_SHARE * speed
+        return not (self._gapes(a, b) or now.pair("relative_speed", a, b) > LET_GO_SHARE * speed)
+
+    def _gapes(self, a: int, b: int) -> bool:
+        """Whether there is a gap between the outlines of two bodies."""
+        gap = kinematics(self._mind).pair("gap", a, b)
+        return gap > LET_GO_GAP * image_diagonal(self._mind.frame_size)
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
         """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
@@ -192,6 +196,8 @@ class RelationLookup:
     ) -> tuple[Relation | None, Relation | None]:
         """The first true one of some relations, and a sudden trend among them; each may be None."""
         entry = self.first_true(names, objects)
+        if entry is not None and entry.name == "coupled" and self._gapes(*objects):
+            return None, None  # it is about to be doubted
         if entry is not None:
             return (None if self._sudden.ends(entry) else entry), None
         sudden = self._sudden.first(names, objects)
