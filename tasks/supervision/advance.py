@@ -174,20 +174,10 @@ class Advance:
                 entry = self._entry(step)
                 if entry is not None:
                     entries[step] = entry.since, self.now
-            if self._coincide([entries.get(s) for s in transition.entered]):
-                met[transition.entered] = self.now
+            together = _coincide([entries.get(s) for s in transition.entered])
+            if together is not None:
+                met[transition.entered] = together
         return replace(hypothesis, entries=tuple(entries.items()), met=tuple(met.items()))
-
-    def _coincide(self, entries: Sequence[tuple[float, float] | None]) -> bool:
-        """Whether the entries of steps that begin together were observed at the same time, just now.
-
-        One may no longer be certain when another one is confirmed.
-        """
-        known = [e for e in entries if e is not None]
-        if not known or len(known) < len(entries):
-            return False
-        last = min(until for _, until in known)
-        return self.now - last <= BEFORE_S and max(since for since, _ in known) <= last
 
     def _holds(self, step: TaskStep) -> bool:
         """Whether a step holds, or a trend by which it holds has just set in."""
@@ -373,6 +363,18 @@ class Advance:
         """Since when a step's action has been contradicted, or None."""
         contrary = self.observe(step).contrary
         return None if contrary is None else contrary.since
+
+
+def _coincide(entries: Sequence[tuple[float, float] | None]) -> float | None:
+    """When the entries of steps that begin together were last observed at the same time, or None.
+
+    One may no longer be certain when another one is confirmed, which is then dated back.
+    """
+    known = [e for e in entries if e is not None]
+    if not known or len(known) < len(entries):
+        return None
+    last = min(until for _, until in known)
+    return last if max(since for since, _ in known) <= last else None
 
 
 def _turn(left: Sequence[Leaf[StepMonitor]]) -> float | None:
