@@ -10,6 +10,7 @@ from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import Backpointer, behind, extended
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
+from visup.tasks.supervision.entries import observed_entries
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import lasted, outcome
@@ -166,18 +167,13 @@ class Advance:
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
     ) -> TaskHypothesis:
         """A hypothesis with the entries to next steps, and to transitions, that are observed now."""
-        entries, met = dict(hypothesis.entries), dict(hypothesis.met)
-        for transition in transitions:
-            if self._goes_round(transition) or _waits(transition):
-                continue
-            for step in transition.entered:
-                entry = self._entry(step)
-                if entry is not None:
-                    entries[step] = entry.since, self.now
-            together = _coincide([entries.get(s) for s in transition.entered])
-            if together is not None:
-                met[transition.entered] = together
-        return replace(hypothesis, entries=tuple(entries.items()), met=tuple(met.items()))
+        possible = [
+            t.entered for t in transitions if not (self._goes_round(t) or _waits(t)) and t.entered
+        ]
+        entries, met = observed_entries(
+            (hypothesis.entries, hypothesis.met), possible, self._entry, self.now
+        )
+        return replace(hypothesis, entries=entries, met=met)
 
     def _holds(self, step: TaskStep) -> bool:
         """Whether a step holds, or a trend by which it holds has just set in."""
@@ -185,7 +181,7 @@ class Advance:
         return seen.holds is Truth.TRUE or seen.sudden is not None
 
     def _entry(self, step: TaskStep) -> Relation | None:
-        """The relation by which the beginning of a step is observed: one that has lasted, or is beyond doubt."""
+        """The relation by which a step is observed to begin: it has lasted, or is beyond doubt."""
         seen = self.observe(step)
         return seen.entry if seen.sudden is not None or self._lasted(step, seen.entry) else None
 
@@ -363,18 +359,6 @@ class Advance:
         """Since when a step's action has been contradicted, or None."""
         contrary = self.observe(step).contrary
         return None if contrary is None else contrary.since
-
-
-def _coincide(entries: Sequence[tuple[float, float] | None]) -> float | None:
-    """When the entries of steps that begin together were last observed at the same time, or None.
-
-    One may no longer be certain when another one is confirmed, which is then dated back.
-    """
-    known = [e for e in entries if e is not None]
-    if not known or len(known) < len(entries):
-        return None
-    last = min(until for _, until in known)
-    return last if max(since for since, _ in known) <= last else None
 
 
 def _turn(left: Sequence[Leaf[StepMonitor]]) -> float | None:

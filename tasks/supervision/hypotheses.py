@@ -14,6 +14,7 @@ from visup.agent import StageBelief, Status
 from visup.tasks.automaton.backpointers import Backpointer
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.automaton.task_filter import TaskPosterior
+from visup.tasks.supervision.entries import Meetings, StepEntries
 from visup.tasks.verification.step_monitor import BAD, StepMonitor
 
 # The status of a stage is the first of these among its steps.
@@ -61,8 +62,7 @@ class TaskHypothesis:
         past: Completed stages with their latest beliefs.
         finished: When the task was completed, or None.
         entries: Possible next steps whose entry was observed: since when, and when last, seconds.
-        met: Transitions, by the steps they enter, all of whose entries were observed at the same time, with the
-            time when that was last so.
+        met: Steps that begin together whose entries were observed at the same time, and when last.
         considered: Transitions not taken, by the steps they enter, with the strength of their support.
         backpointer: Completed steps and their times.
         gone_on: Whether it has completed a step.
@@ -74,8 +74,8 @@ class TaskHypothesis:
     node: int
     past: tuple[StageBelief, ...] = ()
     finished: float | None = None
-    entries: tuple[tuple[TaskStep, tuple[float, float]], ...] = ()
-    met: tuple[tuple[tuple[TaskStep, ...], float], ...] = ()
+    entries: StepEntries = ()
+    met: Meetings = ()
     considered: tuple[tuple[tuple[TaskStep, ...], Support], ...] = ()
     backpointer: Backpointer | None = None
     gone_on: bool = False

@@ -11,7 +11,6 @@ from types import MappingProxyType
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import ContactSettings
-from visup.rules.coupling.evidence import COUPLING
 from visup.rules.formula.truth import truth_if
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
@@ -21,6 +20,7 @@ from visup.tasks.actions.rhythm import Beats, Rhythm, heard
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.verification.kept import NOTHING_KEPT, Kept
+from visup.tasks.verification.passing import gapes, goes_past
 from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 from visup.tasks.verification.sudden import SuddenTrends
 
@@ -33,12 +33,6 @@ CARRIED_SPEED = 0.005
 
 REST_S = 0.3
 """How long a relative speed must be low before one body that passed the other rests there."""
-
-LET_GO_GAP = 0.01
-"""Gap of two coupled bodies from which one has let go of the other, image diagonals."""
-
-LET_GO_SHARE = 1.0
-"""The same by their relative speed, as a share of the slower one's speed."""
 
 RADIAL_SHARE = 0.45
 """Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
@@ -137,7 +131,7 @@ class RelationLookup:
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
         meets = name == "touching" and found is not None and found.truth is Truth.TRUE
-        if meets and found is not None and self._goes_past(objects):
+        if meets and found is not None and goes_past(self._mind, objects, self._rests):
             return replace(found, truth=Truth.UNKNOWN)
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
@@ -149,38 +143,6 @@ class RelationLookup:
         derive = DERIVED.get(name)
         derived = derive(self._mind, self, objects) if derive else None
         return derived or found or Relation(name, objects, Truth.UNKNOWN, self._mind.time)
-
-    def _passes_by(self, objects: tuple[int, ...]) -> bool:
-        """Whether outlines meet only because one body passes in front of the other."""
-        passing = self._mind.relation("passing_by", *objects)
-        if passing is None or passing.truth is not Truth.TRUE:
-            return False
-        return not self._rests(objects)
-
-    def _goes_past(self, objects: tuple[int, ...]) -> bool:
-        """Whether outlines meet only because one body moves on past the other, or is carried past it.
-
-        What is carried touches where it comes to rest, or where it is let go of.
-        """
-        pair = set(objects)
-        held = [c.objects for c in self._mind.couplings if len(pair & set(c.objects)) == 1]
-        if not held:
-            return self._passes_by(objects)
-        evidence = self._mind.recall(COUPLING).get((min(pair), max(pair)))
-        contact = None if evidence is None else evidence.contact
-        moves_on = contact is not None and (contact.passing or not contact.known)
-        return moves_on and any(self._carries(*other) for other in held)
-
-    def _carries(self, a: int, b: int) -> bool:
-        """Whether two that are coupled also move as one just now: one that is let go of does not."""
-        now = kinematics(self._mind)
-        speed = min(now.one("speed", a), now.one("speed", b))
-        return not (self._gapes(a, b) or now.pair("relative_speed", a, b) > LET_GO_SHARE * speed)
-
-    def _gapes(self, a: int, b: int) -> bool:
-        """Whether there is a gap between the outlines of two bodies."""
-        gap = kinematics(self._mind).pair("gap", a, b)
-        return gap > LET_GO_GAP * image_diagonal(self._mind.frame_size)
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
         """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
@@ -196,7 +158,7 @@ class RelationLookup:
     ) -> tuple[Relation | None, Relation | None]:
         """The first true one of some relations, and a sudden trend among them; each may be None."""
         entry = self.first_true(names, objects)
-        if entry is not None and entry.name == "coupled" and self._gapes(*objects):
+        if entry is not None and entry.name == "coupled" and gapes(self._mind, *objects):
             return None, None  # it is about to be doubted
         if entry is not None:
             return (None if self._sudden.ends(entry) else entry), None

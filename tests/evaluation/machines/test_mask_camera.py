@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from tests.percepts.appearance.test_camera import ARM, FPS, HEIGHT, WIDTH, picture
 from visup.agent import CameraMotion, Frame, Observation
 from visup.evaluation.machines.mask_camera import SceneCamera
-from tests.percepts.appearance.test_camera import ARM, FPS, HEIGHT, WIDTH, picture
 
 ARM_BOTTOM = 150
 
@@ -33,9 +33,7 @@ def motions(places: list[tuple[float, float]], arm: bool) -> list[CameraMotion]:
     return told
 
 
-steps = st.lists(
-    st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=2, max_size=5
-)
+steps = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=2, max_size=5)
 
 
 @settings(max_examples=15, deadline=None)
