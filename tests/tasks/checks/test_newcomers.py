@@ -6,7 +6,7 @@
 import pytest
 
 from tests.tasks.checks.mistakes.counted import account_of
-from tests.tasks.checks.mistakes.pairs import SETS, pairs
+from tests.tasks.checks.mistakes.pairs import SETS, pairs, pointings
 from tests.tasks.checks.test_mistakes_counted import fixes, of_tasks
 
 ONE_IN = 4
@@ -19,6 +19,13 @@ def test_nearly_all_mistakes_of_newcomers_are_mended_mostly_to_what_was_meant(na
     assert all(one.told for one in found)
     assert sum(one.legal for one in found) >= 0.9 * len(found)
     assert sum(one.restored for one in found) >= 0.6 * len(found)
+
+
+def test_of_all_mistakes_of_newcomers_95_of_a_hundred_have_a_caret_at_the_culprit() -> None:
+    found = [one for name in SETS for one in pointings(name)]
+    beside = [one.slip.text for one in found if not one.any]
+    assert len(beside) <= 0.05 * len(found), beside
+    assert sum(one.first for one in found) >= 0.95 * len(found)
 
 
 HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
