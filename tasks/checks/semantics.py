@@ -320,7 +320,9 @@ class _Semantics:
                 continue  # an included file may define more than is used
             if not any(_is_misspelling(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
-                hint = did_you_mean(actor.name, named, "`{}`")
+                # The actors of `for each of 4 legs` are written nowhere themselves.
+                written = actor.span.length == len(actor.name)
+                hint = did_you_mean(actor.name, named, "`{}`") if written else None
                 yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
 
 

@@ -15,7 +15,21 @@ _RANKS_MEANT = {
     "bottommost": "lowest", "tiniest": "smallest",
 }  # fmt: skip
 _ACTOR = re.compile(rf"\s*(?:(?:optional\s+)?actor|bystander)\b\s*({NAME})?\s*(\S*)")
-_ARTICLES = ("a", "an", "the", "of", "with", "color", "colour", "colored", "coloured")
+_ARTICLES = (
+    "a",
+    "an",
+    "the",
+    "of",
+    "with",
+    "bright",
+    "vivid",
+    "pale",
+    "deep",
+    "color",
+    "colour",
+    "colored",
+    "coloured",
+)
 _BLANK = re.compile(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|and\b|size\b)([\w.\-]+)")
 
 
