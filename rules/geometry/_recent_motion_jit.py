@@ -97,6 +97,7 @@ def steady_velocities(
     times: Floats,
     support: Floats,
     free: Flags,
+    image: Floats,
     begins: NDArray[np.int64],
     directions: Floats,
     limits: tuple[float, float, float, float],
@@ -107,6 +108,7 @@ def steady_velocities(
         times: (T,) seconds.
         support: (T, M, K) pixels.
         free: (T, M, K).
+        image: (T, M, 3); see `velocities`.
         begins: (W,) first samples of longer and longer windows.
         directions: (K, 2) unit vectors.
         limits: Least noise of an outline, pixels; misfit, see `common_motion`; then as in
@@ -119,7 +121,8 @@ def steady_velocities(
     count, samples = support.shape[1], len(times)
     spans = np.empty((len(begins), 2), np.int64)
     spans[:, 0], spans[:, 1] = begins, samples
-    found = velocities(times, support, free, spans, directions, misfit)
+    trusted = misfit, noise, least
+    found = velocities(times, support, free, image, spans, directions, trusted)
     sigmas, chosen, spread = np.empty(len(begins)), np.empty((count, 2)), np.empty(count)
     for i in range(count):
         shaky, known = 0.0, 0
@@ -154,6 +157,7 @@ def fit_motion(
     times: Floats,
     support: Floats,
     free: Flags,
+    image: Floats,
     separation: Floats,
     directions: Floats,
     limits: tuple[float, float, float, float, float, float],
@@ -165,6 +169,7 @@ def fit_motion(
         times: (T,) seconds.
         support: (T, M, K) pixels; see `SampleWindow`.
         free: (T, M, K).
+        image: (T, M, 3) image motion of each region relative to the static scene; see `velocities`.
         separation: (T, M, M) pixels.
         directions: (K, 2) unit vectors.
         limits: The windows of trends and of motion, seconds; noise of an outline, pixels; difference
@@ -186,9 +191,11 @@ def fit_motion(
     begins = _windows(times, moving)
     half = begins[-1] + (samples - begins[-1]) // 2
     spans = np.array([[begins[-1], half], [half, samples]])
-    motion[1:] = velocities(times, support, free, spans, directions, misfit)
-    for_velocities = noise, misfit, sigmas, strong
-    motion[0], spread = steady_velocities(times, support, free, begins, directions, for_velocities)
+    trusted = misfit, noise, strong
+    motion[1:] = velocities(times, support, free, image, spans, directions, trusted)
+    motion[0], spread = steady_velocities(
+        times, support, free, image, begins, directions, (noise, misfit, sigmas, strong)
+    )
     begins = _windows(times, window)
     series, room, number = np.empty(samples), np.empty((bins + 2, bins)), 0
     for i in range(count):

@@ -222,6 +222,7 @@ class KinematicsEstimator:
             h.times,
             h.steady_support,
             h.free,
+            h.image,
             h.separation,
             DIRECTIONS,
             (*windows, noise, strong, s.change_sigmas, s.misfit * diagonal),
