@@ -18,6 +18,7 @@ from visup.rules.geometry._covered_motion_jit import (
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Samples = tuple[Floats, Flags, Floats]
 
 
 @compiled
@@ -243,9 +244,7 @@ def common_motion(
 @compiled
 def velocities(
     times: Floats,
-    support: Floats,
-    free: Flags,
-    image: Floats,
+    samples: Samples,
     spans: NDArray[np.int64],
     directions: Floats,
     limits: tuple[float, float, float],
@@ -254,9 +253,8 @@ def velocities(
 
     Args:
         times: (T,) seconds.
-        support: (T, M, K) pixels.
-        free: (T, M, K).
-        image: (T, M, 3) image motion of each region, pixels per second, and its deviation; NaN unknown.
+        samples: Support (T, M, K), pixels; whether it is free (T, M, K); and the image motion of each
+            region, pixels per second, and its deviation (T, M, 3); NaN unknown.
         spans: (S, 2) first sample and last + 1.
         directions: (K, 2) unit vectors.
         limits: Misfit, see `common_motion`; noise of an outline, pixels; least difference of two
@@ -266,6 +264,7 @@ def velocities(
         (S, M, 2) pixels per second; NaN unknown.
     """
     misfit, noise, least = limits
+    support, free, image = samples
     count = support.shape[1]
     found = np.empty((len(spans), count, 2))
     slopes = np.empty(len(directions))

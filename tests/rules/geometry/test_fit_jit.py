@@ -44,7 +44,9 @@ def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
     whole = np.array([[0, len(times)]])
     unseen = np.full((*support.shape[:2], 3), np.nan)
     limits = np.inf, 0.7, 3.0
-    found: Floats = velocities(times, support, np.array(free), unseen, whole, DIRECTIONS, limits)[0]
+    found: Floats = velocities(times, (support, np.array(free), unseen), whole, DIRECTIONS, limits)[
+        0
+    ]
     return found
 
 
@@ -196,7 +198,7 @@ def test_velocities_over_spans_are_those_of_a_dumb_twin(
     free = rng.random(support.shape) < rng.choice([1.0, 0.9, 0.4])
     spans = np.array([[0, 20], [0, 10], [10, 20], [17, 20]])
     image = np.full((20, 3, 3), np.nan)
-    found = velocities(times, support, free, image, spans, DIRECTIONS, (misfit, 0.5, 3.0))
+    found = velocities(times, (support, free, image), spans, DIRECTIONS, (misfit, 0.5, 3.0))
     for s, (begin, end) in enumerate(spans):
         for i in range(3):
             slopes = np.full(16, np.nan)
