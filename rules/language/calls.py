@@ -15,6 +15,9 @@ from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits,
 from visup.rules.predicates.vocabulary import Vocabulary
 
 Call = Predicate | Measure
+_KNOWN = ("known", "is_known", "available", "is_available", "has_value")
+SHORT_NAME = 2
+"""Most characters of what is taken for a misspelt variable of a rule."""
 
 
 def check_call(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Iterator[Fault]:
@@ -52,7 +55,10 @@ def _unknown(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Faul
     table = words if fact else quantities
     kind = "relation or fact" if fact else "quantity"
     hint = did_you_mean(synonym(call.name, table) or call.name, table)
-    if fact and (other := said_otherwise(call.name, call.words, words)) is not None:
+    if fact and call.name in _KNOWN and len(call.words) == 1:
+        meant = "identified" if call.words[0] in scope else "signal_known"
+        hint = f"write `{meant}({call.words[0]})`"
+    elif fact and (other := said_otherwise(call.name, call.words, words)) is not None:
         hint = f"write `{other}`"
     elif call.name in (quantities if fact else words):
         hint = _compared(call, vocabulary) if fact else "it is true or false"
@@ -60,6 +66,8 @@ def _unknown(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Faul
         hint = f"write `objects_named({call.words[0]})`"
     elif call.name in scope and not call.words:
         hint = f"write `seen({call.name})` in place of `{call.name}`"
+    elif fact and hint is None and not call.words and len(call.name) > SHORT_NAME:
+        hint = f"write `signal_on({call.name})` in place of `{call.name}`"
     return call.span, f"there is no {kind} '{call.name}'", nearest(call.name, table), hint
 
 

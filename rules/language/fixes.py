@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from visup.agent.model.errors import SourceLocation
+from visup.rules.correction.culprit import Culprit, culprit
+from visup.rules.language.diagnostics import Diagnostic, Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,3 +121,58 @@ def _renamed(where: SourceLocation, rest: str, new: str) -> TextFix:
     found = _NAME.match(rest) if _NAME.match(new) else None
     length = len(found[0]) if found and " " not in new else where.length
     return TextFix(where.line, where.column, length, new)
+
+
+def pointing(text: str, fault: Diagnostic) -> Diagnostic:
+    """The fault with its caret at what its hint changes, unless it is there already.
+
+    Args:
+        text: The faulty text.
+        fault: A fault with a place in that text.
+    """
+    fix = fix_of(text, fault.place, fault.hint)
+    if fix is None or fault.hint is None or _LINE.search(fault.hint):
+        return fault
+    begin = _offset(text, fix.line, fix.column)
+    at = _offset(text, fault.place.line, fault.place.column)
+    if fault.code >= "E2" and begin <= at < begin + fix.length and _names_its_caret(fault):
+        return fault
+    found = culprit(text, begin, begin + fix.length, fix.new)
+    if found is None or _is_at(at, fault.place.length, found):
+        return fault
+    span = found.shown
+    line, column = text.count("\n", 0, span[0]) + 1, span[0] - text.rfind("\n", 0, span[0])
+    place = Source(text, fault.place.file).place(line, column, span[1] - span[0])
+    old = " ".join(text[begin : begin + fix.length].split())
+    in_full = _SAID.sub(lambda _: f"write `{fix.new.strip()}` in place of `{old}`", fault.hint)
+    wanted = fix.applied(text)
+    for hint in (fault.hint, in_full):
+        moved = fix_of(text, place, hint)
+        if moved is not None and moved.applied(text) == wanted:
+            return replace(fault, place=place, hint=hint)
+    return fault
+
+
+def _names_its_caret(fault: Diagnostic) -> bool:
+    """Whether a message of meaning is about exactly the word under its caret."""
+    begin = fault.place.column - 1
+    return f"`{fault.place.text[begin : begin + fault.place.length]}`" in fault.message
+
+
+_SAID = re.compile(r"write `[^`]+`(?: in place of `[^`]+`)?|did you mean [`'][^`']+[`']\?")
+
+
+LITTLE_MORE, LONG = 8, 30
+"""Characters that a caret may cover beside the culprit; and in all, if something is missing after its end."""
+
+
+def _is_at(begin: int, length: int, found: Culprit) -> bool:
+    """Whether a caret covers something of the culprit, and little else."""
+    first, last = found.shown
+    at = any(start < begin + length and begin < end for start, end in found.words)
+    after_bracket = last - first == 1 and begin + length == last and length <= LONG
+    return at and (length <= last - first + LITTLE_MORE or after_bracket)
+
+
+def _offset(text: str, line: int, column: int) -> int:
+    return sum(len(row) + 1 for row in text.split("\n")[: line - 1]) + column - 1

@@ -13,6 +13,7 @@ from visup.agent.model.errors import RuleError
 from visup.agent.storage.text_file import read_text_file
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.diagnostics import Diagnostic, raise_all
+from visup.rules.language.fixes import pointing
 from visup.rules.language.reading import Patience, read_repaired, weight, with_tried_edits
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
@@ -54,6 +55,7 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
         )
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)
+    errors = [pointing(text, error) for error in errors]
     raise_all(sorted(errors, key=_position)[:MOST_FAULTS], RuleError)
     return tuple(rules)
 
@@ -115,7 +117,8 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
 
 def _formula(text: str, file: str, vocabulary: Vocabulary) -> Formula:
     found = read_repaired(text, "formula", file, vocabulary, Patience())
-    raise_all(sorted(found.diagnostics(text), key=_position), RuleError)
+    errors = [pointing(text, error) for error in found.diagnostics(text)]
+    raise_all(sorted(errors, key=_position), RuleError)
     return cast("Formula", found.tree)
 
 

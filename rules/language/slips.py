@@ -196,6 +196,7 @@ SLIPS = (
     _slip(rf"{_QUANTIFIED}(?:an?|any|some|one|another|objects?|things?|bod(?:y|ies))\s+(\w+)"
           r"(?=\s*(?::|\bsuch\b|\bwhere\b|\bwith\b))", r"\1 \2"),
     _slip(r"\b([a-z_]{3,})\s+(?:between|of|from)\s+(\w+)\s+(?:and|to|,)\s*(\w+)(?=\s*[<>=])", r"\1(\2, \3)"),
+    _slip(r"\b(signal(?:_on|_is|_known)?\(\s*\w+)\s+(\w+)", r"\1_\2"),
     _slip(r"∃\s*(?=\w)", "exists "),
     _slip(r"∀\s*(?=\w)", "forall "),
     _slip(r"\bon(?:[ _]?top(?:[ _]of)?)?\(\s*(\w+)\s*,\s*(\w+)\s*\)", _ON),

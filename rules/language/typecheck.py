@@ -8,6 +8,7 @@ from itertools import count
 
 from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
 from visup.agent.model.did_you_mean import did_you_mean
+from visup.rules.correction.everyday import NUMBERS
 from visup.rules.formula.nodes import (
     And,
     Comparison,
@@ -31,7 +32,7 @@ from visup.rules.formula.nodes import (
 from visup.rules.formula.rebuilding import cut_off
 from visup.rules.formula.terms import Arithmetic, Measure, Variable, WindowFunction
 from visup.rules.formula.units import Number, Span, Unit
-from visup.rules.language.calls import check_call
+from visup.rules.language.calls import SHORT_NAME, check_call
 from visup.rules.language.diagnostics import Diagnostic, Source, listed
 from visup.rules.language.dimensions import (
     check_constant,
@@ -318,7 +319,9 @@ class _FormulaChecker:
             return
         what = f"'{node.name}' is a name, not a quantity"
         near = did_you_mean(node.name, (*self.values, *self.vocabulary.quantities))
-        if near is None and not self.values and len(node.name) > SHORT_NAME:
+        if node.name.casefold() in NUMBERS:
+            near = f"write `{NUMBERS[node.name.casefold()]}` in place of `{node.name}`"
+        elif near is None and not self.values and len(node.name) > SHORT_NAME:
             near = f"write `signal({node.name})` in place of `{node.name}`"
         if near is None:
             meant = self.values[-1] if self.values else self.amount
@@ -351,7 +354,3 @@ def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:
             found += [w for w, t in zip(node.words, takes, strict=False) if t == "object"]
     bound = {n.variable for f in rule.formulas for n in walk(f) if isinstance(n, Quantified)}
     return [w for w in dict.fromkeys(found) if w not in bound]
-
-
-SHORT_NAME = 2
-"""Most characters of what is taken for a misspelt variable of a rule."""

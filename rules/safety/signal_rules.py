@@ -116,19 +116,25 @@ def _signal(rule: Rule, node: Node, looks: dict[str, Look], reading: str) -> Nod
         return Measure(key, (), node.span)
     fact = _FACTS.get(node.name) if isinstance(node, Predicate) else None
     if fact is None:
-        raise _refused(rule, node.span, f"'{node}' is not about signals", "signals alone")
+        what, hint = f"'{node}' is not about signals", AT_FRAMES
+        raise _refused(rule, node.span, what, "signals alone", hint)
     if reading == "linear":
-        raise _refused(rule, node.span, f"'{node}' has no line between samples", "numbers alone")
+        what, hint = f"'{node}' has no line between samples", HELD
+        raise _refused(rule, node.span, what, "numbers alone", hint)
     looks[key] = lambda values: _SIGNAL_OF[fact(values, *words)]
     return Comparison(Measure(key, (), node.span), ">", NONE, None, node.span)
 
 
-def _refused(rule: Rule, span: Span, what: str, expected: str) -> RuleError:
+AT_FRAMES = "rules about objects are evaluated at frames: `visup watch --rules FILE`"
+HELD = "words, and what is on or off, stand until the next row: `--between held`"
+
+
+def _refused(rule: Rule, span: Span, what: str, expected: str, hint: str) -> RuleError:
     return RuleError(
         f"{what} (rule '{rule.name}')",
         where=f"{rule.file}:{span.line}" if rule.file else "",
         expected=expected,
-        hint="rules about objects are evaluated at frames: `visup watch --rules FILE`",
+        hint=hint,
     )
 
 

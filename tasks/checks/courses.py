@@ -17,6 +17,7 @@ from visup.tasks.grammar.graphs import reachable
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
+    Already,
     AnyOrder,
     Conditioned,
     Counted,
@@ -68,6 +69,7 @@ class CourseCheck:
         yield from self.conditions()
         yield from self.counts()
         yield from self.clauses()
+        yield from self.already()
         yield from self.together()
         yield from self.invariants()
         yield from self.repetitions()
@@ -124,6 +126,16 @@ class CourseCheck:
                 hint = "put `for` after the one that must hold"
                 expected = "one action, or several at the same time"
                 yield self.source.fault("E216", what, holds[0].span, expected, hint)
+
+    def already(self) -> Iterator[Diagnostic]:
+        """An `already` of an `already`, which says nothing more."""
+        for course in self.courses:
+            if isinstance(course, Already) and isinstance(course.item, Already):
+                what, change = (
+                    "`already` is given twice",
+                    "write `already` in place of `already already`",
+                )
+                yield self.source.fault("E208", what, course.span, "one `already`", change)
 
     def together(self) -> Iterator[Diagnostic]:
         """Actions that can never hold at the same time."""

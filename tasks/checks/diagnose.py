@@ -7,6 +7,7 @@ from collections.abc import Set as AnySet
 from functools import partial
 
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.rules.language.fixes import pointing
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.bounds import MOST_FAULTS, text_fault
 from visup.tasks.checks.files import include_root, read_beside
@@ -47,7 +48,8 @@ def diagnose(
     def check(changed: str) -> list[Diagnostic]:
         return _ordered(changed, file, actions, percepts, read)[1]
 
-    return task, list(with_tried_hints(text, faults, check))
+    hinted = with_tried_hints(text, faults, check)
+    return task, [pointing(text, f) if f.place.file == file else f for f in hinted]
 
 
 def _ordered(

@@ -137,6 +137,10 @@ FOREIGN_FORMS: tuple[UsualMeaning, ...] = (
           r"\b(for|within|after)\s+((?:[\d.]+\s*[hms][a-z]*\s*(?:,|and)?\s*){2,3})(?<!\s)", _seconds),
     usual("E218", r"([\d.]+)\s*rad(?:ians?)?\b\s*(/s)?",
           lambda m: f"{degrees(float(m[1])):.3g} deg{m[2] or ''}"),
+    usual("E122 E218 E116", r"\b(px|deg|m)\s*/\s*(?:s|sec|second)\b", r"\1/s"),
+    usual("E124",
+          rf"\b(actor\s+{NAME}\s+is)\s+(?:(?:an?|the|of|with|bright|vivid|pale|deep|colou?r(?:ed)?)\s+)+(?=\w)",
+          r"\1 "),
     usual("E131", rf"\bzone\s+({NAME})\b(.*)$", _drawn),
     usual("E124 E127 E103", rf"^\s*actors?\s*:?\s*({NAME}(?:\s*(?:,|\band\b)\s*{NAME})+)\s*$",
           lambda m: _each("actor", m)),
@@ -150,6 +154,7 @@ FOREIGN_FORMS: tuple[UsualMeaning, ...] = (
     usual("E101 E103",
           rf"\bsignal\(\s*[\"']?({NAME})[\"']?\s*\)\s*(?:={{1,3}}|\bis\b)\s*[\"']?({NAME})[\"']?",
           _of_signal),
+    usual("E101 E103 E116 E119 E219", rf"\bsignal\s+({NAME})(?=\s*[<>])", r"signal(\1)"),
     # A signal needs no declaration.
     usual("E101", rf"^\s*signals?\s*:?\s+({NAME}(?:\s*,\s*{NAME})*)\s*$", r"# given as a signal: \1"),
     usual("E133 E101", rf"\bwhen\s+(not\s+)?({NAME})\b(?!\s*[\w(<>.])", r"when \1signal_on(\2)"),

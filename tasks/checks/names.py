@@ -122,7 +122,6 @@ class NameCheck:
             for amount in bounds_of(comparison):
                 on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
                 of_signal = wanted != TIME and action_of(comparison).name in SIGNAL_WORDS
-                # The unit of a signal depends on its source.
                 yield amount, SIZE if on_floor else ANY if of_signal else wanted
 
     def measured(self, amount: Amount) -> str:
@@ -155,8 +154,10 @@ class NameCheck:
         """Faults of one amount that is not a parameter."""
         if wanted == ANY and amount.unit == Unit.NONE:
             return
-        if wanted == ANY and amount.unit == Unit.PERCENT:
-            what = f"the numbers of signals have no unit, and `{amount}` is {value(amount):g}"
+        if wanted == ANY:
+            what = f"the numbers of signals have no unit, unlike `{amount}`"
+            if amount.unit == Unit.PERCENT:
+                what = f"the numbers of signals have no unit, and `{amount}` is {value(amount):g}"
             change = f"write `{amount.value:g}`"
             yield self.source.fault("E226", what, amount.span, "a plain number", change)
             return

@@ -15,6 +15,21 @@ _RANKS_MEANT = {
     "bottommost": "lowest", "tiniest": "smallest",
 }  # fmt: skip
 _ACTOR = re.compile(rf"\s*(?:(?:optional\s+)?actor|bystander)\b\s*({NAME})?\s*(\S*)")
+_ARTICLES = (
+    "a",
+    "an",
+    "the",
+    "of",
+    "with",
+    "bright",
+    "vivid",
+    "pale",
+    "deep",
+    "color",
+    "colour",
+    "colored",
+    "coloured",
+)
 _BLANK = re.compile(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|and\b|size\b)([\w.\-]+)")
 
 
@@ -51,11 +66,12 @@ def actor(text: str) -> RecognisedError | None:
     if m[2] == "is":
         hint = "several models are separated by `or`" if re.search(r"[,|/]", text) else None
         spaced = _BLANK.search(text)
-        if hint is None and spaced is not None:
+        if hint is None and spaced is not None and spaced[1] not in _ARTICLES:
             one, two = spaced.groups()
             hint = f"the name of a model has no blanks, such as `{one}_{two}`"
             if one in TERMS or two in TERMS:
-                hint = f"criteria of an actor are joined by `and`, such as `{one} and {two}`"
+                change = f"write `{one} and {two}` in place of `{one} {two}`"
+                hint = f"criteria of an actor are joined by `and`; {change}"
         what = f"actor `{m[1]}` is declared with something that is not a model"
         if not text[m.end() :].strip(" "):
             what = f"actor `{m[1]}` is declared without a model"

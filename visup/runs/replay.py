@@ -20,10 +20,9 @@ from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
 from visup.agent.storage.jsonable import event_record, to_jsonable
-from visup.rules.safety.ending import open_rules
 from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
-from visup.runs.wiring import final_verdict, reasoning_agent
+from visup.runs.wiring import closing_notes, final_verdict, reasoning_agent
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import spare_kinds, task_actors
 from visup.version import __version__
@@ -154,7 +153,7 @@ def replay(
             journal.note(verdict=verdict, steps=listener.steps, tasks=agent.mind.tasks)
             export_events(journal.path, journal.path.with_name("events.jsonl"))
             journal.note(ended="complete")
-    at_end = tuple(map(str, open_rules(agent.mind, settings.at_end)))
+    at_end = closing_notes(agent.mind, settings.at_end)
     return Transcript(tuple(listener.events), verdict, listener.steps, seconds, at_end)
 
 

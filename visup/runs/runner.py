@@ -16,7 +16,6 @@ from visup.agent.storage.wall_clock import RecordStamp, WallClock
 from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
-from visup.rules.safety.ending import open_rules
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.evidence.keeper import EvidenceKeeper
 from visup.runs.inputs.answer_box import AnswerBox
@@ -33,7 +32,7 @@ from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.runs.unattended.next_run import RollOver, RunPlaces
 from visup.runs.unattended.phase_meter import PhaseMeter
-from visup.runs.wiring import VerdictMonitor, build_agent, final_verdict, open_video
+from visup.runs.wiring import VerdictMonitor, build_agent, closing_notes, final_verdict, open_video
 from visup.sinks import Sinks
 from visup.version import __version__
 
@@ -352,7 +351,7 @@ class _Run:
             cache_note(),
             self._checkpoints.note if self._checkpoints else None,
             self._pace.note() if self._pace else None,
-            *map(str, open_rules(mind, self._settings.at_end)),
+            *closing_notes(mind, self._settings.at_end),
             *self._sinks.end(verdict, self._steps),
         )
         notes = (*self._notes, *filter(None, told))

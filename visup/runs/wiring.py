@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from visup.agent.cycle.system_alerts import grave_kinds, verdict_without_task
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
+from visup.agent.model.task_beliefs import TaskBelief
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
@@ -33,8 +34,11 @@ from visup.percepts.video.image_folder import image_names
 from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
 from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.identity import VoteSettings
+from visup.rules.language.diagnostics import either
 from visup.rules.language.parser import load_rules, shipped_rules
+from visup.rules.monitoring.intervals import AtEnd
 from visup.rules.reasoners import ReasonerSettings, default_reasoners
+from visup.rules.safety.ending import open_rules
 from visup.runs.inputs.plugins import user_behaviours
 from visup.runs.inputs.presets import every_for, preset_named
 from visup.runs.inputs.signals import check_signals, signal_behaviours
@@ -218,6 +222,27 @@ def final_verdict(mind: Mind) -> Verdict:
     return verdict_without_task(grave_kinds(mind.alerts)) or Verdict.SUCCEEDED
 
 
+def closing_notes(mind: Mind, at_end: AtEnd | str) -> tuple[str, ...]:
+    """What a run leaves open: undecided rules, and actors of tasks of which nothing was seen.
+
+    Args:
+        mind: The mind after the last step.
+        at_end: How rules that are still undecided count; see `open_rules`.
+    """
+    return (*map(str, open_rules(mind, at_end)), *_unfound(mind.tasks))
+
+
+def _unfound(tasks: Iterable[TaskBelief]) -> Iterator[str]:
+    for task in tasks:
+        missing = [f"the {b.actor}" for b in task.bindings if b.object_id is None]
+        if task.verdict is Verdict.UNKNOWN and missing:
+            what = f"Task '{task.task}': nothing was found that is {either(missing)}."
+            yield f"{what} {NEVER_MOVES}"
+
+
+NEVER_MOVES = (
+    "What never moves is seen only if it was taught, or if its actor is declared with its place."
+)
 _GRAVITY = (
     Verdict.SUCCEEDED,
     Verdict.IN_PROGRESS,

@@ -57,8 +57,17 @@ class Editor:
         self.send({"id": self.number, "method": method, "params": params})
         while (answer := self.receive()).get("id") != self.number:
             pass
-        assert "error" not in answer, answer
+        if "error" in answer:
+            raise AssertionError(answer)
         return answer["result"]
+
+    def refused(self, uri: str, line: int, character: int, new: str) -> str:
+        """The reason why a rename is refused."""
+        with pytest.raises(AssertionError) as caught:
+            self.at("rename", uri, line, character, newName=new)
+        (answer,) = caught.value.args
+        assert answer["error"]["code"] == -32803  # what was asked is valid, and was not done
+        return str(answer["error"]["message"])
 
     def at(self, kind: str, uri: str, line: int, character: int, **more: Any) -> Any:
         place = {"line": line, "character": character}
@@ -177,7 +186,7 @@ def test_files_are_laid_out_and_names_changed_everywhere(editor: Editor, tmp_pat
     ]
     renamed = editor.at("rename", uri, 3, 33, newName="spacecraft")["changes"][uri]
     assert [e["range"]["start"]["line"] for e in renamed] == [1, 3, 4]
-    assert editor.at("rename", uri, 3, 20, newName="x") is None  # an action is not ours to rename
+    assert "belongs to the language" in editor.refused(uri, 3, 20, "x")  # an action
     editor.change(uri, "<t> ::= (")
     assert editor.ask("textDocument/formatting", asked) == []
 
@@ -229,8 +238,9 @@ def test_renaming_is_refused_where_it_would_change_the_meaning(
     uri = editor.write(tmp_path / "names.task", TEXT)
     assert editor.at("prepareRename", uri, 3, 16) is None  # an action
     assert editor.at("prepareRename", uri, 3, 2) is not None
-    assert editor.at("rename", uri, 3, 2, newName="captured") is None
-    assert editor.at("rename", uri, 3, 2, newName="coupled") is None
+    assert "called `captured` already" in editor.refused(uri, 3, 2, "captured")
+    assert "`coupled` is an action" in editor.refused(uri, 3, 2, "coupled")
+    assert "is no name" in editor.refused(uri, 3, 2, "2 arms")
     assert editor.at("rename", uri, 3, 2, newName="reach") is not None
 
 
@@ -277,6 +287,6 @@ def test_names_of_a_rule_are_renamed_within_it(editor: Editor, tmp_path: Path) -
     assert [e["range"]["start"]["character"] for e in value] == [42, 86]
     variable = editor.at("rename", uri, 0, 11, newName="arm")["changes"][uri]
     assert [e["range"]["start"]["line"] for e in variable] == [0, 1, 1, 2]
-    assert editor.at("rename", uri, 1, 42, newName="a") is None
-    assert editor.at("rename", uri, 1, 42, newName="since") is None
-    assert editor.at("rename", uri, 1, 21, newName="near") is None  # a word of the language
+    assert editor.refused(uri, 1, 42, "a")
+    assert editor.refused(uri, 1, 42, "since")
+    assert editor.refused(uri, 1, 21, "near")  # a word of the language

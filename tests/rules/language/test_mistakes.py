@@ -180,6 +180,14 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
         ("temperature > 60 and seen(a)", "signal(temperature) > 60 and seen(a)"),
         ("touching(a, b) in 3 of the last 5 frames", "touching(a, b) in 3 of 5 samples"),
         ("touching(a, b) for half a second", "touching(a, b) for 0.5 s"),
+        ("is_known(battery) and seen(a)", "signal_known(battery) and seen(a)"),
+        ("is_known(a) and seen(b)", "identified(a) and seen(b)"),
+        ("touching(a, b) and press_running", "touching(a, b) and signal_on(press_running)"),
+        (
+            "touching(a, b) and signal_on(press running)",
+            "touching(a, b) and signal_on(press_running)",
+        ),
+        ("touching(a, b) and objects() > four", "touching(a, b) and objects() > 4"),
     ],
 )
 def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:

@@ -6,7 +6,7 @@
 import pytest
 
 from tests.tasks.checks.mistakes.counted import account_of
-from tests.tasks.checks.mistakes.pairs import SETS, pairs
+from tests.tasks.checks.mistakes.pairs import SETS, pairs, pointings
 from tests.tasks.checks.test_mistakes_counted import fixes, of_tasks
 
 ONE_IN = 4
@@ -19,6 +19,13 @@ def test_nearly_all_mistakes_of_newcomers_are_mended_mostly_to_what_was_meant(na
     assert all(one.told for one in found)
     assert sum(one.legal for one in found) >= 0.9 * len(found)
     assert sum(one.restored for one in found) >= 0.6 * len(found)
+
+
+def test_of_all_mistakes_of_newcomers_95_of_a_hundred_have_a_caret_at_the_culprit() -> None:
+    found = [one for name in SETS for one in pointings(name)]
+    beside = [one.slip.text for one in found if not one.any]
+    assert len(beside) <= 0.05 * len(found), beside
+    assert sum(one.first for one in found) >= 0.95 * len(found)
 
 
 HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
@@ -39,6 +46,13 @@ HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
         ("<t> ::= spin(x) < 1 rad/s\n", "<t> ::= spin(x) < 57.3 deg/s\n"),
         ("<t> ::= openness(x) > 0.3\n", "<t> ::= openness(x) > 30 %\n"),
         ("<t> ::= signal(battery) > 90 %\n", "<t> ::= signal(battery) > 90\n"),
+        ("<t> ::= signal(level) < 5 px\n", "<t> ::= signal(level) < 5\n"),
+        ("<t> ::= present(x) already already gone(x)\n", "<t> ::= present(x) already gone(x)\n"),
+        ("<t> ::= present(x) ends when is_known(battery)\n",
+         "<t> ::= present(x) ends when signal_known(battery)\n"),
+        ("<t> ::= present(x)\nactor x is bright red\n", "<t> ::= present(x)\nactor x is red\n"),
+        ("<t> ::= present(x)\nactor x is red cup\n", "<t> ::= present(x)\nactor x is red and cup\n"),
+        ("<t> ::= speed(x) < 5 px / s\n", "<t> ::= speed(x) < 5 px/s\n"),
         (f"signal battery\n{HEAD}", f"# given as a signal: battery\n{HEAD}"),
         ("<t> ::= the hand touches the part for 1 s\n", "<t> ::= touching(hand, part) for 1 s\n"),
     ],

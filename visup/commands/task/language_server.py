@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
@@ -149,18 +150,24 @@ def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[ls
     return [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), new)]
 
 
-def _rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
+def _rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit:
     document, word = _word(ls, params)
     new = params.new_name.strip("<> ")
     if word is None:
-        return None
+        raise _refused("here is no name that could be changed")
     refused = rename_refused(document, word, new)
     if refused is not None:
-        ls.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, refused))
-        return None
+        raise _refused(refused)
     places = alike(document, word)
+    if not places:
+        raise _refused(f"`{word.name}` belongs to the language, so it cannot be renamed")
     edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
-    return lsp.WorkspaceEdit({document.uri: edits}) if edits else None
+    return lsp.WorkspaceEdit({document.uri: edits})
+
+
+def _refused(why: str) -> JsonRpcException:
+    """The answer of a request that is refused; editors show its reason."""
+    return JsonRpcException(why, lsp.LSPErrorCodes.RequestFailed.value)
 
 
 _FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
