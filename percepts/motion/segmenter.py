@@ -220,12 +220,12 @@ class MotionSegmenter:
 
     def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
         """Regions of the foreground objects; of the tracks while the background hardly moves."""
-        asked = self._foreground.memory is not None
+        asked, old = self._foreground.memory is not None, self._history.back(1)
         if asked and not (self._static.active or self._foreground.calm):
             return report_objects(
-                self._foreground, tracks, scene, self._size, self.settings, self._executor
+                self._foreground, tracks, scene, old, self._size, self.settings, self._executor
             )
-        found = report_regions(tracks, scene, self._size, self.settings, self._executor)
+        found = report_regions(tracks, scene, old, self._size, self.settings, self._executor)
         return self._with_object_ids(found)
 
     def _with_object_ids(self, found: Sequence[Numbered]) -> tuple[Numbered, ...]:

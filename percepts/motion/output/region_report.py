@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from visup.agent import Directive, Region
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
-from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.foreground.following import ForegroundState
 from visup.percepts.motion.foreground.objects import MovingObject, object_share, object_velocity
 from visup.percepts.motion.layers.dense_labelling import CLIP, PointEvidence
+from visup.percepts.motion.outlines.outline_motion import part_motion
 from visup.percepts.motion.outlines.outline_refinement import CONTEXT, refine_outline
 from visup.percepts.motion.outlines.region_outline import RegionOutline, region_outline
 from visup.percepts.motion.static_camera.track_fusion import MotionEvidence
@@ -95,6 +96,7 @@ def _boxes(directives: Sequence[Directive], kind: str) -> list[Box]:
 def report_regions(
     tracks: Sequence[Track],
     scene: FrameMeasurements,
+    old: WorkImage,
     size: tuple[int, int],
     settings: MotionSettings,
     executor: Executor,
@@ -104,6 +106,7 @@ def report_regions(
     Args:
         tracks: All tracks.
         scene: The frame.
+        old: The image before it.
         size: (width, height) of the frame.
         settings: Gives the least area.
         executor: Computes every other outline in parallel.
@@ -117,7 +120,7 @@ def report_regions(
 
     def drawn(t: Track) -> RegionOutline | None:
         return _share_outline(
-            t.share, [o.share for o in reported if o is not t], scene, size, least
+            t.share, [o.share for o in reported if o is not t], scene, old, size, least
         )
 
     visible = [t for t in reported if t.last_seen == scene.time]
@@ -129,6 +132,7 @@ def report_objects(
     state: ForegroundState,
     tracks: Sequence[Track],
     scene: FrameMeasurements,
+    old: WorkImage,
     size: tuple[int, int],
     settings: MotionSettings,
     executor: Executor,
@@ -139,6 +143,7 @@ def report_objects(
         state: The foreground after the frame.
         tracks: All tracks: an object with a track takes its velocity.
         scene: The frame.
+        old: The image before it.
         size: (width, height) of the frame.
         settings: Gives the least area.
         executor: Computes every other outline in parallel.
@@ -152,7 +157,7 @@ def report_objects(
 
     def drawn(o: MovingObject) -> RegionOutline | None:
         share = object_share(state.objects, o.key)
-        return _share_outline(share, [], scene, size, least)
+        return _share_outline(share, [], scene, old, size, least)
 
     return tuple(
         _object_region(o, shape, by_id.get(o.track), state, scene)
@@ -192,6 +197,7 @@ def _share_outline(
     share_of_cells: Floats,
     others: Sequence[Floats],
     scene: FrameMeasurements,
+    old: WorkImage,
     size: tuple[int, int],
     least: float,
 ) -> RegionOutline | None:
@@ -202,7 +208,8 @@ def _share_outline(
     part = np.s_[top : y + h + CONTEXT, left : x + w + CONTEXT]
     labels = scene.cells.labels[part]
     share = share_of_cells[labels]
-    drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]))
+    motion = part_motion(scene.image, old, scene.flow, part)
+    drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]), motion)
     if others:
         # Cells of another object are not taken from it.
         taken = (np.max(others, axis=0) > 0.5)[labels]
