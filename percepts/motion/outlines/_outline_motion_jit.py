@@ -15,10 +15,8 @@ Places = NDArray[np.int32]
 @compiled
 def moved_log_odds(
     near: Places,
-    grey: NDArray[np.uint8],
-    gradients: tuple[Floats, Floats],
-    old: NDArray[np.uint8],
-    corner: tuple[int, int],
+    now: tuple[NDArray[np.uint8], Floats, Floats],
+    before: tuple[NDArray[np.uint8], tuple[int, int]],
     flows: tuple[Floats, Floats],
     limits: tuple[float, float, float, float],
 ) -> Floats:
@@ -26,22 +24,22 @@ def moved_log_odds(
 
     Args:
         near: The pixels.
-        grey: (h, w) part of the newest image.
-        gradients: (h, w) each, along x and y, grey levels per pixel.
-        old: (H, W), the whole previous image.
-        corner: (x, y) of the part in it.
+        now: (h, w) part of the newest image, and its gradients along x and y, grey levels per pixel.
+        before: (H, W), the whole previous image, and the (x, y) of the part in it.
         flows: (h / 2, w / 2, 3) each: flow back inside and outside, and whether it is known there.
         limits: Standard deviations of grey levels and of displacements, most squared distance, most
             log odds.
     """
     noise, off, far, most = limits
+    grey, along, down = now
+    old, corner = before
     out = np.zeros(len(near), np.float32)
     for n in range(len(near)):
         y, x = near[n]
         v, u = y // 2, x // 2
         if flows[0][v, u, 2] <= 0 or flows[1][v, u, 2] <= 0:
             continue
-        slope = gradients[0][y, x] ** 2 + gradients[1][y, x] ** 2
+        slope = along[y, x] ** 2 + down[y, x] ** 2
         spread = noise**2 + off**2 * slope
         odds = 0.0
         for k in range(2):

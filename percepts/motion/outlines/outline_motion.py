@@ -30,7 +30,7 @@ Flows = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PartMotion:
+class CropMotion:
     """A part of the newest image and where it comes from.
 
     Attributes:
@@ -72,13 +72,13 @@ class PartMotion:
         Returns:
             (N,) float32; 0 where the flow of a side is not known.
         """
-        limits = (NOISE, OFF, FAR, MOST)
-        return moved_log_odds(near, self.grey, self.gradients, self.old, self.corner, flows, limits)
+        now, before = (self.grey, *self.gradients), (self.old, self.corner)
+        return moved_log_odds(near, now, before, flows, (NOISE, OFF, FAR, MOST))
 
 
 def part_motion(
     image: WorkImage, old: WorkImage, flow: Floats, part: tuple[slice, slice]
-) -> PartMotion:
+) -> CropMotion:
     """The motion of a part of the newest image.
 
     Args:
@@ -93,7 +93,7 @@ def part_motion(
     grey = np.ascontiguousarray(image.grey[part])
     gradients = (np.ascontiguousarray(image.gx[part]), np.ascontiguousarray(image.gy[part]))
     corner = (int(part[1].start), int(part[0].start))
-    return PartMotion(grey, gradients, flow[part], old.grey, corner)
+    return CropMotion(grey, gradients, flow[part], old.grey, corner)
 
 
 def _carried(flow: Floats, where: NDArray[np.uint8]) -> Floats:

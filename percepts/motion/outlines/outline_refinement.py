@@ -27,7 +27,7 @@ from visup.percepts.motion.outlines._outline_refinement_jit import (
     places_of,
     window_log_odds,
 )
-from visup.percepts.motion.outlines.outline_motion import PartMotion
+from visup.percepts.motion.outlines.outline_motion import CropMotion
 
 ROUNDS = 2  # times that the sides are described and the outline is moved
 WINDOW = 21  # pixels: side of the window whose tones are compared
@@ -53,7 +53,7 @@ CONTEXT = WINDOW // 2 + BAND
 
 
 def refine_outline(
-    share: Floats, tone: NDArray[np.uint8], motion: PartMotion | None = None
+    share: Floats, tone: NDArray[np.uint8], motion: CropMotion | None = None
 ) -> Floats:
     """Shares after pixels near the outline were assigned to the side they resemble.
 

@@ -12,7 +12,7 @@ from visup.evaluation.motion.mask_scores import iou
 from visup.percepts.motion.features.work_image import WorkImage, prepare_image
 from visup.percepts.motion.outlines._outline_motion_jit import sampled
 from visup.percepts.motion.outlines._outline_refinement_jit import places_of
-from visup.percepts.motion.outlines.outline_motion import MOST, PartMotion, part_motion
+from visup.percepts.motion.outlines.outline_motion import MOST, CropMotion, part_motion
 from visup.percepts.motion.outlines.outline_refinement import refine_outline
 
 WHOLE = (slice(0, SHAPE[0]), slice(0, SHAPE[1]))
@@ -23,7 +23,7 @@ def view(index: int, grey: np.ndarray) -> WorkImage:
     return prepare_image(Frame(index, index / 25, np.repeat(grey[..., None], 3, axis=2)), 640)
 
 
-def moved(true: np.ndarray, seed: int, inner: Shift, outer: Shift) -> tuple[WorkImage, PartMotion]:
+def moved(true: np.ndarray, seed: int, inner: Shift, outer: Shift) -> tuple[WorkImage, CropMotion]:
     """A disc over a ground of the same two tones; both moved since the image before."""
     skin, ground = texture(seed, (200, 220)), texture(seed + 1, (200, 220))
 
