@@ -23,8 +23,7 @@ from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 KNOWN = 0.4  # least foreground share of a region that subtraction shows
 COMMON = 0.5  # least overlap of two outlines of one object, as a share of the smaller
-WHOLE = 0.8  # intersection over union above which a blob shows an object whole
-BODIES = 0.6  # the same for several blobs that have the shape of bodies
+WHOLE = 0.6  # intersection over union above which subtraction shows an object whole
 MAIN = 0.4  # least share of a region that a blob must fill to take its id: limbs do not
 MISSED = 0.15  # share of a region's motion evidence outside of the foreground, above which parts are missed
 PIECE = 0.35  # least share of a body in a region, as a share of the largest
@@ -304,9 +303,9 @@ def _whole_in(r: Region, seen: Mapping[int, Region]) -> list[int]:
     ]
     bodies = all(are_bodies(seen[a].bbox, seen[b].bbox, SLENDER) for a, b in combinations(large, 2))
     both = large if bodies and len(large) > 1 else []
-    for parts, least in ((order[:1], WHOLE), (both, BODIES)):
+    for parts in (order[:1], both):
         shared = sum(common[key] for key in parts)
-        if shared > least * (sum(seen[key].area for key in parts) + r.area - shared):
+        if shared > WHOLE * (sum(seen[key].area for key in parts) + r.area - shared):
             return parts
     return []
 

@@ -15,6 +15,7 @@ from visup.percepts.motion.segmenter import MotionSegmenter
 WIDE = texture(1, (320, 480))
 SKIN = texture(2, (320, 480), 0, 255)
 OTHER = texture(3, (320, 480), 90, 255)
+DARK = texture(4, (320, 480), 0, 110)
 SKY = np.full((320, 480), 4, np.uint8)
 
 
@@ -85,7 +86,7 @@ def test_a_disc_that_stops_is_kept_under_its_id() -> None:
 
 def test_discs_that_cross_keep_their_ids() -> None:
     discs = [
-        (lambda n: (50 + 1.5 * n, 70.0), 22.0, SKIN),
+        (lambda n: (50 + 1.5 * n, 70.0), 22.0, DARK),
         (lambda n: (190 - 1.5 * n, 95.0), 22.0, OTHER),
     ]
     shots = list(clip(WIDE, lambda n: (20, 30), discs, 90))
