@@ -208,3 +208,13 @@ def hint_of(line: str, repair: Repair) -> str | None:
     if not old.isprintable():
         return None
     return f"write `{new.strip()}` in place of `{' '.join(old.split())}`"
+
+
+def offset_before(at: int, repairs: Sequence[Repair]) -> int:
+    """Map an offset of a repaired text back to the text before all repairs."""
+    for repair in reversed(repairs):
+        if at >= repair.begin + len(repair.new):
+            at -= len(repair.new) - len(repair.old)
+        elif at > repair.begin:
+            at = min(at, repair.begin + len(repair.old))
+    return at

@@ -10,9 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
+from visup.rules.geometry._covered_motion_jit import (
+    COVERED_SIGMAS,
+    image_velocity,
+    uncovered_motion,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Samples = tuple[Floats, Flags, Floats]
 
 
 @compiled
@@ -238,13 +244,27 @@ def common_motion(
 @compiled
 def velocities(
     times: Floats,
-    support: Floats,
-    free: Flags,
+    samples: Samples,
     spans: NDArray[np.int64],
     directions: Floats,
-    misfit: float,
+    limits: tuple[float, float, float],
 ) -> Floats:
-    """(S, M, 2) velocities of all bodies over spans of samples (first, last + 1), (S, 2)."""
+    """Velocities of all bodies over spans of samples.
+
+    Args:
+        times: (T,) seconds.
+        samples: Support (T, M, K), pixels; whether it is free (T, M, K); and the image motion of each
+            region, pixels per second, and its deviation (T, M, 3); NaN unknown.
+        spans: (S, 2) first sample and last + 1.
+        directions: (K, 2) unit vectors.
+        limits: Misfit, see `common_motion`; noise of an outline, pixels; least difference of two
+            velocities, pixels per second.
+
+    Returns:
+        (S, M, 2) pixels per second; NaN unknown.
+    """
+    misfit, noise, least = limits
+    support, free, image = samples
     count = support.shape[1]
     found = np.empty((len(spans), count, 2))
     slopes = np.empty(len(directions))
@@ -254,6 +274,8 @@ def velocities(
         for i in range(count):
             for k in range(len(directions)):
                 slopes[k], usable[k] = _reach_slope(times, support, free, span, (i, k))
-            x, y = common_motion(slopes, usable, directions, misfit)
-            found[s, i, 0], found[s, i, 1] = x, y
+            outline = common_motion(slopes, usable, directions, misfit)
+            seen = image_velocity(times, image, span, i)
+            near = max(least, COVERED_SIGMAS * slope_noise(times[span[0] : span[1]], noise))
+            found[s, i] = uncovered_motion(slopes, usable, directions, (outline, seen), near)
     return found

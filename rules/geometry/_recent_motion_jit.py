@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.rules.geometry._fit_jit import Flags, Floats, binned, slope_noise, theil_sen, velocities
+from visup.rules.geometry._fit_jit import (
+    Floats,
+    Samples,
+    binned,
+    slope_noise,
+    theil_sen,
+    velocities,
+)
 
 
 @compiled
@@ -95,8 +102,7 @@ def steady_trend(
 @compiled
 def steady_velocities(
     times: Floats,
-    support: Floats,
-    free: Flags,
+    samples: Samples,
     begins: NDArray[np.int64],
     directions: Floats,
     limits: tuple[float, float, float, float],
@@ -105,8 +111,7 @@ def steady_velocities(
 
     Args:
         times: (T,) seconds.
-        support: (T, M, K) pixels.
-        free: (T, M, K).
+        samples: Of outlines and their image motion; see `velocities`.
         begins: (W,) first samples of longer and longer windows.
         directions: (K, 2) unit vectors.
         limits: Least noise of an outline, pixels; misfit, see `common_motion`; then as in
@@ -116,10 +121,12 @@ def steady_velocities(
         (M, 2) and (M,) the standard deviation of a component due to noise.
     """
     noise, misfit, far, least = limits
-    count, samples = support.shape[1], len(times)
+    support, last = samples[0], len(times)
+    count = support.shape[1]
     spans = np.empty((len(begins), 2), np.int64)
-    spans[:, 0], spans[:, 1] = begins, samples
-    found = velocities(times, support, free, spans, directions, misfit)
+    spans[:, 0], spans[:, 1] = begins, last
+    trusted = misfit, noise, least
+    found = velocities(times, samples, spans, directions, trusted)
     sigmas, chosen, spread = np.empty(len(begins)), np.empty((count, 2)), np.empty(count)
     for i in range(count):
         shaky, known = 0.0, 0
@@ -152,8 +159,7 @@ LEAST_SHARE = 0.3
 @compiled
 def fit_motion(
     times: Floats,
-    support: Floats,
-    free: Flags,
+    outlines: Samples,
     separation: Floats,
     directions: Floats,
     limits: tuple[float, float, float, float, float, float],
@@ -163,8 +169,8 @@ def fit_motion(
 
     Args:
         times: (T,) seconds.
-        support: (T, M, K) pixels; see `SampleWindow`.
-        free: (T, M, K).
+        outlines: Of outlines and their image motion relative to the static scene; see `velocities` and
+            `SampleWindow`.
         separation: (T, M, M) pixels.
         directions: (K, 2) unit vectors.
         limits: The windows of trends and of motion, seconds; noise of an outline, pixels; difference
@@ -177,7 +183,7 @@ def fit_motion(
         the halves of the motion window; (M,) standard deviations of a velocity component due to noise.
     """
     window, moving, noise, strong, sigmas, misfit = limits
-    samples, count = len(times), support.shape[1]
+    samples, count = len(times), outlines[0].shape[1]
     pairs = count * (count - 1) // 2
     slope, sigma = np.full(pairs, np.nan), np.full(pairs, np.nan)
     motion, spread = np.full((3, count, 2), np.nan), np.full(count, np.nan)
@@ -186,9 +192,11 @@ def fit_motion(
     begins = _windows(times, moving)
     half = begins[-1] + (samples - begins[-1]) // 2
     spans = np.array([[begins[-1], half], [half, samples]])
-    motion[1:] = velocities(times, support, free, spans, directions, misfit)
-    for_velocities = noise, misfit, sigmas, strong
-    motion[0], spread = steady_velocities(times, support, free, begins, directions, for_velocities)
+    trusted = misfit, noise, strong
+    motion[1:] = velocities(times, outlines, spans, directions, trusted)
+    motion[0], spread = steady_velocities(
+        times, outlines, begins, directions, (noise, misfit, sigmas, strong)
+    )
     begins = _windows(times, window)
     series, room, number = np.empty(samples), np.empty((bins + 2, bins)), 0
     for i in range(count):

@@ -1,9 +1,13 @@
-"""Keywords of the language with their syntax and meaning, as shown by editors."""
+"""Keywords of the language with their syntax and meaning, and how messages name what a parser expects."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from collections.abc import Set as AnySet
 from types import MappingProxyType
+
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.rules.language.diagnostics import either
 
 Entry = tuple[str, str]
 """Syntax and meaning."""
@@ -80,3 +84,66 @@ FUNCTIONS: Mapping[str, Entry] = MappingProxyType(
     }
 )
 """Functions of quantities and formulas."""
+
+
+_TERMINALS = {
+    "LPAR": "'('",
+    "RPAR": "')'",
+    "COLON": "':'",
+    "COMMA": "','",
+    "SEVERITY": "info, warning or critical",
+    "NAME": "a name",
+    "NUMBER": "a number",
+    "UNIT": "a unit (ms, s, min, h, px, px/s, px/s2, %, deg, deg/s, /s, m, cm, mm, m/s)",
+    "STRING": "a sentence in double quotes on one line",
+    "OPERATOR": "<, <=, >, >=, == or !=",
+    "LSQB": "'['",
+    "RSQB": "']'",
+    "__ANON_0": "'..'",
+    "PLUS": "'+'",
+    "MINUS": "'-'",
+    "TIMES": "'*'",
+    "OVER": "'/'",
+    "PAST": "'once', 'always'",
+    "FUTURE": "'eventually', 'henceforth'",
+    "QUANTIFIER": "'exists', 'forall'",
+    "REPEAT": "'may repeat'",
+    "LITERAL": "'true' or 'false'",
+    "$END": "the end of the file",
+}
+"""Terminals of the grammar, in the words of messages; keywords stand for themselves."""
+
+
+def expected_words(wanted: AnySet[str]) -> str:
+    """What a parser accepts, as a list of words to choose from; of many the usual ones.
+
+    Args:
+        wanted: Names of terminals of the grammar.
+    """
+    words = sorted({_TERMINALS.get(w, f"'{w.lower()}'") for w in wanted})
+    if len(words) > MOST_EXPECTED:
+        words = [w for w in words if w not in _SELDOM][:MOST_EXPECTED]
+    return either(words)
+
+
+MOST_EXPECTED = 8
+"""Most expected words listed; rarer ones are left out."""
+_SELDOM = frozenset(
+    f"'{w}'"
+    for w in (
+        *("iff", "xor", "release", "leave", "*", "/", "+", "-"),
+        *("implies", "since", "in", "cooldown", "previous", "let"),
+    )
+)
+
+
+def near_word(found: str, wanted: AnySet[str]) -> str | None:
+    """A hint if a word looks like one of those that a parser accepts.
+
+    Args:
+        found: The word that stands there.
+        wanted: Names of terminals of the grammar.
+    """
+    known = [w.lower() for w in wanted if w not in _TERMINALS]
+    known += ["info", "warning", "critical"] if "SEVERITY" in wanted else []
+    return did_you_mean(found, known) if found else None

@@ -13,13 +13,13 @@ from typing import Any
 
 from lark import Lark, UnexpectedInput
 
-from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SourceLocation
-from visup.rules.correction.edits import Repair, edits, hint_of
+from visup.rules.correction.edits import Repair, edits, hint_of, offset_before
 from visup.rules.correction.loss import KNOWN, LITTLE, loss
 from visup.rules.correction.search import corrections
-from visup.rules.language.diagnostics import Diagnostic, Source, either
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.fixes import TextFix, fix_of
+from visup.rules.language.keywords import expected_words, near_word
 from visup.rules.language.repair import (
     MOST_COMPARED,
     MOST_REPAIRS,
@@ -33,33 +33,6 @@ from visup.rules.language.spelling import speller
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
-
-_WANTED = {
-    "LPAR": "'('",
-    "RPAR": "')'",
-    "COLON": "':'",
-    "COMMA": "','",
-    "SEVERITY": "info, warning or critical",
-    "NAME": "a name",
-    "NUMBER": "a number",
-    "UNIT": "a unit (ms, s, min, h, px, px/s, px/s2, %, deg, deg/s, /s, m, cm, mm, m/s)",
-    "STRING": "a sentence in double quotes on one line",
-    "OPERATOR": "<, <=, >, >=, == or !=",
-    "LSQB": "'['",
-    "RSQB": "']'",
-    "__ANON_0": "'..'",
-    "PLUS": "'+'",
-    "MINUS": "'-'",
-    "TIMES": "'*'",
-    "OVER": "'/'",
-    "PAST": "'once', 'always'",
-    "FUTURE": "'eventually', 'henceforth'",
-    "QUANTIFIER": "'exists', 'forall'",
-    "REPEAT": "'may repeat'",
-    "LITERAL": "'true' or 'false'",
-    "$END": "the end of the file",
-}
-
 
 CHARACTERS_TRIED = 200_000
 """Characters parsed to find repairs of one file; errors beyond this budget get no hints."""
@@ -142,8 +115,8 @@ class RepairedText:
             return fault
         lines = self.text.split("\n")
         at = sum(len(x) + 1 for x in lines[: fault.place.line - 1]) + fault.place.column - 1
-        begin = _before_repairs(at, self.repairs)
-        end = _before_repairs(at + fault.place.length, self.repairs)
+        begin = offset_before(at, self.repairs)
+        end = offset_before(at + fault.place.length, self.repairs)
         line, column = _line_of(self._original(), begin)
         return replace(fault, place=source.place(line, column, max(1, end - begin)))
 
@@ -213,16 +186,6 @@ def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
     except UnexpectedInput as fault:
         return fault
     return None
-
-
-def _before_repairs(at: int, repairs: Sequence[Repair]) -> int:
-    """Map an offset of the repaired text back to the original."""
-    for repair in reversed(repairs):
-        if at >= repair.begin + len(repair.new):
-            at -= len(repair.new) - len(repair.old)
-        elif at > repair.begin:
-            at = min(at, repair.begin + len(repair.old))
-    return at
 
 
 def _line_of(text: str, at: int) -> tuple[int, int]:
@@ -321,7 +284,7 @@ class _Place:
 
     def at(self, begin: int, length: int) -> SourceLocation:
         """The location of some characters of the repaired text."""
-        line, column = _line_of(self.written, _before_repairs(begin, self.repairs))
+        line, column = _line_of(self.written, offset_before(begin, self.repairs))
         return Source(self.written, self.file).place(line, column, max(1, length))
 
 
@@ -336,14 +299,14 @@ def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) 
     what = f"'{found}' does not belong here" if found else "the rule ends too early"
     if repair is None:
         begin = at if found else end_before(where.text, len(where.text))
-        hint = _slip(found, wanted)
-        return Diagnostic("", what, where.at(begin, length), _expected(wanted), hint)
+        hint = near_word(found, wanted)
+        return Diagnostic("", what, where.at(begin, length), expected_words(wanted), hint)
     if repair.begin == repair.end and repair.begin < at:
         # For an insertion the caret marks where it goes, not the next word.
         what = f"{_put(repair.new)} is missing" if repair.new.strip() else what
     span = max(1, repair.end - repair.begin)
     hint = repair.hint(where.text)
-    return Diagnostic("", what, where.at(repair.begin, span), _expected(wanted), hint)
+    return Diagnostic("", what, where.at(repair.begin, span), expected_words(wanted), hint)
 
 
 _NAME_IN_CALL = re.compile(r"\A(?![\s\S]*\blet\b)[\s\S]*[(,]\s*[A-Za-z_]\w*\s*\Z")
@@ -352,27 +315,3 @@ _NAME_IN_CALL = re.compile(r"\A(?![\s\S]*\blet\b)[\s\S]*[(,]\s*[A-Za-z_]\w*\s*\Z
 
 def _put(new: str) -> str:
     return f"'{new.strip()}'"
-
-
-def _expected(wanted: set[str]) -> str:
-    words = sorted({_WANTED.get(w, f"'{w.lower()}'") for w in wanted})
-    if len(words) > MOST_EXPECTED:
-        words = [w for w in words if w not in _SELDOM][:MOST_EXPECTED]
-    return either(words)
-
-
-MOST_EXPECTED = 8
-"""Most expected words listed; rarer ones are left out."""
-_SELDOM = frozenset(
-    f"'{w}'"
-    for w in (
-        *("iff", "xor", "release", "leave", "*", "/", "+", "-"),
-        *("implies", "since", "in", "cooldown", "previous", "let"),
-    )
-)
-
-
-def _slip(found: str, wanted: set[str]) -> str | None:
-    known = [w.lower() for w in wanted if w not in _WANTED]
-    known += ["info", "warning", "critical"] if "SEVERITY" in wanted else []
-    return did_you_mean(found, known) if found else None

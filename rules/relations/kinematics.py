@@ -220,8 +220,7 @@ class KinematicsEstimator:
         windows = s.window_s, s.motion_window_s
         slope, sigma, motion, spread = fit_motion(
             h.times,
-            h.steady_support,
-            h.free,
+            (h.steady_support, h.free, h.image),
             h.separation,
             DIRECTIONS,
             (*windows, noise, strong, s.change_sigmas, s.misfit * diagonal),

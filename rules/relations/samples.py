@@ -18,6 +18,9 @@ from visup.rules.presence.object_tracks import merged_pairs, presence_memory
 ROOM = 64
 """Number of further samples for which memory is allocated."""
 
+IMAGE_LAG_S = 0.24
+"""Time over which the image motion of regions is measured, seconds."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampleWindow:
@@ -35,6 +38,8 @@ class SampleWindow:
         depth: (T, M) in the objects' units; NaN where unknown.
         drift: (T, M, 2) accumulated image motion of the static scene at each object due to the camera,
             pixels, since the first sample.
+        image: (T, M, 3) image motion of each region relative to the static scene, pixels per second, and
+            its standard deviation; NaN where unknown.
         start: Row of the shared memory at which the arrays start.
     """
 
@@ -45,12 +50,21 @@ class SampleWindow:
     separation: Floats = field(default_factory=lambda: np.zeros((0, 0, 0)))
     depth: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     drift: Floats = field(default_factory=lambda: np.zeros((0, 0, 2)))
+    image: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
     start: int = 0
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """Times and samples."""
-        return self.times, self.support, self.free, self.separation, self.depth, self.drift
+        return (
+            self.times,
+            self.support,
+            self.free,
+            self.separation,
+            self.depth,
+            self.drift,
+            self.image,
+        )
 
     @property
     def steady_support(self) -> Floats:
@@ -93,13 +107,25 @@ def sampled(
     joint = {i for pair in merged_pairs(mind) for i in pair}
     support = np.full((len(ids), FAN), np.nan)
     free = np.zeros((len(ids), FAN), dtype=bool)
-    depth = np.full(len(ids), np.nan)
+    depth, image = np.full(len(ids), np.nan), np.full((len(ids), 3), np.nan)
+    panning = _camera_velocity(history, mind.time, drift)
     for i, b in enumerate(objects):
         if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
             write_support(b.region, mind.frame_size, support[i], free[i])
             depth[i] = np.nan if b.depth is None else b.depth
-    row = (mind.time, support, free, hull_separation(support), depth, drift)
+            if b.region.velocity_sigma > 0.0:
+                image[i] = (*(b.region.velocity - panning[i]), b.region.velocity_sigma)
+    row = (mind.time, support, free, hull_separation(support), depth, drift, image)
     return extended(without_reassigned(history, mind), row, old)
+
+
+def _camera_velocity(history: SampleWindow, now: float, drift: Floats) -> Floats:
+    """(M, 2) image motion of the static scene at each object over the time for which regions' lags, px/s."""
+    since = int(history.times.searchsorted(now - IMAGE_LAG_S - 1e-6))
+    if since >= len(history.times):
+        return np.zeros_like(drift)
+    panning: Floats = (drift - history.drift[since]) / (now - history.times[since])
+    return panning
 
 
 def drifted(before: Floats, objects: Sequence[ObjectBelief], observation: Observation) -> Floats:
@@ -138,13 +164,14 @@ def reindexed(history: SampleWindow, ids: tuple[int, ...]) -> SampleWindow:
     t, m = len(history.times), len(ids)
     support, free = np.full((t, m, FAN), np.nan), np.zeros((t, m, FAN), dtype=bool)
     separation, depth = np.full((t, m, m), np.nan), np.full((t, m), np.nan)
-    drift = np.zeros((t, m, 2))
+    drift, image = np.zeros((t, m, 2)), np.full((t, m, 3), np.nan)
     new = [i for i, x in enumerate(ids) if x in history.ids]
     old = [history.ids.index(ids[i]) for i in new]
     support[:, new], free[:, new] = history.support[:, old], history.free[:, old]
     depth[:, new], drift[:, new] = history.depth[:, old], history.drift[:, old]
+    image[:, new] = history.image[:, old]
     separation[np.ix_(range(t), new, new)] = history.separation[np.ix_(range(t), old, old)]
-    return SampleWindow(ids, history.times, support, free, separation, depth, drift)
+    return SampleWindow(ids, history.times, support, free, separation, depth, drift, image)
 
 
 def without_reassigned(history: SampleWindow, mind: Mind) -> SampleWindow:
@@ -162,6 +189,7 @@ def without_reassigned(history: SampleWindow, mind: Mind) -> SampleWindow:
         history,
         support=np.where(old[:, :, None], np.nan, history.support),
         separation=np.where(either, np.nan, history.separation),
+        image=np.where(old[:, :, None], np.nan, history.image),
     )
 
 
@@ -205,5 +233,5 @@ def _with_room(history: SampleWindow, more: int) -> SampleWindow:
 
 def _window(ids: tuple[int, ...], arrays: Iterable[NDArray[Any]], start: int = 0) -> SampleWindow:
     """The samples of some objects, from arrays in the order of `SampleWindow.arrays`."""
-    times, support, free, separation, depth, drift = arrays
-    return SampleWindow(ids, times, support, free, separation, depth, drift, start)
+    times, support, free, separation, depth, drift, image = arrays
+    return SampleWindow(ids, times, support, free, separation, depth, drift, image, start)

@@ -1,15 +1,25 @@
-"""Checks of actor declarations: satisfiable criteria, and machines without cycles."""
+"""Checks of actors: satisfiable criteria, machines without cycles, and that those declared take part."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from difflib import SequenceMatcher
 
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.grammar.criteria import Conduct, Extent, OtherModels, PartOf, Place, Ranked
-from visup.tasks.grammar.nodes import Actor, Task
+from visup.tasks.grammar.nodes import Actor, Name, Task
 from visup.tasks.grammar.structure import machines_of
 from visup.tasks.grammar.units import value
 
+MANY = 500
+"""Most names that are compared with each other."""
+ALIKE = 0.85
+"""Similarity from which two names are considered the same."""
 OPPOSITES = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest", "lowest"})
 
 
@@ -53,3 +63,64 @@ def _impossible(task: Task, actor: Actor) -> str:
 
 def _circular(task: Task, actor: Actor) -> bool:
     return any(task.actor(m).machine == actor.name for m in machines_of(task, actor.name))
+
+
+@dataclass(frozen=True)
+class TakingPart:
+    """Checks which actors take part, by the actions that name them.
+
+    Attributes:
+        task: The tree.
+        source: For positions.
+        asked: Every action of the file: its name, its actors, its place.
+        undefined: Names of stages that are referred to and not defined.
+    """
+
+    task: Task
+    source: Source
+    asked: Sequence[tuple[str, tuple[Name, ...], Span]]
+    undefined: Collection[str]
+
+    def misspelt(self) -> Iterator[Diagnostic]:
+        """Probable misspellings: actors named once that resemble another one declared or named more often."""
+        machines = [a.machine for a in self.task.actors if a.machine is not None]
+        counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
+        counts.update(map(str, machines))
+        declared = {a.name for a in self.task.actors} | {z.name for z in self.task.zones}
+        sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
+        if len(sure) > MANY:
+            return
+        for actors in (*(actors for _, actors, _ in self.asked), machines):
+            for actor in actors:
+                name = str(actor)
+                if name in declared or counts[name] > 1:
+                    continue
+                meant = next((o for o in sure if _is_misspelling(name, o)), None)
+                if meant is not None:
+                    what = f"actor `{name}` is named only here"
+                    yield self.source.fault(
+                        "E214", what, actor.span, hint=f"did you mean `{meant}`?"
+                    )
+
+    def idle(self) -> Iterator[Diagnostic]:
+        """Declared actors that no action names."""
+        named = {str(a) for _, actors, _ in self.asked for a in actors}
+        named |= {m for a in named for m in machines_of(self.task, a)}
+        named |= {a for stage in self.undefined for a in re.findall(r"\w+", stage)}
+        for actor in self.task.actors:
+            if actor.span.file or actor.name in named:
+                continue  # an included file may define more than is used
+            if not any(_is_misspelling(n, actor.name) for n in named):
+                what = f"actor `{actor.name}` is declared but takes no part"
+                # The actors of `for each of 4 legs` are written nowhere themselves.
+                written = actor.span.length == len(actor.name)
+                hint = did_you_mean(actor.name, named, "`{}`") if written else None
+                yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
+
+
+def _is_misspelling(name: str, other: str) -> bool:
+    """Whether one name is probably a misspelling of another; `arm1` is none of `arm2`."""
+    if name == other or name.rstrip("0123456789_") == other.rstrip("0123456789_"):
+        return False
+    turned = len(name) > 3 and name[0] == other[0] and sorted(name) == sorted(other)
+    return turned or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE

@@ -6,12 +6,9 @@ that merely follows from another.
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AnySet
 from dataclasses import dataclass, replace
-from difflib import SequenceMatcher
 from functools import cached_property
 
 from visup.agent.model.did_you_mean import closest, did_you_mean
@@ -22,7 +19,7 @@ from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.bounds import BoundsCheck
 from visup.tasks.checks.courses import CourseCheck
-from visup.tasks.checks.criteria import criteria_faults
+from visup.tasks.checks.criteria import TakingPart, criteria_faults
 from visup.tasks.checks.names import NameCheck
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
@@ -39,10 +36,6 @@ from visup.tasks.grammar.nodes import (
     walk,
 )
 from visup.tasks.grammar.statement import RESERVED_WORDS
-from visup.tasks.grammar.structure import machines_of
-
-MANY = 500  # limit for pairwise comparison of names
-ALIKE = 0.85  # similarity from which two names are considered the same
 
 
 def check_semantics(
@@ -115,8 +108,9 @@ class _Semantics:
         yield from self.twice()
         if not self.parsed.faults:
             yield from self.unreachable()
-            yield from self.slips()
-            yield from self.idle_actors()
+            took_part = TakingPart(self.parsed.task, self.source, self.asked, self.undefined)
+            yield from took_part.misspelt()
+            yield from took_part.idle()
         whole = not (self.undefined or self.parsed.faults)
         yield from CourseCheck(
             self.parsed.task, self.source, self.actions, whole, self.grammar
@@ -289,53 +283,9 @@ class _Semantics:
                 hint = "refer to it from another stage, or take it out; the first rule is the task"
                 yield self.source.fault("E204", what, stage.span, hint=hint)
 
-    def slips(self) -> Iterator[Diagnostic]:
-        """Probable misspellings: actors named once that resemble another one declared or named more often."""
-        task = self.parsed.task
-        machines = [a.machine for a in task.actors if a.machine is not None]
-        counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
-        counts.update(map(str, machines))
-        declared = {a.name for a in task.actors} | {z.name for z in task.zones}
-        sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
-        if len(sure) > MANY:
-            return
-        for actors in (*(actors for _, actors, _ in self.asked), machines):
-            for actor in actors:
-                name = str(actor)
-                if name in declared or counts[name] > 1:
-                    continue
-                meant = next((o for o in sure if _is_misspelling(name, o)), None)
-                if meant is not None:
-                    what = f"actor `{name}` is named only here"
-                    yield self.source.fault(
-                        "E214", what, actor.span, hint=f"did you mean `{meant}`?"
-                    )
-
-    def idle_actors(self) -> Iterator[Diagnostic]:
-        named = {str(a) for _, actors, _ in self.asked for a in actors}
-        named |= {m for a in named for m in machines_of(self.parsed.task, a)}
-        named |= {a for stage in self.undefined for a in re.findall(r"\w+", stage)}
-        for actor in self.parsed.task.actors:
-            if actor.span.file or actor.name in named:
-                continue  # an included file may define more than is used
-            if not any(_is_misspelling(n, actor.name) for n in named):
-                what = f"actor `{actor.name}` is declared but takes no part"
-                # The actors of `for each of 4 legs` are written nowhere themselves.
-                written = actor.span.length == len(actor.name)
-                hint = did_you_mean(actor.name, named, "`{}`") if written else None
-                yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
-
 
 def _line(span: Span) -> str:
     return f"line {span.line}{' of ' + span.file if span.file else ''}"
-
-
-def _is_misspelling(name: str, other: str) -> bool:
-    """Whether one name is probably a misspelling of another; `arm1` is none of `arm2`."""
-    if name == other or name.rstrip("0123456789_") == other.rstrip("0123456789_"):
-        return False
-    turned = len(name) > 3 and name[0] == other[0] and sorted(name) == sorted(other)
-    return turned or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE
 
 
 def _count(n: int, what: str) -> str:

@@ -7,6 +7,7 @@ all runs is preserved and any other order left free, as in a task graph.
 Read in this order: `traces.py` (a run as intervals), `meetings.py` (contacts, without those of carried
 objects), `relevance.py` (the event sequence of each run), `carrying.py` (who is carried, and where to),
 `alignment.py` (removal of repeated events), `order.py` (loops and partial order), `periods.py` (periodic
-loops), `places.py` and `rests.py` (where things end up, who stays or comes to rest), `drafts.py` (a task and
-its text), `induction.py` (the task file), `fitting.py` (durations of an existing task).
+loops), `places.py` and `rests.py` (where things end up, who keeps near to whom, who stays or comes to rest),
+`drafts.py` (a task and its text), `induction.py` (the task file), `fitting.py` (durations of an existing
+task).
 """

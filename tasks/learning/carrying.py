@@ -7,7 +7,8 @@ by itself, or that somebody else still holds. Each is added only where all runs 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from visup.tasks.learning.meetings import CARRIED_S, MEETINGS, Pair
@@ -41,12 +42,37 @@ def with_carrying(rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[list[Co
         rows: The relevant events of each run, in order.
         runs: The runs, in the same order.
     """
-    found = [list(row) for row in rows]
+    found = _without_passing(rows)
     for pair in _pairs(rows, "coupled"):
         found = _carried(found, runs, pair)
     for pair in _pairs(rows, "decoupled"):
         found = _drawn_back(found, runs, pair)
     return found
+
+
+def _without_passing(rows: Sequence[Row]) -> list[list[CourseEvent]]:
+    """Rows without contacts in passing: what is carried past its destination meets it again later.
+
+    Those that all runs have equally often are meant.
+    """
+    counts = [Counter(e.symbol for e in row if e.symbol[0] == "touching") for row in rows]
+    varied = {s for c in counts for s in c if len({d[s] for d in counts}) > 1}
+    return [[e for e in row if not _in_passing(e, row, varied)] for row in rows]
+
+
+def _in_passing(event: CourseEvent, row: Row, varied: Collection[Symbol]) -> bool:
+    """Whether an event is a contact, or its end, and who is carried meets the same one again later."""
+    contact = ("touching", event.symbol[1])
+    if event.symbol[0] not in ("touching", "apart") or contact not in varied:
+        return False
+    later = [e.at for e in row if e.symbol == contact and e.at > event.at]
+    return any(
+        e.symbol[0] == "coupled"
+        and len(set(e.symbol[1]) & set(contact[1])) == 1
+        and e.at < event.at
+        and any(at < e.happening.end for at in later)
+        for e in row
+    )
 
 
 def _pairs(rows: Sequence[Row], action: str) -> list[Pair]:

@@ -9,11 +9,13 @@ from math import ceil, floor, inf
 from visup.tasks.grammar.nodes import Actor
 from visup.tasks.learning.meetings import MEETINGS
 from visup.tasks.learning.order import (
+    KEEPING,
     Carry,
     Either,
     Free,
     Item,
     Joint,
+    Keep,
     Loop,
     Occurrence,
     Plan,
@@ -39,6 +41,7 @@ STAGE_NAMES = {
     "diverging": "retreat",
     "moving_together": "carry",
     "apart": "part",
+    KEEPING: "keep",
 }
 MARGIN = 3.0
 """Deadline of a stage as a multiple of its longest duration in a good run."""
@@ -128,6 +131,8 @@ class Draft:
             return f"<{name}> ::= ({body}) at least {least} times at most {most} times  # {said}"
         spans = self._spans(occurrence)
         seen = f"in {len(spans)} of {runs_text(len(self.runs))}"
+        if isinstance(item, Keep):
+            return f"<{name}> ::= {action_text(item)} for {item.held_s:g} s  # {seen}"
         if not spans or (self._last(occurrence) and not self._settled()):
             held = self._held(occurrence) if self._last(occurrence) else 0.0
             course = self._asked(occurrence, f" for {held:g} s" if held else "")
@@ -138,7 +143,8 @@ class Draft:
 
     def _asked(self, occurrence: Occurrence, clause: str) -> str:
         """What a stage asks for, with a clause of time."""
-        item, already = occurrence[0], self._from_the_start(occurrence)
+        item = occurrence[0]
+        already = self._from_the_start(occurrence) or self._meanwhile(occurrence)
         if isinstance(item, Carry):
             return f"({action_text(item)}){clause}{self._kept(item)}"
         if isinstance(item, Either):
@@ -180,6 +186,13 @@ class Draft:
         found = [event_of(row, occurrence) for row in self.rows]
         return any(e is not None and not e.happening.begun for e in found)
 
+    def _meanwhile(self, occurrence: Occurrence) -> bool:
+        """Whether a lasting meeting is one of several in any order, so that it may begin during others."""
+        if occurrence not in _single_parts(self.plan):
+            return False
+        found = [event_of(row, occurrence) for row in self.rows]
+        return all(e is not None and e.lasts and e.symbol[0] in MEETINGS for e in found)
+
     def _held(self, occurrence: Occurrence) -> float:
         """How long the last event must hold, seconds; 0 if it does not last to the end."""
         if not self.holding:
@@ -212,6 +225,15 @@ class Draft:
             later = [t for t in begins.values() if t > mine]
             found.append(min(later, default=mine) - max(earlier, default=run.begin))
         return found
+
+
+def _single_parts(plan: Plan) -> list[Occurrence]:
+    """The stages that are by themselves one of several in any order."""
+    if isinstance(plan, Series):
+        return [o for p in plan.parts for o in _single_parts(p)]
+    if isinstance(plan, Free):
+        return [p for p in plan.parts if not isinstance(p, Series | Free)]
+    return []
 
 
 def stage_names(plan: Plan) -> dict[Occurrence, str]:

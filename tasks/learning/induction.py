@@ -36,7 +36,7 @@ from visup.tasks.learning.order import (
     without,
 )
 from visup.tasks.learning.periods import periods_of
-from visup.tasks.learning.places import places_of
+from visup.tasks.learning.places import places_of, with_keeping
 from visup.tasks.learning.precedence import precedences
 from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.rests import halt_of, rests_of
@@ -86,6 +86,7 @@ def learn_task(
         TaskError: The good runs have no event in common.
     """
     rows = with_carrying(joined(as_one_body(relevant(good), good)), good)
+    rows = with_keeping(rows, good)
     folded, times = with_loops([tuple(e.item for e in row) for row in rows])
     if not times:  # without loops, surplus repeats in some runs are noise
         rows = aligned(rows)

@@ -13,6 +13,8 @@ from statistics import mean
 
 from visup.tasks.learning.traces import Symbol
 
+KEEPING = "keeping"
+"""Action of the symbol of `Keep`; no action of the task language."""
 LONGEST_LOOP = 6
 MOST_FREE = 6
 
@@ -43,7 +45,22 @@ class Either:
     parts: tuple[Symbol, ...]
 
 
-Item = Symbol | Loop | Joint | Either
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """Two that meet nowhere keep near each other.
+
+    Attributes:
+        pair: The two.
+        below_px: Gap of their outlines that they keep below, pixels.
+        held_s: For how long at least, seconds.
+    """
+
+    pair: tuple[str, ...]
+    below_px: int
+    held_s: float
+
+
+Item = Symbol | Loop | Joint | Either | Keep
 Word = tuple[Item, ...]
 
 
@@ -226,6 +243,8 @@ def symbols_of(item: Item) -> list[Symbol]:
     """The symbols of an item, in order."""
     if isinstance(item, Joint | Either):
         return list(item.parts)
+    if isinstance(item, Keep):
+        return [(KEEPING, item.pair)]
     return [s for i in item.body for s in symbols_of(i)] if isinstance(item, Loop) else [item]
 
 
@@ -237,5 +256,7 @@ def action_text(symbol: Item) -> str:
         return " & ".join(map(action_text, symbol.parts))
     if isinstance(symbol, Either):
         return " | ".join(map(action_text, symbol.parts))
+    if isinstance(symbol, Keep):
+        return f"gap({', '.join(symbol.pair)}) < {symbol.below_px} px"
     action, actors = symbol
     return f"{action}({', '.join(actors)})"

@@ -1,22 +1,40 @@
-"""Where things end up: those that stay in contact overlap in the image about as much as in the good runs.
+"""Where things end up, and how near to each other those keep that never meet.
+
+Those that stay in contact overlap in the image about as much as in the good runs.
 
 What is put down beside its place may touch it in the image as well. In the end the boxes of two that stay in
 contact must then not overlap far less than in any good run. In a pile each hides the others, by more or less
 as the camera stands, so that nothing is asked of it.
+
+Where nobody meets, one comes, stays near the other for a while and goes, as one who flies round a tower. How
+near and for how long is read from the gap over time, by the largest rectangle of time and nearness.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import floor, isfinite
+from math import ceil, floor, isfinite, nan
+
+import numpy as np
 
 from visup.agent import Mind
+from visup.rules.geometry.regions import Floats
 from visup.rules.predicates.image_quantities import box_overlap
 from visup.rules.predicates.snapshot import Snapshot
-from visup.tasks.learning.order import Occurrence, Plan, final_of, leaves_of, symbols_of
+from visup.rules.relations.reasoner import kinematics
+from visup.tasks.learning.meetings import MEETINGS, Pair
+from visup.tasks.learning.order import (
+    KEEPING,
+    Keep,
+    Occurrence,
+    Plan,
+    final_of,
+    leaves_of,
+    symbols_of,
+)
 from visup.tasks.learning.relevance import CourseEvent
-from visup.tasks.learning.traces import RunTrace, Span, Symbol, names_of
+from visup.tasks.learning.traces import Happening, RunTrace, Span, Symbol, names_of
 
 FAR_LESS = 0.5
 """A pair is elsewhere when it overlaps by less than this share of the least overlap in a good run."""
@@ -123,3 +141,115 @@ def _overlap(mind: Mind, pair: Sequence[str]) -> float | None:
     i, j = at
     least = float(box_overlap(facts)[0, i, j])
     return least if isfinite(least) else None
+
+
+NEARER = 1.1
+"""Those that keep near may be farther from each other by this factor than in any good run."""
+KEPT_SHARE = 0.75
+"""They must keep near for this share of the shortest time in a good run."""
+LEAST_KEPT_S = 2.0
+"""A shorter time together is a turn between coming and going, seconds."""
+FAR = 0.8
+"""Near is at most this share of the greatest gap of every good run."""
+LEVELS = 50
+"""Numbers of gaps that are tried."""
+
+
+def with_keeping(
+    rows: Sequence[Sequence[CourseEvent]], runs: Sequence[RunTrace]
+) -> list[list[CourseEvent]]:
+    """The rows with coming, keeping near and going for each pair that does so in all runs, if nobody meets.
+
+    Args:
+        rows: The relevant events of each run, in order.
+        runs: The runs, in the same order.
+    """
+    found = [list(row) for row in rows]
+    met = [{h.symbol[1] for h in run.happenings if h.symbol[0] in MEETINGS} for run in runs]
+    if not runs or set.intersection(*met):
+        return found
+    for pair in sorted({h.symbol[1] for h in runs[0].happenings if h.symbol[0] == "converging"}):
+        courses = _kept_courses(runs, pair)
+        if courses is not None:
+            found = [
+                sorted([*(e for e in row if e.symbol[1] != pair), *course], key=lambda e: e.at)
+                for row, course in zip(found, courses, strict=True)
+            ]
+    return found
+
+
+def _kept_courses(runs: Sequence[RunTrace], pair: Pair) -> list[list[CourseEvent]] | None:
+    """Coming, keeping near and going of a pair in each run; None unless all runs show them."""
+    gaps = [_gaps(run.minds, pair) for run in runs]
+    levels = [kept_below(*g) for g in gaps]
+    if not all(
+        0.0 < level <= FAR * np.nanmax(g) for level, (_, g) in zip(levels, gaps, strict=True)
+    ):
+        return None
+    below = 5 * ceil(NEARER * max(levels) / 5)
+    spans = [longest_below(*g, below) for g in gaps]
+    held = floor(2 * KEPT_SHARE * min(b - a for a, b in spans)) / 2
+    if held < LEAST_KEPT_S:
+        return None
+    keep = Keep(pair, below, held)
+    found = [_kept_course(run, span, keep) for run, span in zip(runs, spans, strict=True)]
+    return None if None in found else [course for course in found if course is not None]
+
+
+def _kept_course(run: RunTrace, span: Span, keep: Keep) -> list[CourseEvent] | None:
+    spells = {a: [h for h in run.happenings if h.symbol == (a, keep.pair)] for a in GOING}
+    comes = [h for h in spells["converging"] if h.begin < span[1]]
+    goes = [h for h in spells["diverging"] if h.end > span[1]]
+    if not comes or not goes:
+        return None
+    first, last = comes[0], goes[-1]
+    at = max(span[0], first.begin + AFTER_S)
+    near = Happening((KEEPING, keep.pair), at, span[1])
+    return [
+        CourseEvent(first, first.begin),
+        CourseEvent(near, at, keeps=keep),
+        CourseEvent(last, max(last.begin, at + AFTER_S)),
+    ]
+
+
+GOING = ("converging", "diverging")
+AFTER_S = 1e-3
+"""What follows directly is this much later, seconds."""
+
+
+def _gaps(minds: Sequence[Mind], pair: Pair) -> tuple[Floats, Floats]:
+    """Times, seconds, and gaps of the outlines of a pair, pixels; NaN where unknown."""
+    found = []
+    for mind in minds:
+        numbers = {name: number for number, name in names_of(mind).items()}
+        known = all(name in numbers for name in pair)
+        found.append(kinematics(mind).pair("gap", *(numbers[n] for n in pair)) if known else nan)
+    return np.array([mind.time for mind in minds]), np.array(found)
+
+
+def kept_below(times: Floats, gaps: Floats) -> float:
+    """The gap below which two kept, by the largest rectangle of time and nearness; 0 if they kept nowhere.
+
+    Args:
+        times: (N,) seconds.
+        gaps: (N,) pixels; NaN where unknown.
+    """
+    if not np.isfinite(gaps).any():
+        return 0.0
+    most = float(np.nanmax(gaps))
+    levels = most * np.arange(1, LEVELS) / LEVELS
+    spans = (longest_below(times, gaps, level) for level in levels)
+    areas = [(most - level) * (b - a) for level, (a, b) in zip(levels, spans, strict=True)]
+    return float(levels[int(np.argmax(areas))]) if max(areas, default=0.0) > 0.0 else 0.0
+
+
+def longest_below(times: Floats, gaps: Floats, level: float) -> Span:
+    """From when to when a gap was longest below a level, seconds; unknown gaps end it."""
+    best, begin = (0.0, 0.0), None
+    for time, gap in zip(times.tolist(), gaps.tolist(), strict=True):
+        if not gap < level:
+            begin = None
+            continue
+        begin = time if begin is None else begin
+        best = (begin, time) if time - begin > best[1] - best[0] else best
+    return best

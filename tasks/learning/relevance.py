@@ -18,7 +18,7 @@ from visup.tasks.learning.meetings import (
     meetings_of,
     pairs_by_weight,
 )
-from visup.tasks.learning.order import Carry, Either, Item, Joint
+from visup.tasks.learning.order import Carry, Either, Item, Joint, Keep
 from visup.tasks.learning.traces import Happening, RunTrace, Symbol
 
 ENDED_S = 0.3
@@ -36,6 +36,7 @@ class CourseEvent:
         beside: Symbols of simultaneous events joined with it.
         instead: Symbols that are evidence of the same event.
         carries: What the carried one does, of an event in which one carries the other.
+        keeps: How near to each other two keep, of an event in which they do.
     """
 
     happening: Happening
@@ -44,6 +45,7 @@ class CourseEvent:
     beside: tuple[Symbol, ...] = ()
     instead: tuple[Symbol, ...] = ()
     carries: Symbol | None = None
+    keeps: Keep | None = None
 
     @property
     def symbol(self) -> Symbol:
@@ -57,6 +59,8 @@ class CourseEvent:
             return Either((self.symbol, *self.instead))
         if self.carries is not None:
             return Carry((self.symbol, self.carries))
+        if self.keeps is not None:
+            return self.keeps
         return Joint((self.symbol, *self.beside)) if self.beside else self.symbol
 
 

@@ -8,11 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from visup.rules.geometry._covered_motion_jit import COVERED_SIGMAS, uncovered_motion
 from visup.rules.geometry._fit_jit import (
     binned,
     binned_trends,
     common_motion,
     median,
+    slope_noise,
     velocities,
 )
 from visup.rules.geometry.regions import DIRECTIONS
@@ -21,6 +23,7 @@ Floats = NDArray[np.float64]
 
 some = settings(max_examples=50, deadline=None)
 number = st.floats(-100, 100)
+UNSEEN = (np.nan, np.nan, np.nan)
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -39,7 +42,11 @@ def binned_of(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]
 def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
     """Over all of the samples."""
     whole = np.array([[0, len(times)]])
-    found: Floats = velocities(times, support, np.array(free), whole, DIRECTIONS, np.inf)[0]
+    unseen = np.full((*support.shape[:2], 3), np.nan)
+    limits = np.inf, 0.7, 3.0
+    found: Floats = velocities(times, (support, np.array(free), unseen), whole, DIRECTIONS, limits)[
+        0
+    ]
     return found
 
 
@@ -190,7 +197,8 @@ def test_velocities_over_spans_are_those_of_a_dumb_twin(
     support[rng.integers(20, size=missing), rng.integers(3, size=missing)] = np.nan
     free = rng.random(support.shape) < rng.choice([1.0, 0.9, 0.4])
     spans = np.array([[0, 20], [0, 10], [10, 20], [17, 20]])
-    found = velocities(times, support, free, spans, DIRECTIONS, misfit)
+    image = np.full((20, 3, 3), np.nan)
+    found = velocities(times, (support, free, image), spans, DIRECTIONS, (misfit, 0.5, 3.0))
     for s, (begin, end) in enumerate(spans):
         for i in range(3):
             slopes = np.full(16, np.nan)
@@ -200,7 +208,9 @@ def test_velocities_over_spans_are_those_of_a_dumb_twin(
                     t = times[begin:end][good]
                     slopes[k] = np.polyfit(t, support[begin:end, i, k][good], 1)[0]
             expected = by_least_squares(slopes, misfit)
-            assert found[s, i] == pytest.approx(expected, nan_ok=True, abs=1e-5)
-            usable = np.isfinite(slopes)
-            alone = common_motion(np.nan_to_num(slopes), usable, DIRECTIONS, misfit)
+            usable, known = np.isfinite(slopes), np.nan_to_num(slopes)
+            alone = common_motion(known, usable, DIRECTIONS, misfit)
             assert alone == pytest.approx(tuple(expected), nan_ok=True, abs=1e-5)
+            near = max(3.0, COVERED_SIGMAS * slope_noise(times[begin:end], 0.5))
+            own = uncovered_motion(known, usable, DIRECTIONS, (alone, UNSEEN), near)
+            assert found[s, i] == pytest.approx(own, nan_ok=True, abs=1e-5)

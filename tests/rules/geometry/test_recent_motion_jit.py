@@ -87,7 +87,10 @@ def test_a_body_that_stops_is_told_to_rest_though_it_moved_fast() -> None:
     path = 100.0 * np.minimum(times, 1.0)
     support = (20.0 + path[:, None] * DIRECTIONS[:, 0])[:, None]
     free, separation = np.ones(support.shape, dtype=bool), np.zeros((len(times), 1, 1))
-    _, _, motion, sigma = fit_motion(times, support, free, separation, DIRECTIONS, LIMITS, 16)
+    image = np.full((len(times), 1, 3), np.nan)
+    _, _, motion, sigma = fit_motion(
+        times, (support, free, image), separation, DIRECTIONS, LIMITS, 16
+    )
     assert np.hypot(*motion[0, 0]) < 3.0 + 4.0 * sigma[0]
     assert np.hypot(*motion[1, 0]) == pytest.approx(100.0, rel=0.01)  # as it did in the first half
 
@@ -96,7 +99,12 @@ def test_nothing_is_fitted_before_there_is_enough() -> None:
     times = np.arange(5) / 25
     blank = np.zeros((5, 2, 16))
     slope, sigma, motion, spread = fit_motion(
-        times, blank, blank == 0, np.zeros((5, 2, 2)), DIRECTIONS, LIMITS, 16
+        times,
+        (blank, blank == 0, blank[..., :3].copy()),
+        np.zeros((5, 2, 2)),
+        DIRECTIONS,
+        LIMITS,
+        16,
     )
     assert np.isnan(slope).all()
     assert np.isnan(sigma).all()

@@ -23,19 +23,21 @@ def row(time: float) -> Row:
         np.full((1, 1), -time),
         np.full(1, 10 * time),
         np.full((1, 2), 20 * time),
+        np.full((1, 3), 30 * time),
     )
 
 
 def empty() -> SampleWindow:
     blank = np.zeros((0, 1, FAN))
-    separation, depth, drift = (np.zeros((0, *n)) for n in ((1, 1), (1,), (1, 2)))
-    return SampleWindow((1,), np.zeros(0), blank, blank > 0, separation, depth, drift)
+    shapes = (1, 1), (1,), (1, 2), (1, 3)
+    separation, depth, drift, image = (np.zeros((0, *n)) for n in shapes)
+    return SampleWindow((1,), np.zeros(0), blank, blank > 0, separation, depth, drift, image)
 
 
 def holds(history: SampleWindow, times: list[float]) -> bool:
     """Whether a history is what a plain list of its samples would be."""
     rows = [row(t) for t in times]
-    wanted = [np.array([r[k] for r in rows]) for k in range(6)]
+    wanted = [np.array([r[k] for r in rows]) for k in range(7)]
     return all(
         np.array_equal(a, w.reshape(a.shape)) for a, w in zip(history.arrays, wanted, strict=True)
     )

@@ -143,17 +143,23 @@ def worlds_of(
     Args:
         kind: Kind of world.
         seed: Different seeds give different worlds.
-        outcomes: Outcomes, used in turn.
+        outcomes: Outcomes, used in turn, without those that these actors cannot have.
         count: How many.
         actors: Actors of the worlds.
     """
     found: list[World] = []
+    wanted, vain = list(outcomes), 0
     for number in range(MOST_DRAWN * count):
-        outcome = outcomes[len(found) % len(outcomes)]
+        if vain == MOST_DRAWN and len(wanted) > 1:  # this outcome only comes with other actors
+            wanted.remove(wanted[len(found) % len(wanted)])
+            vain = 0
+        outcome = wanted[len(found) % len(wanted)]
         world = random_world(kind, SEEDS_APART * seed + number, outcome)
         actors = actors or set(world.actors)
+        vain += 1
         if set(world.actors) == actors:
             found.append(world)
+            vain = 0
         if len(found) == count:
             break
     return found
