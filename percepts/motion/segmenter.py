@@ -60,6 +60,7 @@ from visup.percepts.motion.layers.dense_labelling import (
 from visup.percepts.motion.layers.layer_discovery import affine_rate
 from visup.percepts.motion.output.cast_shadows import CastShadowFilter, comparable_image
 from visup.percepts.motion.output.region_report import (
+    OutlinedFrame,
     apply_ignore,
     looked_at,
     motion_evidence,
@@ -220,12 +221,11 @@ class MotionSegmenter:
 
     def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
         """Regions of the foreground objects; of the tracks while the background hardly moves."""
+        frame = OutlinedFrame(scene, self._history.back(1), self._size)
         asked = self._foreground.memory is not None
         if asked and not (self._static.active or self._foreground.calm):
-            return report_objects(
-                self._foreground, tracks, scene, self._size, self.settings, self._executor
-            )
-        found = report_regions(tracks, scene, self._size, self.settings, self._executor)
+            return report_objects(self._foreground, tracks, frame, self.settings, self._executor)
+        found = report_regions(tracks, frame, self.settings, self._executor)
         return self._with_object_ids(found)
 
     def _with_object_ids(self, found: Sequence[Numbered]) -> tuple[Numbered, ...]:

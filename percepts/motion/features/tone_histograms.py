@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from visup.percepts.motion.features._products_jit import smoothed_and_turned
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats
 
@@ -42,8 +43,8 @@ def tone_likelihood(cells: Superpixels, prior: Floats, least: float = 12.0) -> F
 
 def smoothed_histogram(histogram: NDArray[Any]) -> NDArray[Any]:
     """A flat histogram after a Gaussian along each of its three axes."""
-    out = histogram
+    out = np.asarray(histogram, dtype=np.float64)
     for _ in range(3):
         # Each product smooths the first axis and moves it last.
-        out = (SMOOTHING @ out.reshape(BINS, -1)).T
+        out = smoothed_and_turned(SMOOTHING, out.reshape(BINS, -1))
     return out.ravel()

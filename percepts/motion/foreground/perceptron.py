@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SourceError
+from visup.percepts.motion.features._products_jit import affine_product
 from visup.percepts.motion.features.work_image import Floats
 
 FORMAT = 2
@@ -43,7 +44,8 @@ class Perceptron:
     def log_odds(self, cues: Floats) -> Floats:
         """Of (N, D) cues, (N,) float32."""
         z = np.clip((cues - self.mean) / self.deviation, -FAR, FAR)
-        return np.asarray(np.tanh(z @ self.hidden + self.offset) @ self.out + np.float32(self.bias))
+        units = np.tanh(affine_product(z, self.hidden, self.offset))
+        return np.asarray((units * self.out).sum(axis=1) + np.float32(self.bias), dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

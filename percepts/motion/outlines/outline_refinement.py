@@ -1,13 +1,15 @@
 """Outline refinement: pixels near an outline are reassigned to the side whose tones they resemble.
 
 Cells are several pixels wide, and some lie across the border of an object: a dark sky, a gap between
-legs. Two descriptions of either side say to which a pixel belongs: mean and variance of tones in a
+legs. Three descriptions of either side say to which a pixel belongs: mean and variance of tones in a
 window (after Lankton and Tannenbaum, Localizing region-based active contours, 2008, with local Gaussians
-as in Wang, He, Mishra and Li, 2009), and histograms of the colours of the object and of what surrounds it
-(pixel-wise posteriors, Bibby and Reid 2008). Neighbours that look alike pull each other to one side, so
-that the border comes to lie where tones change (the energy of Rother, Kolmogorov and Blake, GrabCut,
-2004, by mean field instead of a cut). Since both descriptions hang on the outline, all is done twice.
-Where both sides look alike hardly anything changes.
+as in Wang, He, Mishra and Li, 2009), histograms of the colours of the object and of what surrounds it
+(pixel-wise posteriors, Bibby and Reid 2008), and the motion of either side (`outline_motion.py`), which
+tells them apart where both have the same colours. Neighbours that look
+alike pull each other to one side, so that the border comes to lie where tones change (the energy of
+Rother, Kolmogorov and Blake, GrabCut, 2004, by mean field instead of a cut). Since the first two
+descriptions hang on the outline, all is done twice. Where both sides look and move alike hardly anything
+changes.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from visup.percepts.motion.outlines._outline_refinement_jit import (
     places_of,
     window_log_odds,
 )
+from visup.percepts.motion.outlines.outline_motion import CropMotion
 
 ROUNDS = 2  # times that the sides are described and the outline is moved
 WINDOW = 21  # pixels: side of the window whose tones are compared
@@ -38,6 +41,7 @@ BOTH = 0.1  # share of the window that describes both sides
 NEITHER = 20.0  # pixels that speak for neither side, added to each bin of the histograms
 LOCAL = 1.5  # weight of the log odds by tones in the window
 COLOURS = 1.1  # weight of the log odds by colours
+MOTION = 1.0  # weight of the log odds by motion
 STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
 ALIKE = 32.0  # log odds that a neighbour just alike and sure of its side adds
 SWEEPS = 3  # passes of mean field in a round
@@ -48,17 +52,21 @@ CONTEXT = WINDOW // 2 + BAND
 """Margin around the object that a crop for refinement needs, pixels."""
 
 
-def refine_outline(share: Floats, tone: NDArray[np.uint8]) -> Floats:
+def refine_outline(
+    share: Floats, tone: NDArray[np.uint8], motion: CropMotion | None = None
+) -> Floats:
     """Shares after pixels near the outline were assigned to the side they resemble.
 
     Args:
         share: (h, w) float32 probability of an object.
         tone: (h, w, 3) uint8.
+        motion: Where these pixels come from; None for a single image.
 
     Returns:
         (h, w) float32; above one half inside.
     """
     every = window_means(_halved(tone))
+    flows = None if motion is None else motion.side_flows((share > 0.5).view(np.uint8))
     for _ in range(ROUNDS):
         inside = (share > 0.5).view(np.uint8)
         near = places_of(_grown(inside, BAND) != _shrunk(inside, BAND))
@@ -69,6 +77,8 @@ def refine_outline(share: Floats, tone: NDArray[np.uint8]) -> Floats:
         known = np.clip(share[near[:, 0], near[:, 1]], 0.02, 0.98)
         prior = np.log(known / (1 - known))
         odds = LOCAL * local + COLOURS * colours + STEEP * prior
+        if motion is not None and flows is not None:
+            odds += MOTION * motion.log_odds(near, flows)
         alike = likeness_of_neighbours(near, tone)
         share = mean_field(share, near, odds, alike, ALIKE, SWEEPS)
     return share

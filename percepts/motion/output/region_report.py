@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from visup.agent import Directive, Region
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
-from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.foreground.following import ForegroundState
 from visup.percepts.motion.foreground.objects import MovingObject, object_share, object_velocity
 from visup.percepts.motion.layers.dense_labelling import CLIP, PointEvidence
+from visup.percepts.motion.outlines.outline_motion import part_motion
 from visup.percepts.motion.outlines.outline_refinement import CONTEXT, refine_outline
 from visup.percepts.motion.outlines.region_outline import RegionOutline, region_outline
 from visup.percepts.motion.static_camera.track_fusion import MotionEvidence
@@ -23,6 +25,21 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_reg
 from visup.percepts.motion.tracks.track import Indices, Track
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutlinedFrame:
+    """What outlines are drawn from.
+
+    Attributes:
+        scene: The frame as measured.
+        old: The image before it.
+        size: (width, height) of the frame.
+    """
+
+    scene: FrameMeasurements
+    old: WorkImage
+    size: tuple[int, int]
 
 
 def apply_ignore(
@@ -94,8 +111,7 @@ def _boxes(directives: Sequence[Directive], kind: str) -> list[Box]:
 
 def report_regions(
     tracks: Sequence[Track],
-    scene: FrameMeasurements,
-    size: tuple[int, int],
+    frame: OutlinedFrame,
     settings: MotionSettings,
     executor: Executor,
 ) -> tuple[Region, ...]:
@@ -103,22 +119,20 @@ def report_regions(
 
     Args:
         tracks: All tracks.
-        scene: The frame.
-        size: (width, height) of the frame.
+        frame: The frame.
         settings: Gives the least area.
         executor: Computes every other outline in parallel.
 
     Returns:
         Regions by id.
     """
+    scene = frame.scene
     scale = scene.image.scale
     least = min_region_area(scene, settings) / scale**2
     reported = [t for t in tracks if t.id > 0]
 
     def drawn(t: Track) -> RegionOutline | None:
-        return _share_outline(
-            t.share, [o.share for o in reported if o is not t], scene, size, least
-        )
+        return _share_outline(t.share, [o.share for o in reported if o is not t], frame, least)
 
     visible = [t for t in reported if t.last_seen == scene.time]
     out = [_region(t, shape, scale) for t, shape in _outlined(visible, drawn, executor)]
@@ -128,8 +142,7 @@ def report_regions(
 def report_objects(
     state: ForegroundState,
     tracks: Sequence[Track],
-    scene: FrameMeasurements,
-    size: tuple[int, int],
+    frame: OutlinedFrame,
     settings: MotionSettings,
     executor: Executor,
 ) -> tuple[Region, ...]:
@@ -138,21 +151,21 @@ def report_objects(
     Args:
         state: The foreground after the frame.
         tracks: All tracks: an object with a track takes its velocity.
-        scene: The frame.
-        size: (width, height) of the frame.
+        frame: The frame.
         settings: Gives the least area.
         executor: Computes every other outline in parallel.
 
     Returns:
         Regions by id.
     """
+    scene = frame.scene
     least = min_region_area(scene, settings) / scene.image.scale**2
     by_id = {t.id: t for t in tracks if t.id > 0}
     reported = state.objects.reported(scene.time)
 
     def drawn(o: MovingObject) -> RegionOutline | None:
         share = object_share(state.objects, o.key)
-        return _share_outline(share, [], scene, size, least)
+        return _share_outline(share, [], frame, least)
 
     return tuple(
         _object_region(o, shape, by_id.get(o.track), state, scene)
@@ -191,10 +204,10 @@ def _object_region(
 def _share_outline(
     share_of_cells: Floats,
     others: Sequence[Floats],
-    scene: FrameMeasurements,
-    size: tuple[int, int],
+    frame: OutlinedFrame,
     least: float,
 ) -> RegionOutline | None:
+    scene = frame.scene
     x, y, w, h = scene.cells.box(share_of_cells > 0.5)
     if not w:
         return None
@@ -202,12 +215,13 @@ def _share_outline(
     part = np.s_[top : y + h + CONTEXT, left : x + w + CONTEXT]
     labels = scene.cells.labels[part]
     share = share_of_cells[labels]
-    drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]))
+    motion = part_motion(scene.image, frame.old, scene.flow, part)
+    drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]), motion)
     if others:
         # Cells of another object are not taken from it.
         taken = (np.max(others, axis=0) > 0.5)[labels]
         drawn = np.where(taken, share, drawn)
-    return region_outline(drawn, (left, top), scene.image.shape, size, least)
+    return region_outline(drawn, (left, top), scene.image.shape, frame.size, least)
 
 
 def select_regions(

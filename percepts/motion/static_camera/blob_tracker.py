@@ -162,7 +162,7 @@ def _merged_parts(
     # A static occluder splits an object only for as long as it takes to pass.
     two = s.split_px > PASSED * max(s.shape.shape)
     for part in order[1:]:
-        bodies = s.split_px > 0 and are_bodies(whole, part, slender)
+        bodies = s.split_px > 0 and are_bodies(_box(whole), _box(part), slender)
         if (two or bodies) and _is_large_part(part, whole):
             others.append(part)
             continue
@@ -172,6 +172,11 @@ def _merged_parts(
         else:
             others.append(part)
     return whole, others
+
+
+def _box(mask: Mask) -> tuple[int, int, int, int]:
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
+    return x, y, w, h
 
 
 def _is_large_part(part: Mask, whole: Mask) -> bool:

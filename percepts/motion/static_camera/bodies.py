@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects
@@ -99,15 +98,15 @@ def parting_columns(mask: Mask, slender: float) -> tuple[int, ...]:
     return tuple(columns)
 
 
-def are_bodies(a: Mask, b: Mask, slender: float) -> bool:
+def are_bodies(a: tuple[int, int, int, int], b: tuple[int, int, int, int], slender: float) -> bool:
     """Whether two pieces of an outline are bodies side by side, not halves of one behind a post.
 
     Args:
-        a: (h, w) bool.
-        b: (h, w) bool, of the same image.
+        a: (x, y, width, height) of one.
+        b: The same of the other.
         slender: Width of a body as a share of its height.
     """
-    (_, ay, aw, ah), (_, by, bw, bh) = (cv2.boundingRect(m.view(np.uint8)) for m in (a, b))
+    (_, ay, aw, ah), (_, by, bw, bh) = a, b
     slim = all(WHOLE * slender * h <= w <= UPRIGHT * h for w, h in ((aw, ah), (bw, bh)))
     common = min(ay + ah, by + bh) - max(ay, by)
     return slim and common >= ALIKE * max(ah, bh)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.static_camera.blob_filters import is_salient_blob
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, Foreground
+from visup.percepts.motion.static_camera.bodies import SLENDER, are_bodies
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 KNOWN = 0.4  # least foreground share of a region that subtraction shows
@@ -24,6 +26,7 @@ COMMON = 0.5  # least overlap of two outlines of one object, as a share of the s
 WHOLE = 0.6  # intersection over union above which subtraction shows an object whole
 MAIN = 0.4  # least share of a region that a blob must fill to take its id: limbs do not
 MISSED = 0.15  # share of a region's motion evidence outside of the foreground, above which parts are missed
+PIECE = 0.35  # least share of a body in a region, as a share of the largest
 LARGE = 4.0  # least area, in areas of a well-known region, at which subtraction may miss parts
 RECENT = 0.9  # weight of previous evidence per frame
 BESIDE = 5  # tolerance, pixels: points lie on edges, half of them outside of the blob
@@ -248,14 +251,12 @@ class TrackFusion:
                 continue
             if r.id not in self._old:
                 continue
-            common = {key: common_pixels(s, r) for key, s in seen.items()}
-            iou = {key: c / (seen[key].area + r.area - c) for key, c in common.items()}
-            best = max(iou, key=lambda key: iou[key], default=None)
-            if best is None or iou[best] <= WHOLE:
+            parts = _whole_in(r, seen)
+            if not parts:
                 out.append(r)
                 continue
             self._old.discard(r.id)
-            heirs[best] = self._known_id(r)
+            heirs[parts[0]] = self._known_id(r)
         return out, heirs
 
     def _is_part(
@@ -288,6 +289,25 @@ class TrackFusion:
         best = max(reported, key=lambda s: common_pixels(s, r), default=None)
         if best is not None and common_pixels(best, r) > COMMON * min(r.area, best.area):
             self._alias[r.id] = best.id
+
+
+def _whole_in(r: Region, seen: Mapping[int, Region]) -> list[int]:
+    """The blobs, by key, that show a region whole, the largest part first; none if they do not.
+
+    One blob, or bodies side by side that the layers have taken for one, since they walk together.
+    """
+    common = {key: common_pixels(s, r) for key, s in seen.items()}
+    order = sorted(common, key=lambda key: -common[key])
+    large = [
+        key for key in order if common[key] > max(COMMON * seen[key].area, PIECE * common[order[0]])
+    ]
+    bodies = all(are_bodies(seen[a].bbox, seen[b].bbox, SLENDER) for a, b in combinations(large, 2))
+    both = large if bodies and len(large) > 1 else []
+    for parts in (order[:1], both):
+        shared = sum(common[key] for key in parts)
+        if shared > WHOLE * (sum(seen[key].area for key in parts) + r.area - shared):
+            return parts
+    return []
 
 
 def _visible_regions(blobs: BlobTracks, frame: FusionFrame) -> dict[int, Region]:

@@ -37,6 +37,12 @@ def seen(mask: Mask, image: np.ndarray | None = None, n: int = 0) -> Foreground:
     return find_blobs(image, mask, 20, n / 10, 0.1)
 
 
+def box(mask: Mask) -> tuple[int, int, int, int]:
+    ys, xs = np.nonzero(mask)
+    left, top = int(xs.min()), int(ys.min())
+    return left, top, int(xs.max()) + 1 - left, int(ys.max()) + 1 - top
+
+
 def in_its_box(mask: Mask) -> Mask:
     ys, xs = np.nonzero(mask)
     return mask[ys.min() : ys.max() + 1, xs.min() : xs.max() + 1]
@@ -87,11 +93,10 @@ def test_two_halves_behind_a_post_are_no_bodies() -> None:
     post[:, 28:36] = True
     left, right = one & ~post, one & ~post
     left[:, 28:], right[:, :36] = False, False
-    assert not are_bodies(left, right, SLENDER)
-    assert are_bodies(one, body(60, 103), SLENDER)
-    assert not are_bodies(
-        one, body(60, 100, 24), SLENDER
-    )  # a child's height apart: they share too little
+    assert not are_bodies(box(left), box(right), SLENDER)
+    assert are_bodies(box(one), box(body(60, 103)), SLENDER)
+    # A child's height apart: they share too little.
+    assert not are_bodies(box(one), box(body(60, 100, 24)), SLENDER)
 
 
 def followed(frames: list[Mask]) -> tuple[BlobTrack, ...]:
