@@ -16,9 +16,6 @@ from visup.rules.relations.reasoner import kinematics
 LET_GO_GAP = 0.01
 """Gap of two coupled bodies from which on one has let go of the other, image diagonals."""
 
-LET_GO_SHARE = 1.0
-"""The same by their relative speed, as a share of the slower one's speed."""
-
 
 def goes_past(
     mind: Mind, objects: tuple[int, ...], rests: Callable[[tuple[int, ...]], bool]
@@ -33,7 +30,7 @@ def goes_past(
     pair = set(objects)
     held = [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
     if held:
-        return _moves_on(mind, objects) and any(_carries(mind, *other) for other in held)
+        return _moves_on(mind, objects) and not all(gapes(mind, *other) for other in held)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
@@ -47,10 +44,3 @@ def _moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
     evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
     contact = None if evidence is None else evidence.contact
     return contact is not None and (contact.passing or not contact.known)
-
-
-def _carries(mind: Mind, a: int, b: int) -> bool:
-    """Whether two that are coupled also move as one just now: one that is let go of does not."""
-    now = kinematics(mind)
-    speed = min(now.one("speed", a), now.one("speed", b))
-    return not (gapes(mind, a, b) or now.pair("relative_speed", a, b) > LET_GO_SHARE * speed)
