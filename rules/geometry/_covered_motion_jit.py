@@ -139,8 +139,8 @@ def uncovered_motion(
     for k in range(len(slopes)):
         known += usable[k]
     alike = moving_along(slopes, usable, directions, (x, y), near) if np.isfinite(x) else 0
-    if known < SOME or alike >= AS_ONE * known:
-        return x, y
+    if known < len(slopes) or alike >= AS_ONE * known:
+        return x, y  # where the image border cuts it, or another body covers it, is known
     found = _explanations(slopes, usable, directions, motions, near)
     best = -1
     for e in range(len(found)):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.tasks.scripted import Script, Spell, play
 from visup.agent import Status
 from visup.tasks import parse_task
-from visup.tasks.supervision.entries import coincidence
+from visup.tasks.automaton.entries import coincidence
 from visup.tasks.supervision.supervise import task_reasoner
 
 CARRY = """<t> ::= <carry> <place>
