@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import Backpointer, behind, extended
-from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.automaton.entries import observed_entries
+from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import lasted, outcome

@@ -12,9 +12,9 @@ from enum import IntEnum
 
 from visup.agent import StageBelief, Status
 from visup.tasks.automaton.backpointers import Backpointer
+from visup.tasks.automaton.entries import Meetings, StepEntries
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.automaton.task_filter import TaskPosterior
-from visup.tasks.automaton.entries import Meetings, StepEntries
 from visup.tasks.verification.step_monitor import BAD, StepMonitor
 
 # The status of a stage is the first of these among its steps.
