@@ -1,0 +1,59 @@
+"""What is carried touches another body where it slows down, or where it is let go of."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from visup.agent import Coupling, Truth
+from visup.rules.coupling.contact import OutlineContact
+from visup.rules.coupling.evidence import COUPLING
+from visup.tasks.verification.passing import goes_past
+
+GRIPPER, PART, TARGET = 1, 2, 3
+
+
+def scene(held: bool, gap: float, contact: OutlineContact, passing_by: Truth) -> Any:
+    """A mind in which the outlines of part and target meet, with a gap between gripper and part."""
+    measured = SimpleNamespace(pair=lambda quantity, a, b: gap)
+    return SimpleNamespace(
+        couplings=(Coupling((GRIPPER, PART), 0.0),) if held else (),
+        frame_size=(640, 480),
+        truth=lambda name, *objects: passing_by,
+        recall=lambda key: (
+            {(PART, TARGET): SimpleNamespace(contact=contact)}
+            if key is COUPLING
+            else SimpleNamespace(measured=measured)
+        ),
+    )
+
+
+ON = OutlineContact(0.0, passing=True, known=True)
+SLOW = OutlineContact(0.0, passing=False, known=True)
+UNKNOWN = OutlineContact(0.0)
+
+
+@pytest.mark.parametrize(
+    ("held", "gap", "contact", "passing_by", "past"),
+    [
+        (True, 0.0, ON, Truth.FALSE, True),  # carried on
+        (True, 0.0, UNKNOWN, Truth.FALSE, True),  # just met
+        (True, 0.0, SLOW, Truth.FALSE, False),  # slowed down
+        (True, 20.0, ON, Truth.TRUE, False),  # let go of
+        (True, float("nan"), ON, Truth.FALSE, True),  # a gap that is not known is none
+        (False, 0.0, ON, Truth.FALSE, False),  # nobody holds it: by how far it has passed alone
+        (False, 0.0, ON, Truth.TRUE, True),
+    ],
+)
+def test_outlines_that_meet(
+    held: bool, gap: float, contact: OutlineContact, passing_by: Truth, past: bool
+) -> None:
+    mind = scene(held, gap, contact, passing_by)
+    assert goes_past(mind, (PART, TARGET), lambda _: False) is past
+    assert goes_past(mind, (TARGET, PART), lambda _: False) is past
+
+
+def test_what_rests_does_not_go_past() -> None:
+    assert not goes_past(scene(False, 0.0, ON, Truth.TRUE), (PART, TARGET), lambda _: True)
