@@ -12,10 +12,10 @@ are excluded.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import log
+from math import hypot, log
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from visup.rules.coupling._relative_motion_jit import first_recent, fused_veloci
 from visup.rules.geometry._outlines_jit import near_outline, register, resampled, run_boxes
 from visup.rules.geometry.outlines import TEMPLATE_POINTS, prepared_outline
 from visup.rules.geometry.regions import Floats
+
+Vector = tuple[float, float]
 
 ICP_REACH = 12.0
 """Greatest distance of a point to the target outline, pixels."""
@@ -58,12 +60,14 @@ class OutlineTemplate:
         points: (N, 2) pixels.
         normals: (N, 2) unit vectors across the outline.
         shift: (x, y) by which the body has moved since, pixels.
+        velocity: (x, y) at which it moved last, pixels per second.
         local: Whether they cover only the part of the body near the other one.
     """
 
     points: Floats
     normals: Floats
-    shift: tuple[float, float] = (0.0, 0.0)
+    shift: Vector = (0.0, 0.0)
+    velocity: Vector = (0.0, 0.0)
     local: bool = False
 
 
@@ -83,7 +87,7 @@ class RelativeTrack:
     first: OutlineTemplate
     second: OutlineTemplate
     since: float
-    before: tuple[float, float] = (0.0, 0.0)
+    before: Vector = (0.0, 0.0)
     path: tuple[tuple[float, ...], ...] = ()
 
     @property
@@ -157,22 +161,43 @@ def target_of(region: Region) -> TargetOutline:
     return TargetOutline(made.even, made.even_boxes)
 
 
-def registered(kept: OutlineTemplate, target: TargetOutline) -> OutlineTemplate | None:
+def registered(
+    kept: OutlineTemplate, target: TargetOutline, ahead: Iterable[Vector] = ()
+) -> OutlineTemplate | None:
     """A stored outline registered with a later one.
+
+    Closest points find shifts of a few pixels; a body that moves farther between two frames is expected
+    elsewhere, and of all starts the one that brings most points onto the outline counts.
 
     Args:
         kept: The outline, with its shift so far.
         target: The later outline.
+        ahead: Shifts since then to start from as well, (x, y) pixels; those of a pixel or so are not tried.
 
     Returns:
         The outline with the new shift; None when too few points match, or when it has only one
         direction.
     """
+    x, y = kept.shift
+    starts = [kept.shift, *((x + dx, y + dy) for dx, dy in ahead if hypot(dx, dy) > _OUTLIER)]
+    found = [k for start in starts if (k := _registered_from(start, kept, target)) is not None]
+    if len(found) < 2:
+        return found[0] if found else None
+    return max(found, key=lambda k: _on_outline(k, target))
+
+
+def _registered_from(
+    start: Vector, kept: OutlineTemplate, target: TargetOutline
+) -> OutlineTemplate | None:
     limits = ICP_REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _OUTLIER
-    found, x, y = register(
-        kept.points, kept.normals, kept.shift, target.points, target.boxes, limits
-    )
+    found, x, y = register(kept.points, kept.normals, start, target.points, target.boxes, limits)
     return replace(kept, shift=(x, y)) if found else None
+
+
+def _on_outline(kept: OutlineTemplate, target: TargetOutline) -> int:
+    """Number of points that lie on the other outline."""
+    near = near_outline(kept.points + np.array(kept.shift), target.points, target.boxes, _OUTLIER)
+    return int(np.count_nonzero(near))
 
 
 def update_relative_track(
@@ -200,8 +225,9 @@ def update_relative_track(
     apart = regions[0] is not regions[1]
     if track is None:
         return begin_relative_track(regions, now, size) if apart else None
-    first = registered(track.first, target_of(regions[0]))
-    second = registered(track.second, target_of(regions[1]))
+    dt = now - track.path_end
+    first = _followed(track.first, regions[0], dt)
+    second = _followed(track.second, regions[1], dt)
     if first is None or second is None:
         return (
             _begun_again(track, regions, now, size, lasts_s) if apart else replace(track, path=())
@@ -215,6 +241,18 @@ def update_relative_track(
         if fresh is not None:
             return replace(fresh, before=(x, y), path=path)
     return replace(track, first=first, second=second, path=path)
+
+
+def _followed(kept: OutlineTemplate, region: Region, dt: float) -> OutlineTemplate | None:
+    """A stored outline registered with the body as it is seen `dt` seconds after the last time."""
+    known = region.velocity_sigma > 0.0
+    velocities = (kept.velocity, region.velocity) if known else (kept.velocity,)
+    ahead = [(vx * dt, vy * dt) for vx, vy in velocities]
+    found = registered(kept, target_of(region), ahead)
+    if found is None or dt <= 0.0:
+        return found
+    (x, y), (x0, y0) = found.shift, kept.shift
+    return replace(found, velocity=((x - x0) / dt, (y - y0) / dt))
 
 
 def _begun_again(

@@ -6,8 +6,9 @@ zero moves the outline in and out. Names of objects play no role here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -138,8 +139,21 @@ def _velocity(
     old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
 ) -> tuple[float, float] | None:
     kept = outline_template(old, others, size)
-    laid = None if kept is None else registered(kept, TargetOutline.of(outline(new)))
+    ahead = _displacements(old, new)
+    laid = None if kept is None else registered(kept, TargetOutline.of(outline(new)), ahead)
     return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
+
+
+def _displacements(old: Region, new: Region) -> Iterator[tuple[float, float]]:
+    """Possible displacements, pixels: of the centroid and of each corner, as a side may be covered or cut."""
+    (x, y), (x0, y0) = new.centroid, old.centroid
+    yield x - x0, y - y0
+    (left, top, width, height), (left0, top0, width0, height0) = new.bbox, old.bbox
+    for right, low in product((0, 1), repeat=2):
+        yield (
+            float(left + right * width - left0 - right * width0),
+            float(top + low * height - top0 - low * height0),
+        )
 
 
 def _masks(path: Path, labels: Mapping[str, int]) -> dict[str, TrueMask]:
