@@ -29,7 +29,7 @@ class ContactSettings:
 
     passing: float = 0.0125
     passing_share: float = 0.5
-    slowed_share: float = 0.4
+    slowed_share: float = 0.25
     settled_s: float = 0.15
     unknown_s: float = 0.5
     doubt_share: float = 0.4
@@ -45,7 +45,8 @@ class OutlineContact:
         path: How far one has passed across the other since it last did not.
         passing: Whether one was last observed passing the other.
         changed_at: Since when `passing` has its value.
-        known: Whether their relative motion was ever known since they met.
+        known: Whether their relative motion is known, or was at most `unknown_s` ago.
+        known_at: When it was last known, or when they met.
         fastest: Their greatest relative speed since, pixels per second.
     """
 
@@ -55,6 +56,7 @@ class OutlineContact:
     passing: bool = False
     changed_at: float = 0.0
     known: bool = False
+    known_at: float = 0.0
     fastest: float = 0.0
 
 
@@ -78,9 +80,12 @@ def updated_contact(
         thrown_back: Whether they separate on the side on which they met, which implies contact.
     """
     now, dt = moment
-    contact = before or OutlineContact(now, changed_at=now)
+    contact = before or OutlineContact(now, changed_at=now, known_at=now)
+    if speed is None and contact.known and now - contact.known_at >= settings.unknown_s - 1e-6:
+        # Hidden in the other, say: had it gone on, it would have come out again.
+        contact = replace(contact, known=False, passing=False, path=0.0, met_at=contact.known_at)
     if speed is not None:
-        contact = replace(contact, fastest=max(contact.fastest, speed))
+        contact = replace(contact, fastest=max(contact.fastest, speed), known_at=now)
         passing = speed > max(limit, settings.slowed_share * contact.fastest)
         if passing is not contact.passing or not contact.known:
             contact = replace(contact, passing=passing, changed_at=now, known=True)

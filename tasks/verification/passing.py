@@ -30,8 +30,12 @@ def goes_past(
     pair = set(objects)
     held = [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
     if held:
-        return _moves_on(mind, objects) and not all(gapes(mind, *other) for other in held)
-    return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
+        return _moves_on(mind, objects)
+    if mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects):
+        return True
+    evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
+    contact = None if evidence is None else evidence.contact
+    return contact is not None and contact.settled_since is None
 
 
 def gapes(mind: Mind, a: int, b: int) -> bool:
