@@ -16,8 +16,9 @@ class TaskSettings:
             there is bound to it.
         enter_s: How long a relation must be true before it counts as the entry to a stage.
         contact_s: A contact that ended at most this long ago still counts as the entry to a stage.
-        contrary_s: How long the contrary of an action must hold before a begun stage fails.
-        contrary_early_s: The same for a stage that has not begun yet.
+        contrary_s: How long the contrary of an action must hold before a begun stage fails, or any stage if
+            its course states the contrary, which did not hold when its turn came.
+        contrary_early_s: The same for other stages that have not begun yet.
         recover_s: How long a failing stage must make progress before it counts as recovered.
         recover_share: The same as a share of the time for which it has been failing; the longer one counts.
         stalled_s: A begun stage without progress for this long is stalled.

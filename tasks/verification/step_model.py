@@ -66,7 +66,7 @@ class StepModel:
         if leaf.payload.status in BAD and not done:
             # The onset of failure was penalised already; from then on its contrary is expected.
             return math.exp(-self.hmm.recover * dt)
-        if seen.contrary is not None and _counts(seen):
+        if seen.contrary is not None and _counts(seen) and leaf.payload.begun is not None:
             return self.hmm.fit(ActionStatus.CONTRARY, seen.contrary.confidence, dt)
         if done or self.over(leaf) or (seen.helps is not None and leaf.payload.held):
             return 1.0

@@ -58,6 +58,7 @@ class StepMonitor:
         better_since: Since when it holds or progresses without a break, or None.
         contrary: Name of the contrary relation that is true now, or None.
         contrary_since: Since when.
+        contrary_arose: Whether the course states that contrary, and it became true while the step was active.
         fault: The contrary by which it last failed, or None.
         fault_since: Since when that was true.
         late: Whether a `within` expired before the step was over, which is final.
@@ -96,6 +97,7 @@ class StepMonitor:
     better_since: float | None = None
     contrary: str | None = None
     contrary_since: float | None = None
+    contrary_arose: bool = False
     fault: str | None = None
     fault_since: float = 0.0
     late: bool = False
@@ -328,9 +330,12 @@ def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) ->
     since = max(monitor.entered, seen.contrary.since)
     if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:
         since = min(since, monitor.contrary_since)
-    confidence = seen.contrary.confidence
     return replace(
-        monitor, contrary=seen.contrary.name, contrary_since=since, confidence=confidence
+        monitor,
+        contrary=seen.contrary.name,
+        contrary_since=since,
+        contrary_arose=seen.decisive and since > monitor.entered,
+        confidence=seen.contrary.confidence,
     )
 
 
@@ -370,7 +375,8 @@ def _status_unseen(
 def _fails(monitor: StepMonitor, now: float, settings: TaskSettings, worked: Worked) -> bool:
     if monitor.contrary_since is None:
         return False
-    patience = settings.contrary_s if monitor.begun is not None else settings.contrary_early_s
+    early = monitor.begun is None and not monitor.contrary_arose
+    patience = settings.contrary_early_s if early else settings.contrary_s
     return worked(monitor.contrary_since, now) >= patience - 1e-9
 
 
