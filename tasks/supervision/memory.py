@@ -8,7 +8,7 @@ from visup.agent import TaskBelief
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.replay import PastLook
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity
-from visup.tasks.verification.kept import NOTHING_KEPT, Kept
+from visup.tasks.verification.observation import NOTHING_KEPT, Kept
 
 
 @dataclass(frozen=True)

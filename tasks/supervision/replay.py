@@ -19,7 +19,7 @@ from visup.rules.relations.zones import ZONES
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
-from visup.tasks.verification.kept import NOTHING_KEPT, Kept
+from visup.tasks.verification.observation import NOTHING_KEPT, Kept
 
 KEPT_S = 60.0
 """How long looks are stored, seconds."""

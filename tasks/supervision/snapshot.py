@@ -8,8 +8,8 @@ from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Hold
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.verification.kept import NOTHING_KEPT, Kept
-from visup.tasks.verification.observe import ActionObservation, RelationLookup
+from visup.tasks.verification.observation import NOTHING_KEPT, ActionObservation, Kept
+from visup.tasks.verification.observe import RelationLookup
 from visup.tasks.verification.observe import observe as observe_action
 from visup.tasks.verification.stage_conditions import ConditionEvaluator
 
@@ -52,7 +52,7 @@ class TaskSnapshot:
     def observe(self, step: TaskStep) -> ActionObservation:
         """The present observation of a step."""
         if not step.conditions:
-            return self._look(step.action, step.actors)
+            return self._look(step.action, step.actors).settled
         if step not in self._judged:
             self._judged[step] = self._judge(step)
         return self._judged[step]
@@ -61,7 +61,7 @@ class TaskSnapshot:
         """The observation of a step that has conditions of its own."""
         if self.pauses.now(step.pauses) is not None:
             return ActionObservation(paused=True, pauses=self.pauses)
-        seen = replace(self._look(step.action, step.actors), pauses=self.pauses)
+        seen = replace(self._look(step.action, step.actors).settled, pauses=self.pauses)
         return self._conditions.apply(step, seen)
 
     def holds(self, condition: Condition, lasting: Hold | None) -> Truth:

@@ -7,7 +7,8 @@ failure of a step), `step_monitor.py` (the status of a step over time), `togethe
 likelihood of observations), `settings.py` (the time constants).
 """
 
-from visup.tasks.verification.observe import ActionObservation, observe
+from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.observe import observe
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
 from visup.tasks.verification.step_monitor import StepMonitor
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 
@@ -18,15 +17,20 @@ from visup.rules.relations.reasoner import kinematics
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.rhythm import Beats, Rhythm, heard
 from visup.tasks.actions.vocabulary import FactEvaluator
-from visup.tasks.automaton.states import TaskStep
-from visup.tasks.verification.kept import NOTHING_KEPT, Kept
-from visup.tasks.verification.passing import gapes, goes_past
-from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
+from visup.tasks.verification.observation import (
+    NOTHING_KEPT,
+    UNOBSERVED,
+    ActionObservation,
+    Kept,
+)
+from visup.tasks.verification.passing import gapes, goes_past, moves_on
+from visup.tasks.verification.pauses import PauseRecord
 from visup.tasks.verification.sudden import SuddenTrends
 
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
+CONTACTS = ("touching", "in_contact", "on")
 
 CARRIED_SPEED = 0.005
 """Least speed at which coupled objects count as moving together, image diagonals per second."""
@@ -37,50 +41,6 @@ REST_S = 0.3
 RADIAL_SHARE = 0.45
 """Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
 flies round another it reaches 0.4."""
-
-
-@dataclass(frozen=True, slots=True)
-class ActionObservation:
-    """The observation of an action between its actors.
-
-    Attributes:
-        holds: Whether the action holds.
-        held_by: A true relation by which it holds, or None.
-        helps: A true relation by which it holds or progresses, or None.
-        entry: A true relation by which it begins, or None.
-        contrary: A true relation by which it fails, or None.
-        decisive: Whether the contrary counts even while the action holds, because the course states it.
-        over: Whether the end condition of its course holds; None when the course has none.
-        observed: Whether anything is known about it; False while an actor is not found or its object
-            is hidden.
-        sudden: A trend by which it begins that has just set in, and has not lasted yet, or None.
-        round: Whether its entry is a trend between two of which one goes round the other.
-        paused: Whether the work on it is paused: then there is no observation of it.
-        pauses: All pauses of the task so far.
-        absent: Whether one of its actors is optional and has no object: then the step is not due.
-    """
-
-    holds: Truth = Truth.UNKNOWN
-    held_by: Relation | None = None
-    helps: Relation | None = None
-    entry: Relation | None = None
-    contrary: Relation | None = None
-    decisive: bool = False
-    over: Truth | None = None
-    observed: bool = False
-    sudden: Relation | None = None
-    round: bool = False
-    paused: bool = False
-    pauses: PauseRecord = NO_PAUSES
-    absent: bool = False
-
-    def elapsed(self, step: TaskStep, since: float, now: float) -> float:
-        """Seconds from one time to another in which the work on a step was not paused."""
-        pauses = step.pauses if step.conditions else ()
-        return self.pauses.elapsed(pauses, since, now) if pauses else now - since
-
-
-UNOBSERVED = ActionObservation()
 
 
 class RelationLookup:
@@ -152,6 +112,10 @@ class RelationLookup:
             "rests", objects, Truth.UNKNOWN if math.isnan(speed) else truth_if(slow)
         )
         return rest.truth is Truth.TRUE and self.time - rest.since >= REST_S - 1e-9
+
+    def moves_on(self, objects: tuple[int, ...]) -> bool:
+        """Whether neither of two whose outlines meet has slowed down at the other."""
+        return moves_on(self._mind, objects)
 
     def begun(
         self, names: tuple[str, ...], objects: tuple[int, ...]
@@ -298,6 +262,7 @@ def observe(
         observed=relations.known(known, ids),
         sudden=sudden,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
+        moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
     )
 
 

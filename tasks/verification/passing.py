@@ -1,7 +1,6 @@
 """Outlines that meet in the image although the bodies do not touch: one moves on past the other.
 
-What is carried touches where it comes to rest, or where it is let go of; until then its outline may pass over
-everything in its way.
+What is carried touches where it comes to rest; until then its outline may pass over everything in its way.
 """
 
 from __future__ import annotations
@@ -9,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from visup.agent import Mind, Truth
+from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.relations.reasoner import kinematics
@@ -20,7 +20,7 @@ LET_GO_GAP = 0.01
 def goes_past(
     mind: Mind, objects: tuple[int, ...], rests: Callable[[tuple[int, ...]], bool]
 ) -> bool:
-    """Whether outlines meet only because one body moves on past the other, or is carried past it.
+    """Whether outlines meet only because one body has passed the other, or is carried past it.
 
     Args:
         mind: The mind.
@@ -28,13 +28,20 @@ def goes_past(
         rests: Whether one of two has come to rest at the other.
     """
     pair = set(objects)
-    held = [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
-    if held:
-        return _moves_on(mind, objects)
-    if mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects):
-        return True
-    evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
-    contact = None if evidence is None else evidence.contact
+    if any(len(pair & set(c.objects)) == 1 for c in mind.couplings):
+        contact = _contact(mind, objects)
+        return contact is not None and (contact.passing or not contact.known)
+    return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
+
+
+def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
+    """Whether one of two whose outlines meet has not slowed down at the other, as far as is known.
+
+    What touches another body is stopped by it, or takes it along. Seen from above, outlines meet long
+    before a boat is alongside; so a stage that consists of a contact has not begun until then. An invariant
+    does not wait for it: what must not touch may do so at full speed.
+    """
+    contact = _contact(mind, objects)
     return contact is not None and contact.settled_since is None
 
 
@@ -43,8 +50,6 @@ def gapes(mind: Mind, a: int, b: int) -> bool:
     return kinematics(mind).pair("gap", a, b) > LET_GO_GAP * image_diagonal(mind.frame_size)
 
 
-def _moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether one has not slowed down since their outlines met, as far as is known."""
+def _contact(mind: Mind, objects: tuple[int, ...]) -> OutlineContact | None:
     evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
-    contact = None if evidence is None else evidence.contact
-    return contact is not None and (contact.passing or not contact.known)
+    return None if evidence is None else evidence.contact

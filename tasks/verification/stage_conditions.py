@@ -15,7 +15,8 @@ from visup.tasks.grammar.conditions import Condition, Lasted
 from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
-from visup.tasks.verification.observe import ActionObservation, RelationLookup
+from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.observe import RelationLookup
 from visup.tasks.verification.step_monitor import Worked
 
 Holds = Callable[[str, tuple[str, ...]], Truth]

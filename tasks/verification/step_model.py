@@ -11,7 +11,7 @@ from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
 from visup.tasks.automaton.states import Leaf, State, TaskStep
-from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
 from visup.tasks.verification.together import at_the_same_time

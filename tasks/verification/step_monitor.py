@@ -12,7 +12,7 @@ from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import RunningDeadline, TaskStep
-from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
+from visup.tasks.verification.observation import UNOBSERVED, ActionObservation
 from visup.tasks.verification.reported import ReportedRelations, with_reported
 from visup.tasks.verification.settings import TaskSettings
 

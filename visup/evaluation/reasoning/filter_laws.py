@@ -20,7 +20,7 @@ from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.grammar.parser import read
 from visup.tasks.supervision.hypotheses import TaskHypothesis
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.settings import DEFAULT_SETTINGS
 from visup.tasks.verification.step_model import Observe
 

@@ -1,0 +1,84 @@
+"""The observation of an action at one moment, and what is kept of its facts until the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from visup.agent import Relation, Truth
+from visup.agent.model.fast_replace import replace
+from visup.tasks.actions.rhythm import Beats
+from visup.tasks.automaton.states import TaskStep
+from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
+
+
+@dataclass(frozen=True, slots=True)
+class ActionObservation:
+    """The observation of an action between its actors.
+
+    Attributes:
+        holds: Whether the action holds.
+        held_by: A true relation by which it holds, or None.
+        helps: A true relation by which it holds or progresses, or None.
+        entry: A true relation by which it begins, or None.
+        contrary: A true relation by which it fails, or None.
+        decisive: Whether the contrary counts even while the action holds, because the course states it.
+        over: Whether the end condition of its course holds; None when the course has none.
+        observed: Whether anything is known about it; False while an actor is not found or its object
+            is hidden.
+        sudden: A trend by which it begins that has just set in, and has not lasted yet, or None.
+        round: Whether its entry is a trend between two of which one goes round the other.
+        paused: Whether the work on it is paused: then there is no observation of it.
+        pauses: All pauses of the task so far.
+        absent: Whether one of its actors is optional and has no object: then the step is not due.
+        moves_on: Whether it is a contact at which neither has slowed down yet.
+    """
+
+    holds: Truth = Truth.UNKNOWN
+    held_by: Relation | None = None
+    helps: Relation | None = None
+    entry: Relation | None = None
+    contrary: Relation | None = None
+    decisive: bool = False
+    over: Truth | None = None
+    observed: bool = False
+    sudden: Relation | None = None
+    round: bool = False
+    paused: bool = False
+    pauses: PauseRecord = NO_PAUSES
+    absent: bool = False
+    moves_on: bool = False
+
+    def elapsed(self, step: TaskStep, since: float, now: float) -> float:
+        """Seconds from one time to another in which the work on a step was not paused."""
+        pauses = step.pauses if step.conditions else ()
+        return self.pauses.elapsed(pauses, since, now) if pauses else now - since
+
+    @property
+    def settled(self) -> ActionObservation:
+        """What counts for a stage: no contact of two of which one moves on past the other."""
+        if not self.moves_on:
+            return self
+        return replace(self, holds=Truth.UNKNOWN, held_by=None, helps=None, entry=None)
+
+
+UNOBSERVED = ActionObservation()
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """State of the facts of a task at one moment, for the next.
+
+    Attributes:
+        time: Seconds of that moment, or None before the first.
+        lasting: Since when each fact that is no plain relation of the mind has been true, by key.
+        beats: Occurrences of periodic facts, by key.
+        pauses: All pauses so far.
+    """
+
+    time: float | None = None
+    lasting: tuple[tuple[str, float], ...] = ()
+    beats: tuple[tuple[str, Beats], ...] = ()
+    pauses: PauseRecord = NO_PAUSES
+
+
+NOTHING_KEPT = Kept()
