@@ -39,13 +39,18 @@ def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floa
         (2,) velocity and (2, 2) its covariance.
     """
     count = len(path)
-    # Neighbouring positions differ by noise alone, however the bodies move; the correlated part of the
-    # noise is assumed equally large.
+    # Steps between neighbouring positions differ from those at the mean velocity by noise; its correlated
+    # part is assumed equally large.
     xx = xy = yy = 0.0
-    for n in range(count - 1):
-        dx, dy = path[n + 1, 1] - path[n, 1], path[n + 1, 2] - path[n, 2]
-        xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
     steps = max(count - 1, 1)
+    lasted = max(path[count - 1, 0] - path[0, 0], 1e-9)
+    mean_x = (path[count - 1, 1] - path[0, 1]) / lasted
+    mean_y = (path[count - 1, 2] - path[0, 2]) / lasted
+    for n in range(count - 1):
+        dt = path[n + 1, 0] - path[n, 0]
+        dx = path[n + 1, 1] - path[n, 1] - mean_x * dt
+        dy = path[n + 1, 2] - path[n, 2] - mean_y * dt
+        xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
     xx, xy, yy = xx / steps + 1e-4, xy / steps, yy / steps + 1e-4
     middle = 0.0
     for n in range(begin, count):

@@ -42,6 +42,15 @@ def test_where_nothing_is_known_of_their_motion_it_settles_later() -> None:
     assert seen([None] * 7).settled_since is not None
 
 
+def test_what_is_not_seen_to_move_on_any_more_settles() -> None:
+    """A parcel that falls into a bin is hidden by it: had it gone on, it would have come out again."""
+    assert seen([30.0] * 5 + [None] * 3).passing
+    hidden = seen([30.0] * 5 + [None] * 8)
+    assert not hidden.passing
+    assert hidden.settled_since is not None
+    assert seen([30.0] * 5 + [None] * 8 + [30.0]).settled_since is None
+
+
 @given(speeds)
 def test_what_is_thrown_back_has_made_contact(told: list[float | None]) -> None:
     contact = updated_contact(seen(told), 30.0, LIMIT, (9.0, DT), SETTINGS, thrown_back=True)

@@ -10,12 +10,16 @@ from scipy.stats import multivariate_normal
 
 from tests.rules.scenes import SIZE, box_region
 from visup.agent import Region
+from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.relative_motion import (
     OutlineTemplate,
     RelativeTrack,
     RelativeVelocity,
     begin_relative_track,
+    outline_template,
+    registered,
     relative_velocity,
+    target_of,
     update_relative_track,
 )
 from visup.rules.geometry._outlines_jit import icp_step
@@ -126,7 +130,8 @@ def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
 
 def by_arrays(path: np.ndarray, now: float, window: float) -> RelativeVelocity:
     """`relative_velocity` by matrices."""
-    steps = np.diff(path[:, 1:3], axis=0)
+    velocity = (path[-1, 1:3] - path[0, 1:3]) / (path[-1, 0] - path[0, 0])
+    steps = np.diff(path[:, 1:3], axis=0) - np.diff(path[:, :1], axis=0) * velocity
     noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
     inside = int((path[:, 0] > now - window - 1e-6).sum())
     long = int((path[:, 0] > path[-1, 0] - 0.6 * window + 1e-6).sum()) + 1
@@ -167,21 +172,42 @@ def test_of_a_few_places_nothing_is_told(count: int) -> None:
     assert relative_velocity(track(places(8.0)[:count]), count / 25, 0.3) is None
 
 
-def test_boxes_that_move_apart_are_followed() -> None:
+@pytest.mark.parametrize(
+    ("speed", "known"), [(20.0, False), (20.0, True), (200.0, False), (200.0, True), (700.0, True)]
+)
+def test_boxes_that_move_apart_are_followed(speed: float, known: bool) -> None:
+    """700 pixels a second are 28 from frame to frame, more than closest points reach by themselves."""
+    sigma = 1.0 if known else 0.0
+
     def both(t: float) -> tuple[Region, Region]:
-        first, second = (
-            box_region(1, (100, 200, 80, 60)),
-            box_region(2, (184 + 20 * t, 200, 80, 60)),
-        )
+        first = box_region(1, (10, 200, 80, 60))
+        second = box_region(2, (94 + speed * t, 200, 80, 60))
         assert first is not None
         assert second is not None
-        return first, second
+        return replace(first, velocity_sigma=sigma), replace(
+            second, velocity=(speed, 0.0), velocity_sigma=sigma
+        )
 
-    known = begin_relative_track(both(0.0), 0.0, SIZE)
-    for k in range(1, 20):
-        known = update_relative_track(known, both(k / 25), k / 25, SIZE, lasts_s=1.2, anew_s=2.5)
-    assert known is not None
-    found = relative_velocity(known, 19 / 25, 0.3)
+    frames = 16
+    followed = begin_relative_track(both(0.0), 0.0, SIZE)
+    for k in range(1, frames):
+        now = k / 25
+        followed = update_relative_track(followed, both(now), now, SIZE, lasts_s=1.2, anew_s=2.5)
+    assert followed is not None
+    assert followed.since == 0.0  # the outlines that were stored first are still found
+    found = relative_velocity(followed, (frames - 1) / 25, 0.3)
     assert found is not None
-    assert found.velocity[0] == pytest.approx(20.0, abs=1.0)
+    assert found.velocity[0] == pytest.approx(speed, rel=0.02, abs=1.0)
     assert found.rest_odds(STILL, MOVING) < -5.0
+
+
+@given(st.floats(-60, 60), st.floats(-60, 60))
+def test_an_outline_is_found_where_it_is_expected(dx: float, dy: float) -> None:
+    region, moved = box_region(1, (200, 200, 80, 60)), box_region(1, (200 + dx, 200 + dy, 80, 60))
+    assert region is not None
+    assert moved is not None
+    kept = outline_template(region, (), SIZE)
+    assert kept is not None
+    found = registered(kept, target_of(moved), [(dx + 4.0, dy - 4.0)])
+    assert found is not None
+    assert found.shift == pytest.approx((round(dx), round(dy)), abs=1.0)

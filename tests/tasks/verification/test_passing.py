@@ -1,4 +1,4 @@
-"""What is carried touches another body where it slows down, or where it is let go of."""
+"""What is carried touches another body where it slows down; a stage of contact begins there, held or not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from visup.agent import Coupling, Truth
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
-from visup.tasks.verification.passing import goes_past
+from visup.tasks.verification.passing import goes_past, moves_on
 
 GRIPPER, PART, TARGET = 1, 2, 3
 
@@ -41,8 +41,8 @@ UNKNOWN = OutlineContact(0.0)
         (True, 0.0, ON, Truth.FALSE, True),  # carried on
         (True, 0.0, UNKNOWN, Truth.FALSE, True),  # just met
         (True, 0.0, SLOW, Truth.FALSE, False),  # slowed down
-        (True, 20.0, ON, Truth.TRUE, False),  # let go of
-        (True, float("nan"), ON, Truth.FALSE, True),  # a gap that is not known is none
+        (True, 20.0, ON, Truth.TRUE, True),  # let go of on the move: it falls past it
+        (True, 20.0, SLOW, Truth.TRUE, False),  # let go of where it rests
         (False, 0.0, ON, Truth.FALSE, False),  # nobody holds it: by how far it has passed alone
         (False, 0.0, ON, Truth.TRUE, True),
     ],
@@ -57,3 +57,24 @@ def test_outlines_that_meet(
 
 def test_what_rests_does_not_go_past() -> None:
     assert not goes_past(scene(False, 0.0, ON, Truth.TRUE), (PART, TARGET), lambda _: True)
+
+
+@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize(
+    ("contact", "on"),
+    [
+        (OutlineContact(0.0, passing=True, known=True), True),
+        (OutlineContact(0.0), True),
+        (OutlineContact(0.0, known=True), True),  # it has slowed down this moment
+        (OutlineContact(0.0, settled_since=1.0, known=True), False),
+    ],
+)
+def test_a_stage_of_contact_waits_until_one_has_slowed_down(
+    held: bool, contact: OutlineContact, on: bool
+) -> None:
+    assert moves_on(scene(held, 0.0, contact, Truth.FALSE), (PART, TARGET)) is on
+
+
+def test_where_nothing_is_known_of_a_contact_nobody_moves_on() -> None:
+    mind = scene(False, 0.0, ON, Truth.FALSE)
+    assert not moves_on(mind, (GRIPPER, TARGET))
