@@ -240,7 +240,7 @@ class MonitoredPhases:
         )
         state = self.steps.together(with_leaves(hypothesis.state, looked_at), observe)
         new = leaves(state)
-        fit = math.prod(self.steps.fit(x, observe(x.step), done, dt) for x in new)
+        fit = self.steps.joint_fit(state, observe, done, dt)
         lost = any(x.payload.status in BAD for x in new)
         return replace(hypothesis, state=state, finished=None if lost else finished), fit
 

@@ -10,7 +10,7 @@ from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
-from visup.tasks.automaton.states import Leaf, State, TaskStep
+from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
@@ -57,16 +57,53 @@ class StepModel:
     def _judged(self, step: TaskStep) -> bool:
         return not self.actions[step.action].lasts and not step.is_told
 
-    def fit(self, leaf: Leaf[StepMonitor], seen: ActionObservation, done: bool, dt: float) -> float:
-        """Likelihood of `dt` seconds of an observation, relative to the best: at most 1, and 1 in a pause."""
+    def joint_fit(
+        self, state: State[StepMonitor], observe: Observe, done: bool, dt: float
+    ) -> float:
+        """Likelihood of `dt` seconds of the observations of all active steps; see `fit`.
+
+        What contradicts several actions that one stage requires is one event: a tug that leaves without its
+        cart neither moves together with it nor moves it. So it counts once.
+        """
+        active = leaves(state)
+        failing = {x.step.stage for x in active if x.payload.status in BAD}
+        whole, worst = 1.0, dict[str, float]()
+        for leaf in active:
+            seen, stage = observe(leaf.step), leaf.step.stage
+            fit = self.fit(leaf, seen, done, dt, failing=stage in failing)
+            if seen.contrary is None:
+                whole *= fit
+            else:
+                worst[stage] = min(fit, worst.get(stage, 1.0))
+        return whole * math.prod(worst.values())
+
+    def fit(
+        self,
+        leaf: Leaf[StepMonitor],
+        seen: ActionObservation,
+        done: bool,
+        dt: float,
+        *,
+        failing: bool,
+    ) -> float:
+        """Likelihood of `dt` seconds of an observation, relative to the best: at most 1, and 1 in a pause.
+
+        Args:
+            leaf: An active step.
+            seen: Its observation.
+            done: Whether the task is.
+            dt: Seconds.
+            failing: Whether its stage fails, by this step or by another one that it requires as well.
+        """
         if seen.paused:
             return 1.0
         if not seen.observed:
             return self.hmm.fit(ActionStatus.UNKNOWN, 1.0, dt)
-        if leaf.payload.status in BAD and not done:
+        bad = leaf.payload.status in BAD or seen.contrary is not None
+        if failing and bad and not done:
             # The onset of failure was penalised already; from then on its contrary is expected.
             return math.exp(-self.hmm.recover * dt)
-        if seen.contrary is not None and _counts(seen) and leaf.payload.begun is not None:
+        if seen.contrary is not None and _counts(seen):
             return self.hmm.fit(ActionStatus.CONTRARY, seen.contrary.confidence, dt)
         if done or self.over(leaf) or (seen.helps is not None and leaf.payload.held):
             return 1.0
