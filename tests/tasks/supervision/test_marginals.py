@@ -108,3 +108,23 @@ def test_a_false_alarm_counts_once_however_long_it_lasts() -> None:
     played = play(task_reasoner([parse_task(text)]), Script(spells), 11.0)
     assert belief(played, 7.5).current == "near"
     assert belief(played, 11.0).current == "near"
+
+
+def test_what_contradicts_two_actions_of_a_stage_counts_once() -> None:
+    """A tug that leaves without its cart fails to haul it: it has not failed to approach it."""
+    text = (
+        "<fetch> ::= <approach> <meet> <haul>\n<approach> ::= converging(arm, satellite)\n"
+        "<meet> ::= touching(arm, satellite)\n<haul> ::= moving_together(arm, satellite) "
+        "& keeping_distance(arm, satellite) fails when diverging(arm, satellite)"
+    )
+    spells = (
+        Spell("converging", 0.0, 5.6),
+        Spell("touching", 4.5, 7.0),
+        Spell("diverging", 7.0, 14.0),
+    )
+    played = play(task_reasoner([parse_task(text)]), Script(spells), 12.0)
+    assert belief(played, 6.5).current == "haul"
+    status = {s.stage: s.status for s in belief(played, 7.8).stages}
+    assert status == {"approach": Status.DONE, "meet": Status.DONE, "haul": Status.FAILING}
+    later = {s.stage: s.status for s in belief(played, 12.0).stages}
+    assert later == status
