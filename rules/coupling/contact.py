@@ -29,7 +29,7 @@ class ContactSettings:
 
     passing: float = 0.0125
     passing_share: float = 0.5
-    slowed_share: float = 0.25
+    slowed_share: float = 0.4
     settled_s: float = 0.15
     unknown_s: float = 0.5
     doubt_share: float = 0.4

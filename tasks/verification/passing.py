@@ -1,6 +1,7 @@
 """Outlines that meet in the image although the bodies do not touch: one moves on past the other.
 
-What is carried touches where it comes to rest; until then its outline may pass over everything in its way.
+What is carried touches where it comes to rest, or where it is let go of; until then its outline may pass over
+everything in its way.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ def goes_past(
         objects: Two objects whose outlines meet.
         rests: Whether one of two has come to rest at the other.
     """
-    pair = set(objects)
-    if any(len(pair & set(c.objects)) == 1 for c in mind.couplings):
+    if held := holds_on(mind, objects):
         contact = _contact(mind, objects)
-        return contact is not None and (contact.passing or not contact.known)
+        on = contact is not None and (contact.passing or not contact.known)
+        return on and not all(gapes(mind, *other) for other in held)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
@@ -39,10 +40,18 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
 
     What touches another body is stopped by it, or takes it along. Seen from above, outlines meet long
     before a boat is alongside; so a stage that consists of a contact has not begun until then. An invariant
-    does not wait for it: what must not touch may do so at full speed.
+    does not wait for it: what must not touch may do so at full speed. Nor does what is carried, which has
+    a rule of its own (`goes_past`).
     """
     contact = _contact(mind, objects)
-    return contact is not None and contact.settled_since is None
+    unsettled = contact is not None and contact.settled_since is None
+    return unsettled and not holds_on(mind, objects)
+
+
+def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """The couplings of one of two bodies to a third one."""
+    pair = set(objects)
+    return [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
 
 
 def gapes(mind: Mind, a: int, b: int) -> bool:
