@@ -20,7 +20,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.files import read_json
 from visup.percepts.opencv_names import opencv_name
 from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
-from visup.rules.geometry.regions import outline
+from visup.rules.geometry.outlines import prepared_outline
 from visup.testing import region_of
 
 MARGIN = 8
@@ -138,7 +138,9 @@ def _velocity(
     old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
 ) -> tuple[float, float] | None:
     kept = outline_template(old, others, size)
-    laid = None if kept is None else registered(kept, TargetOutline.of(outline(new)))
+    laid = (
+        None if kept is None else registered(kept, TargetOutline.of(prepared_outline(new).points))
+    )
     return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
 
 
