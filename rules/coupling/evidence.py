@@ -56,6 +56,10 @@ class CouplingEvidence:
     contact: OutlineContact | None = None
     decoupled_at: float | None = None
 
+    def parted_since(self, moment: float) -> bool:
+        """Whether they were decoupled after a moment, seconds."""
+        return self.decoupled_at is not None and self.decoupled_at > moment
+
 
 COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
     "rules.coupling", MappingProxyType({})
@@ -122,6 +126,17 @@ def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
             host = hosts.get((a, b))
             observed.append(PairObservation((a, b), touching, closing, parting, gap, host))
     return observed
+
+
+def touching_bodies(observed: Sequence[PairObservation]) -> dict[int, set[int]]:
+    """Who touches whom, by id; without those that share a region."""
+    found: dict[int, set[int]] = {}
+    for seen in observed:
+        if seen.touching == YES and seen.host is None:
+            a, b = seen.pair
+            found.setdefault(a, set()).add(b)
+            found.setdefault(b, set()).add(a)
+    return found
 
 
 def relation_table(mind: Mind) -> RelationTable:

@@ -4,6 +4,7 @@ Two bodies are believed coupled when, for a while, they are at rest to each othe
 - they touch, and came together before that; or
 - they touch and move together; or
 - the number of regions fell, and the region that is left is like the union of the two.
+Or when one of them rested and set out while the other alone, of those that move, touches it (`carriers.py`).
 
 Rest is judged by how both outlines move relative to each other (`relative_motion.py`), in a sequential
 test: each velocity gives odds of rest against motion, and these add up until they suffice (Wald 1945)
@@ -30,6 +31,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
+from visup.rules.coupling.carriers import CARRIERS, CarrierSettings, updated_carriers
 from visup.rules.coupling.contact import ContactSettings, OutlineContact, updated_contact
 from visup.rules.coupling.evidence import (
     CONFIDENCE,
@@ -46,6 +48,7 @@ from visup.rules.coupling.evidence import (
     pair_regions,
     regions_apart,
     relation_table,
+    touching_bodies,
 )
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
@@ -88,6 +91,7 @@ class CouplingSettings:
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
         contact: When outlines that meet are in contact.
+        carriers: When a body that sets out counts as carried.
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
@@ -104,6 +108,7 @@ class CouplingSettings:
     approach_s: float = 6.0
     part_s: float = 0.35
     contact: ContactSettings = field(default_factory=ContactSettings)
+    carriers: CarrierSettings = field(default_factory=CarrierSettings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,21 +134,29 @@ class CouplingReasoner(ExplainableReasoner):
         coupled = {c.objects: c for c in mind.couplings}
         table = relation_table(mind)
         observed = observed_pairs(table, mind)
+        carriers = updated_carriers(
+            mind.recall(CARRIERS), touching_bodies(observed), mind, self.settings.carriers
+        )
+        carried = carriers.carried()
         kept: dict[Pair, CouplingEvidence] = {}
         events: list[Event] = []
         for seen in observed:
             pair = seen.pair
             evidence = self._look(old.get(pair, NO_EVIDENCE), seen, mind)
+            set_out = carried.get(pair)
+            if set_out is not None and evidence.parted_since(set_out):
+                set_out = None
             if pair in coupled:
                 if decide(self._decoupling(evidence, mind), log, "decoupled", pair):
                     del coupled[pair]
                     text = "{0} and {1} {are} no longer coupled."
                     events.append(_event("decoupled", text, pair, mind, observation))
                     evidence = replace(NO_EVIDENCE, decoupled_at=mind.time)
-            elif log is None and evidence.relative_track is None:
+            elif log is None and evidence.relative_track is None and set_out is None:
                 pass  # as nearly always: they are not near each other; the first condition
-            elif decide(self._coupling(evidence, seen, mind), log, "coupled", pair):
-                since = mind.time if evidence.rest_since is None else evidence.rest_since
+            elif decide(self._coupling(evidence, seen, mind, set_out), log, "coupled", pair):
+                since = evidence.rest_since if set_out is None else set_out
+                since = mind.time if since is None else since
                 coupled[pair] = Coupling(pair, since)
                 text = "{0} and {1} {are} coupled."
                 events.append(_event("coupled", text, pair, mind, observation))
@@ -153,6 +166,7 @@ class CouplingReasoner(ExplainableReasoner):
         table = table.with_block(coupling_cells(observed, coupled, kept, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
+        mind = mind.remember(CARRIERS, carriers)
         # That parts of one machine hang together is no news.
         return Outcome(mind, tuple(e for e in events if not mind.one_machine(*e.objects)))
 
@@ -257,19 +271,28 @@ class CouplingReasoner(ExplainableReasoner):
         seen: PairObservation,
         mind: Mind,
     ) -> bool:
-        """Whether one of two whose outlines still meet moves on, while the other all but rests."""
+        """Whether one of two moves on, while the other all but rests, though they are still near."""
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
         speed = 0.0 if found is None else float(np.hypot(*found.velocity))
-        if contact is None or not (contact.passing or speed > s.contact.passing * diagonal):
+        passing = contact is not None and contact.passing
+        known = contact is not None or seen.touching == NO
+        if not known or not (passing or speed > s.contact.passing * diagonal):
             return False
         least = max(s.relations.still_speed * diagonal, s.still_share * speed)
         now = kinematics(mind)
         return any(now.one("speed", i) < least for i in seen.pair)
 
     def _coupling(
-        self, evidence: CouplingEvidence, seen: PairObservation, mind: Mind
+        self,
+        evidence: CouplingEvidence,
+        seen: PairObservation,
+        mind: Mind,
+        set_out: float | None,
     ) -> Iterator[Condition]:
-        """Conditions of two becoming one body."""
+        """Conditions of two becoming one body; `set_out`: when one did that the other carries, if so."""
+        if set_out is not None:
+            yield Condition("one rested and set out while the other alone moved it", True)
+            return
         s, track = self.settings, evidence.relative_track
         watched = track is not None and track.path_end == mind.time
         yield Condition("both are seen near each other", watched)

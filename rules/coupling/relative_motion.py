@@ -22,9 +22,10 @@ import numpy as np
 from visup.agent import Region
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling._relative_motion_jit import first_recent, fused_velocity
-from visup.rules.geometry._outlines_jit import near_outline, register, resampled, run_boxes
+from visup.rules.geometry._outlines_jit import near_outline, register, run_boxes
 from visup.rules.geometry.outlines import TEMPLATE_POINTS, prepared_outline
 from visup.rules.geometry.regions import Floats
+from visup.rules.geometry.rings import even_rings, joined
 
 Vector = tuple[float, float]
 
@@ -110,8 +111,9 @@ def outline_template(
         size: (width, height) of the image, pixels.
         beside: A body relative to which it moves; of a larger body only the part near that is used.
     """
-    points = resampled(prepared_outline(region).points, TEMPLATE_POINTS)
-    tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    parts = even_rings(prepared_outline(region).rings, TEMPLATE_POINTS)
+    points = joined(parts)
+    tangent = joined([np.roll(p, -1, axis=0) - np.roll(p, 1, axis=0) for p in parts])
     length = np.linalg.norm(tangent, axis=1)
     normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
     x, y = points.T

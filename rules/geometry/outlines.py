@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from visup.agent import Region
 from visup.rules.geometry._outlines_jit import (
     least_distance,
-    longest_edge,
     outline_support,
-    resampled,
     run_boxes,
     signed_extent,
 )
@@ -25,10 +23,9 @@ from visup.rules.geometry.regions import (
     DIRECTIONS,
     Floats,
     box_gap,
-    densified,
     masks_overlap,
-    outline,
 )
+from visup.rules.geometry.rings import closed_rings, even_rings, joined, rings
 
 NEAR_SHARE = 0.05
 """Greatest gap that is computed exactly, image diagonals."""
@@ -53,12 +50,14 @@ class PreparedOutline:
         region: Any region.
 
     Attributes:
-        points: (N, 2) pixels; see `outline`.
+        rings: The outlines of its parts; see `rings.py`.
+        points: (N, 2) all of their points, pixels.
     """
 
     def __init__(self, region: Region) -> None:
         self._region = region
-        self.points = outline(region)
+        self.rings = rings(region)
+        self.points = joined(self.rings)
 
     @cached_property
     def boxes(self) -> Floats:
@@ -68,11 +67,7 @@ class PreparedOutline:
     @cached_property
     def closed(self) -> Floats:
         """(M, 2) points without wide gaps between neighbours; see `densified`."""
-        return (
-            self.points
-            if longest_edge(self.points) <= CLOSED_STEP
-            else densified(self.points, CLOSED_STEP)
-        )
+        return closed_rings(self.rings, CLOSED_STEP)
 
     @cached_property
     def closed_boxes(self) -> Floats:
@@ -82,7 +77,7 @@ class PreparedOutline:
     @cached_property
     def even(self) -> Floats:
         """(M, 2) the outline resampled evenly, to at least `TEMPLATE_POINTS`."""
-        return resampled(self.points, max(TEMPLATE_POINTS, len(self.points)))
+        return joined(even_rings(self.rings, max(TEMPLATE_POINTS, len(self.points))))
 
     @cached_property
     def even_boxes(self) -> Floats:

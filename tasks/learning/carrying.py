@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from visup.tasks.learning.meetings import CARRIED_S, MEETINGS, Pair
 from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent
+from visup.tasks.learning.rests import at_rest
 from visup.tasks.learning.traces import Happening, RunTrace, Span, Symbol
 
 Row = Sequence[CourseEvent]
@@ -131,6 +132,8 @@ def _comes(run: RunTrace, carriage: _Carriage) -> bool:
     span = carriage.coupling.at, carriage.until
     (cargo,) = set(carriage.to) & set(carriage.coupling.symbol[1])
     (other,) = set(carriage.to) - {cargo}
+    if at_rest(run, other):
+        return False
     return _moved_s(run, other, span) > 0.5 * _moved_s(run, cargo, span)
 
 

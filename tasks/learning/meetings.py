@@ -11,7 +11,7 @@ from visup.tasks.learning.traces import BREAK_S, Happening, RunTrace, Span
 Pair = tuple[str, ...]
 MEETINGS = ("touching", "coupled")
 LET_GO_S = 1.0
-"""A meeting of a carried object ends at most this long after its release, seconds."""
+"""A meeting of a carried object ends at most this long after its carrier drew back, seconds."""
 MOSTLY = 0.5
 """A pair counts as carried along when its meetings do in more than this share of the runs."""
 CLOSE_S = 2.0
@@ -129,13 +129,13 @@ def _together_s(run: RunTrace, pair: Pair, spell: Span) -> float:
 def _carried(meeting: Meeting, meetings: Sequence[Meeting], slack: int) -> bool:
     """Whether two meet only through a third object, which one carries and which meets the other.
 
-    The meeting ends at the release of the carried object, or up to `slack` times `LET_GO_S` later. In the
-    image it may begin long before, where one overlaps the other.
+    The meeting ends when the carrier has drawn back from what it carried, so that the two no longer touch, or
+    up to `slack` times `LET_GO_S` later. In the image it may begin long before, where one overlaps the other.
     """
     begin, end = meeting.touching
     overlap = [m for m in meetings if m.touching[0] <= end and m.touching[1] >= begin]
     for held in overlap:
-        if not held.carries or held.coupled is None or end > held.coupled[1] + slack * LET_GO_S:
+        if not held.carries or end > held.touching[1] + slack * LET_GO_S:
             continue
         for a, b in (meeting.pair, meeting.pair[::-1]):
             if a not in held.pair or b in held.pair:

@@ -50,6 +50,11 @@ class Rest:
         return f"never {fast} for {SUSTAINED_S:g} s  # in {runs} at most {self.seen:.0f} px/s"
 
 
+def at_rest(run: RunTrace, actor: str) -> bool:
+    """Whether an actor never clearly moved in a run, though noise or a swaying camera may have moved it."""
+    return actor in run.fastest and run.fastest[actor] <= REST * run.diagonal
+
+
 def rests_of(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[Rest]:
     """The actors at rest in all runs, in alphabetical order.
 
@@ -59,10 +64,10 @@ def rests_of(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[Rest
     """
     diagonal = min(run.diagonal for run in runs)
     for actor in sorted(actors):
-        speeds = [run.fastest[actor] for run in runs if actor in run.fastest]
-        if len(speeds) == len(runs) and max(speeds) <= REST * diagonal:
-            allowed = max(LEAST_ALLOWED * diagonal, TIMES_SEEN * max(speeds))
-            yield Rest(actor, max(speeds), 5 * ceil(allowed / 5))
+        if all(at_rest(run, actor) for run in runs):
+            fastest = max(run.fastest[actor] for run in runs)
+            allowed = max(LEAST_ALLOWED * diagonal, TIMES_SEEN * fastest)
+            yield Rest(actor, fastest, 5 * ceil(allowed / 5))
 
 
 HALT = 0.01

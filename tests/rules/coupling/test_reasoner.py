@@ -79,6 +79,20 @@ def test_coupled_bodies_that_part_are_decoupled() -> None:
     assert 7.0 < found[1][1] < 9.0
 
 
+def test_who_is_let_go_of_and_left_along_a_narrow_gap_is_decoupled() -> None:
+    """A gripper opens by 7 px, and draws back past the part before it gets any farther from it."""
+
+    def at(i: int) -> Observation:
+        t = i / 25
+        aside = 7.0 * min(max(0.0, t - 7) / 0.3, 1.0)
+        boxes = [(100, 200, 80, 60), (closing(t) + aside, 200 - 20 * max(0.0, t - 8.5), 80, 60)]
+        return seen(i, [box_region(n, box) for n, box in enumerate(boxes, start=1)])
+
+    found = told(reason(at(i) for i in range(250)))
+    assert [k for k, _ in found] == ["coupled", "decoupled"]
+    assert 7.0 < found[1][1] < 9.8
+
+
 def test_who_is_decoupled_is_so_since_one_moment() -> None:
     """A stage that begins by it needs it to have lasted."""
     thoughts = scene(lambda t: closing(t) if t < 7 else 180 + 15 * (t - 7))

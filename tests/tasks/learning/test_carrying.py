@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.tasks.scripted import REGION, Script, Spell, play
 from visup.agent import Mind, Outcome, Verdict
@@ -13,6 +14,7 @@ from visup.tasks.analysis.judging import judged
 from visup.tasks.checks.load import parse_task
 from visup.tasks.learning.carrying import with_carrying
 from visup.tasks.learning.induction import learn_task
+from visup.tasks.learning.meetings import meetings_of, pairs_by_weight
 from visup.tasks.learning.order import Carry
 from visup.tasks.learning.places import FinalOverlap, places_of
 from visup.tasks.learning.relevance import CourseEvent
@@ -73,6 +75,29 @@ def test_nothing_is_carried_to_who_comes_by_itself_or_while_another_one_holds_it
     assert not carries(with_carrying([course()], [comes]))
     held = [event("coupled", ("arm", "part"), 0.0, 15.0), *course()[1:2]]
     assert HELD not in [c.parts[0][1] for c in carries(with_carrying([held], [run(BRINGS)]))]
+
+
+def test_who_is_swayed_by_the_camera_alone_does_not_come_by_itself() -> None:
+    swayed = run({**BRINGS, "fixture": ((3.0, 8.0),)}, NEARS)
+    assert carries(with_carrying([course()], [replace(swayed, fastest={"fixture": 4.0})]))
+    assert not carries(with_carrying([course()], [replace(swayed, fastest={"fixture": 90.0})]))
+
+
+@pytest.mark.parametrize(("until", "counted"), [(12.5, False), (15.0, True)])
+def test_what_the_carrier_touches_until_it_has_drawn_back_is_no_meeting(
+    until: float, counted: bool
+) -> None:
+    """It lets go at 10 s; before the part, in the image, it is until 12 s."""
+    beyond = ("fixture", "gripper")
+    seen = run(
+        BRINGS,
+        Happening(("touching", HELD), 2.5, 12.0),
+        Happening(("coupled", HELD), 3.0, 10.0),
+        Happening(("touching", beyond), 7.0, until),
+        Happening(("touching", PLACED), 8.0, 20.0),
+    )
+    (meetings,) = meetings_of([seen], pairs_by_weight([seen]))
+    assert {m.pair for m in meetings} == {HELD, PLACED} | ({beyond} if counted else set())
 
 
 def lying(name: str, share: float) -> RunTrace:

@@ -21,7 +21,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.files import read_json
 from visup.percepts.opencv_names import opencv_name
 from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
-from visup.rules.geometry.regions import outline
+from visup.rules.geometry.outlines import prepared_outline
 from visup.testing import region_of
 
 MARGIN = 8
@@ -139,8 +139,10 @@ def _velocity(
     old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
 ) -> tuple[float, float] | None:
     kept = outline_template(old, others, size)
-    ahead = _displacements(old, new)
-    laid = None if kept is None else registered(kept, TargetOutline.of(outline(new)), ahead)
+    if kept is None:
+        return None
+    target = TargetOutline.of(prepared_outline(new).points)
+    laid = registered(kept, target, _displacements(old, new))
     return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
 
 
