@@ -16,7 +16,7 @@ from visup.agent import Region
 from visup.rules.geometry._outlines_jit import longest_edge, resampled
 from visup.rules.geometry.regions import Floats, densified, outline
 
-LEAST_SHARE = 0.04
+LEAST_SHARE = 0.15
 """Least share of a region's pixels in a part of it; smaller ones are specks of a segmenter."""
 
 
