@@ -47,7 +47,7 @@ def test_a_rendered_mission_is_scored_end_to_end(tmp_path: Path) -> None:
     from visup.render.scenario.library import shipped_scenario
 
     scenario = shipped_scenario("sts87")
-    short = scenario.model_copy(update={"duration_s": 2.0})
+    short = scenario.model_copy(update={"duration_s": 3.6})
     write_mission(short.resized((320, 240)), tmp_path / "mission")
     figures = evaluate_missions(
         tmp_path / "mission", models=ROOT / "visup" / "data" / "demo.models"
