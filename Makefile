@@ -3,10 +3,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+COMPILED := $(VENV)/.compiled
 
-.PHONY: setup demo test check fuzz oracles bench docs clean
+# The tests start hundreds of processes: each would read all of visup's source anew.
+unexport PYTHONDONTWRITEBYTECODE
 
-setup: $(STAMP)
+.PHONY: setup demo test check fuzz oracles bench docs wheel clean
+
+setup: $(COMPILED)
 
 # The plain way of an editable install (a path, no import hook) is what type checkers and editors can follow.
 $(STAMP): pyproject.toml constraints.txt
@@ -15,6 +19,10 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	  --config-settings editable_mode=compat -e '.[dev]'
+	touch $@
+
+# What runs nothing (check, docs, wheel) need not wait for this.
+$(COMPILED): $(STAMP)
 	@echo 'Compiling the hot loops: once, for about a minute.'
 	$(BIN)/python -m visup.serving.warm_up
 	touch $@
@@ -26,7 +34,7 @@ demo: setup
 test: setup
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-check: setup
+check: $(STAMP)
 	@! git grep -InE '^(<{7}|>{7}|[|]{7})( |$$)' || { echo 'Conflict markers: resolve the merges named above.'; exit 1; }
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -48,9 +56,13 @@ bench: setup
 	test ! -d ../shared/data || $(BIN)/python -m tests.story ../shared/data/worlds ../shared/data/machines
 
 # The documentation as a site in site/; every warning is an error.
-docs: setup
+docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo 'Documentation: site/index.html'
+
+# Built from the sdist, it works in a clean environment, and for a user who may write nowhere.
+wheel: $(STAMP)
+	.ci/wheel
 
 clean:
 	rm -rf $(VENV) build dist site *.egg-info demo-run runs .mypy_cache .ruff_cache .pytest_cache .hypothesis

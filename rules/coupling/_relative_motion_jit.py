@@ -27,6 +27,27 @@ def first_recent(path: Floats, now: float, window: float, least: int) -> int:
 
 
 @compiled
+def _noise(path: Floats) -> tuple[float, float, float]:
+    """Covariance (xx, xy, yy) of the noise of positions, squared pixels.
+
+    Steps between neighbouring positions differ from those at the mean velocity by noise; its correlated part
+    is assumed equally large.
+    """
+    count = len(path)
+    steps = max(count - 1, 1)
+    xx = xy = yy = 0.0
+    lasted = max(path[count - 1, 0] - path[0, 0], 1e-9)
+    mean_x = (path[count - 1, 1] - path[0, 1]) / lasted
+    mean_y = (path[count - 1, 2] - path[0, 2]) / lasted
+    for n in range(count - 1):
+        dt = path[n + 1, 0] - path[n, 0]
+        dx = path[n + 1, 1] - path[n, 1] - mean_x * dt
+        dy = path[n + 1, 2] - path[n, 2] - mean_y * dt
+        xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
+    return xx / steps + 1e-4, xy / steps, yy / steps + 1e-4
+
+
+@compiled
 def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floats]:
     """The slope of positions fused with the mean of velocities, weighted by precision.
 
@@ -39,19 +60,7 @@ def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floa
         (2,) velocity and (2, 2) its covariance.
     """
     count = len(path)
-    # Steps between neighbouring positions differ from those at the mean velocity by noise; its correlated
-    # part is assumed equally large.
-    xx = xy = yy = 0.0
-    steps = max(count - 1, 1)
-    lasted = max(path[count - 1, 0] - path[0, 0], 1e-9)
-    mean_x = (path[count - 1, 1] - path[0, 1]) / lasted
-    mean_y = (path[count - 1, 2] - path[0, 2]) / lasted
-    for n in range(count - 1):
-        dt = path[n + 1, 0] - path[n, 0]
-        dx = path[n + 1, 1] - path[n, 1] - mean_x * dt
-        dy = path[n + 1, 2] - path[n, 2] - mean_y * dt
-        xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
-    xx, xy, yy = xx / steps + 1e-4, xy / steps, yy / steps + 1e-4
+    xx, xy, yy = _noise(path)
     middle = 0.0
     for n in range(begin, count):
         middle += path[n, 0]

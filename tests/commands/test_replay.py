@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -11,16 +12,29 @@ from tests.cli import Call
 from tests.clips import moving_disc, write_clip
 from tests.commands.test_cli import visup
 from visup.agent.storage.journal_reader import JOURNAL
+from visup.runs.runner import fresh_folder, supervise
+from visup.runs.settings import RunOptions, WatchSettings
 
 __all__ = ["visup"]  # the fixture
 
 RULE = 'rule seen(a): warning\n    when in_view(a) > 0.2 s\n    say "{a} {is} seen."\n'
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run and its clip; only copied."""
+    folder = tmp_path_factory.mktemp("recorded")
+    clip = write_clip(folder / "clip.avi", moving_disc(30), fps=15.0)
+    options = RunOptions(video=False)
+    supervise(WatchSettings(source=str(clip)), fresh_folder(folder / "run", ""), options=options)
+    clip.rename(folder / "moved.avi")  # no replay reads it
+    return folder
+
+
 @pytest.fixture
-def run(visup: Call, tmp_path: Path) -> Path:
-    clip = write_clip(tmp_path / "clip.avi", moving_disc(30), fps=15.0)
-    assert visup("watch", clip, "--out", tmp_path / "run", "--no-video", "--quiet").code == 0
+def run(visup: Call, recorded: Path, tmp_path: Path) -> Path:
+    shutil.copytree(recorded / "run", tmp_path / "run")
+    shutil.copy(recorded / "moved.avi", tmp_path / "clip.avi")
     return tmp_path / "run"
 
 

@@ -34,12 +34,15 @@ supervise(demo_settings(int(sys.argv[3])), folder, audience=Audience([stop]), op
 
 
 def told(folder: Path, cores: list[int]) -> bytes:
+    env = {**os.environ}
+    env.pop("OPENBLAS_NUM_THREADS", None)  # as many threads as there are cores
     subprocess.run(
         [
             *(sys.executable, "-c", RUN, str(folder)),
             *(",".join(map(str, cores)), str(EVERY), str(UNTIL_S)),
         ],
         check=True,
+        env=env,
     )
     return (folder / "events.jsonl").read_bytes()
 

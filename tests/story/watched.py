@@ -25,7 +25,7 @@ from visup.teaching.lesson import store, views_of
 
 def told_of_mission(folder: Path, noise: PerceptNoise, every: int) -> Told:
     """What is told of a mission on percepts made from its truth, of every so many frames."""
-    mission = load_mission(folder)
+    mission = load_mission(folder, every=every)
     behaviours, _ = behaviours_of(mission, noise)
     rules = default_reasoners()
     task = task_reasoner([load_task("dock")])

@@ -8,6 +8,7 @@ ten, before anything was mended for them, 65, 59, 61, 60, 63, 72, 70, 85, 31 and
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from tests.rules.language.test_mistakes import CONDITIONS as MENDED_CONDITIONS
 from tests.rules.language.test_mistakes import RULES as MENDED_RULES
@@ -31,6 +32,7 @@ class Told:
     hint: str | None
 
 
+@cache  # several tests tell of the same texts
 def of_rules(text: str) -> list[Told]:
     found = []
     for e in errors_of(text):
@@ -39,6 +41,7 @@ def of_rules(text: str) -> list[Told]:
     return found
 
 
+@cache
 def of_tasks(text: str) -> list[Told]:
     return [Told(str(f), f.place, f.expected, f.hint) for f in diagnose(text, "my.task")[1]]
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from visup.agent import Relation, Truth
 from visup.evaluation.oracles import oracle
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.stage_hmm import ActionStatus
-from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.grammar.parser import read
 from visup.tasks.supervision.hypotheses import TaskHypothesis
@@ -77,14 +77,19 @@ def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
     return max(abs(one.get(k, 0.0) - other.get(k, 0.0)) for k in {*one, *other})
 
 
-def drawn_distance(seed: int) -> FilterDistance:
-    """The distance of supervision from the reference on a random grammar with random observations."""
+def drawn_distance(seed: int, steps: int = STEPS) -> FilterDistance:
+    """The distance of supervision from the reference on a random grammar with random observations.
+
+    Args:
+        seed: Of the grammar and of the observations.
+        steps: Steps that are compared; the draw does not depend on them.
+    """
     rng = random.Random(seed)
     task = read(recognition_tasks.text_of(recognition_tasks.Draw(rng).rules()))
     keys = recognition_tasks.KEYS
     actions = {k: ActionDefinition(k, (k,), contrary=(f"not {k}",), text=k) for k in keys}
     spells = {k: drawn_spells(rng) for k in keys}
-    times = [FRAME_S * i for i in range(STEPS)]
+    times = [FRAME_S * i for i in range(steps)]
     recorded = [(now, _seen_at(now, spells)) for now in times]
     return distance_to_certified(MonitoredPhases(task, actions, DEFAULT_SETTINGS), recorded)
 
@@ -103,17 +108,18 @@ def drawn_spells(rng: random.Random) -> Spells:
 
 
 def _seen_at(now: float, spells: Mapping[str, Spells]) -> Observe:
-    def observe(step: TaskStep) -> ActionObservation:
-        since, seen = max(s for s in spells[step.action] if s[0] <= now)
-        relation = Relation(step.action, (1,), Truth.TRUE, since)
-        holds = relation if seen is ActionStatus.HOLDS else None
+    @cache  # hundreds of hypotheses ask for the same few actions
+    def seen(action: str) -> ActionObservation:
+        since, status = max(s for s in spells[action] if s[0] <= now)
+        relation = Relation(action, (1,), Truth.TRUE, since)
+        holds = relation if status is ActionStatus.HOLDS else None
         return ActionObservation(
             holds=Truth.TRUE if holds else Truth.FALSE,
             held_by=holds,
             helps=holds,
             entry=holds,
-            contrary=relation if seen is ActionStatus.CONTRARY else None,
-            observed=seen is not ActionStatus.UNKNOWN,
+            contrary=relation if status is ActionStatus.CONTRARY else None,
+            observed=status is not ActionStatus.UNKNOWN,
         )
 
-    return observe
+    return lambda step: seen(step.action)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -95,8 +96,9 @@ def load_mission(folder: Path, *, every: int = 1) -> Mission:
         for k, row in enumerate(truth["frames"])
     )
     lag = max(1, round(LAG_S * float(truth["fps"]) / every)) * every
+    width, height = truth["size"]
     moving = tuple(
-        moved_since(masks[max(0, k - lag)], here, lag / float(truth["fps"]), truth["size"])
+        moved_since(masks[max(0, k - lag)], here, lag / float(truth["fps"]), (width, height))
         for k, here in enumerate(masks)
     )
     return Mission(folder.name, read_json(folder / "mission.json"), truth, moving)
@@ -131,6 +133,7 @@ def moved_since(
     return moved
 
 
+@lru_cache(maxsize=64)  # a mask is needed again when it lies the lag before another
 def _region(mask: TrueMask, size: tuple[int, int]) -> Region:
     return region_of(mask.inside > 0, 0, at=mask.at, size=size)
 
