@@ -33,7 +33,8 @@ class CarrierSettings:
         speed: Least speed of a body that sets out, and least mean speed on its way, image diagonals per
             second: outlines next to a hand, or before a camera that sways, drift more slowly.
         rest_share: Greatest speed of rest, as a share of that.
-        along_share: Least path of the carrier in the same time, as a share of that way.
+        along_share: Least path of the carrier in the same time, as a share of that way; and
+        past_share: the greatest: who goes much farther passes by.
     """
 
     rest_s: float = 0.4
@@ -42,6 +43,7 @@ class CarrierSettings:
     speed: float = 0.0125
     rest_share: float = 0.5
     along_share: float = 0.3
+    past_share: float = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +190,12 @@ def _with_carrier(
         for i in touching
         if i in motions and _goes_along(motions[i], ever.get(i), settings.along_share * far)
     ]
-    return replace(body, carrier=movers[0]) if len(movers) == 1 and movers[0] in ever else body
+    if len(movers) != 1 or movers[0] not in ever:
+        return body
+    gone = motions[movers[0]].path - ever.pop(movers[0])
+    if gone > settings.past_share * far:
+        return replace(body, touching=MappingProxyType(ever))
+    return replace(body, carrier=movers[0])
 
 
 def _has_come_far(
