@@ -69,6 +69,13 @@ def test_what_is_knocked_and_comes_to_rest_is_not_carried() -> None:
     assert carried(scene(arm, knocked)) == {}
 
 
+@pytest.mark.parametrize(("speed", "carries"), [(60.0, True), (400.0, False)])
+def test_who_goes_much_farther_passes_by(speed: float, carries: bool) -> None:
+    """A long body that moves along another one, which sets out meanwhile: as fast, or much faster."""
+    belt: Course = lambda t: (150, 150 - speed * (t - LIFT_S), 45, 2 * 480)  # noqa: E731
+    assert ((HAND, PART) in carried(scene(belt, part))) is carries
+
+
 def test_what_moves_from_the_start_on_tells_nothing() -> None:
     hand: Course = lambda t: (100 + 12 * t, 200, 80, 60)  # noqa: E731
     held: Course = lambda t: (180 + 12 * t, 200, 80, 60)  # noqa: E731
