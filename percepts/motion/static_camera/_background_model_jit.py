@@ -66,6 +66,20 @@ class LearningRates(NamedTuple):
     alike: float
 
 
+class Covered(NamedTuple):
+    """Where objects are, each (h, w).
+
+    Attributes:
+        moving: They are reported: there the background is replaced less easily.
+        gone: One that was part of the background has left.
+        things: One hides a background that was known before, which is not replaced.
+    """
+
+    moving: Mask
+    gone: Mask
+    things: Mask
+
+
 @compiled
 def normalised_distances(image: Floats, mean: Floats, variance: Floats, most: float) -> Floats:
     """Squared distance of each pixel to the background, in variances, at most `most`, (h, w)."""
@@ -149,18 +163,18 @@ def pixels_near_sure_ones(
 
 @compiled
 def update_planes(
-    planes: BackgroundPlanes, image: Floats, moving: Mask, gone: Mask, pace: LearningRates
+    planes: BackgroundPlanes, image: Floats, covered: Covered, pace: LearningRates
 ) -> None:
     """Update the background model with one more (h, w, 3) image, in place.
 
     Args:
         planes: The model.
         image: The image.
-        moving: (h, w) where objects are reported: there the background is replaced less easily.
-        gone: (h, w) where an object that was part of the background has left.
+        covered: Where objects are.
         pace: Learning rates.
     """
     mean, other = planes.mean, planes.other
+    moving, gone, things = covered
     variance, seen_s, other_s = planes.variance, planes.seen_s, planes.other_s
     height, width = moving.shape
     for y in range(height):
@@ -169,7 +183,7 @@ def update_planes(
             off = _squared_distance(image, mean, y, x) / (np.float32(3) * spread)
             moves, is_known = moving[y, x], seen > 0
             fits = off < pace.fits and not moves and is_known
-            away = is_known and not fits
+            away = is_known and not fits and not things[y, x]
             weight = np.float32(max(pace.seconds / (seen + pace.seconds), pace.settle))
             weight = weight if fits else np.float32(0)
             step = np.float32(0)

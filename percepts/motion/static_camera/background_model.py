@@ -20,6 +20,7 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera._background_model_jit import (
     FIRST_S,
     BackgroundPlanes,
+    Covered,
     LearningRates,
     ShadowLimits,
     foreground_pixels,
@@ -104,6 +105,7 @@ def update_background(
     moving: Mask,
     seconds: float,
     gone: Mask | None = None,
+    things: Mask | None = None,
 ) -> None:
     """Update the background, in place, with one more image.
 
@@ -113,6 +115,7 @@ def update_background(
         moving: (h, w) bool, where objects are reported: there the background is replaced less easily.
         seconds: Since the last image.
         gone: (h, w) bool, where an object that was part of the background has left: it is forgotten.
+        things: (h, w) bool, where an object hides a background that was known before: it is kept.
     """
     pace = LearningRates(
         seconds,
@@ -125,7 +128,10 @@ def update_background(
         3 * (FAR * NOISE) ** 2,
     )
     nowhere = np.zeros(moving.shape, dtype=bool)
-    update_planes(_planes(background), image, moving, nowhere if gone is None else gone, pace)
+    covered = Covered(
+        moving, nowhere if gone is None else gone, nowhere if things is None else things
+    )
+    update_planes(_planes(background), image, covered, pace)
 
 
 def _planes(background: BackgroundModel) -> BackgroundPlanes:
