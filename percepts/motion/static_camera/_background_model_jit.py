@@ -54,6 +54,7 @@ class LearningRates(NamedTuple):
         least: Least variance.
         most: Greatest variance.
         alike: Squared distance, over three channels, below which two tones are the same.
+        slowly: Pace at which time counts for a thing that rests, as a share.
     """
 
     seconds: float
@@ -64,6 +65,7 @@ class LearningRates(NamedTuple):
     least: float
     most: float
     alike: float
+    slowly: float
 
 
 class Covered(NamedTuple):
@@ -72,7 +74,7 @@ class Covered(NamedTuple):
     Attributes:
         moving: They are reported: there the background is replaced less easily.
         gone: One that was part of the background has left.
-        things: One hides a background that was known before, which is not replaced.
+        things: One hides a background that was known before, which is hardly ever replaced.
     """
 
     moving: Mask
@@ -183,14 +185,15 @@ def update_planes(
             off = _squared_distance(image, mean, y, x) / (np.float32(3) * spread)
             moves, is_known = moving[y, x], seen > 0
             fits = off < pace.fits and not moves and is_known
-            away = is_known and not fits and not things[y, x]
+            away = is_known and not fits
             weight = np.float32(max(pace.seconds / (seen + pace.seconds), pace.settle))
             weight = weight if fits else np.float32(0)
             step = np.float32(0)
             if away:
                 alike = _squared_distance(image, other, y, x) < pace.alike
                 step = np.float32(0.3 if alike else 1.0)
-                instead = instead + pace.seconds if alike else pace.seconds
+                lasted = pace.seconds * pace.slowly if things[y, x] else pace.seconds
+                instead = instead + lasted if alike else lasted
             for i in range(3):
                 now, old, before = image[y, x, i], mean[y, x, i], other[y, x, i]
                 mean[y, x, i] = old + weight * (now - old)

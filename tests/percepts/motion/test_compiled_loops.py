@@ -30,6 +30,7 @@ from visup.percepts.motion.static_camera.background_model import (
     NOISE,
     RARE,
     SETTLE_S,
+    SLOWLY,
     BackgroundModel,
     update_background,
 )
@@ -137,8 +138,9 @@ def slowly_learnt(
     variance = np.clip(known.variance * (1 + stir), NOISE**2, (8 * NOISE) ** 2)
     seen = np.minimum(known.seen_s + fits * seconds, 60.0)
     alike = ((image - known.other) ** 2).sum(axis=2) < 3 * (FAR * NOISE) ** 2
-    away = ~fits & told & ~things
-    other_s = np.where(away, np.where(alike, known.other_s + seconds, seconds), known.other_s)
+    away = ~fits & told
+    lasted = np.where(things, SLOWLY, 1.0) * seconds
+    other_s = np.where(away, np.where(alike, known.other_s + lasted, lasted), known.other_s)
     step = np.where(away, np.where(alike, 0.3, 1.0), 0)
     other = known.other + step[..., None] * (image - known.other)
     other = np.where(gone[..., None], image, other)

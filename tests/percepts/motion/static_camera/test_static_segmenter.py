@@ -116,7 +116,7 @@ def test_what_was_long_seen_is_kept_where_an_object_is_told() -> None:
     assert np.abs(picture.mean - GROUND)[mask].max() < 5
 
 
-def test_what_rests_before_ground_that_was_known_is_never_taken_for_ground() -> None:
+def test_what_rests_before_ground_that_was_known_is_long_not_taken_for_ground() -> None:
     mask, picture = box(100, 60), initial_model(GROUND)
     for _ in range(25):
         update_background(picture, GROUND, NOWHERE, 1 / FPS)
