@@ -54,6 +54,7 @@ class LearningRates(NamedTuple):
         least: Least variance.
         most: Greatest variance.
         alike: Squared distance, over three channels, below which two tones are the same.
+        slowly: Pace at which time counts for a thing that rests, as a share.
     """
 
     seconds: float
@@ -64,6 +65,21 @@ class LearningRates(NamedTuple):
     least: float
     most: float
     alike: float
+    slowly: float
+
+
+class Covered(NamedTuple):
+    """Where objects are, each (h, w).
+
+    Attributes:
+        moving: They are reported: there the background is replaced less easily.
+        gone: One that was part of the background has left.
+        things: One hides a background that was known before, which is hardly ever replaced.
+    """
+
+    moving: Mask
+    gone: Mask
+    things: Mask
 
 
 @compiled
@@ -149,18 +165,18 @@ def pixels_near_sure_ones(
 
 @compiled
 def update_planes(
-    planes: BackgroundPlanes, image: Floats, moving: Mask, gone: Mask, pace: LearningRates
+    planes: BackgroundPlanes, image: Floats, covered: Covered, pace: LearningRates
 ) -> None:
     """Update the background model with one more (h, w, 3) image, in place.
 
     Args:
         planes: The model.
         image: The image.
-        moving: (h, w) where objects are reported: there the background is replaced less easily.
-        gone: (h, w) where an object that was part of the background has left.
+        covered: Where objects are.
         pace: Learning rates.
     """
     mean, other = planes.mean, planes.other
+    moving, gone, things = covered
     variance, seen_s, other_s = planes.variance, planes.seen_s, planes.other_s
     height, width = moving.shape
     for y in range(height):
@@ -176,7 +192,8 @@ def update_planes(
             if away:
                 alike = _squared_distance(image, other, y, x) < pace.alike
                 step = np.float32(0.3 if alike else 1.0)
-                instead = instead + pace.seconds if alike else pace.seconds
+                lasted = pace.seconds * pace.slowly if things[y, x] else pace.seconds
+                instead = instead + lasted if alike else lasted
             for i in range(3):
                 now, old, before = image[y, x, i], mean[y, x, i], other[y, x, i]
                 mean[y, x, i] = old + weight * (now - old)

@@ -20,6 +20,7 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera._background_model_jit import (
     FIRST_S,
     BackgroundPlanes,
+    Covered,
     LearningRates,
     ShadowLimits,
     foreground_pixels,
@@ -40,6 +41,7 @@ RESTLESS_S = 8.0  # time constant of the variance, seconds
 SHADE = 0.6  # least brightness in a shadow, as a share of the background's
 HUE = 0.055  # greatest difference of colour in a shadow, as a share of brightness
 RARE = 10.0  # squared distance, in variances, at which a pixel's effect on the variance is clipped
+SLOWLY = 0.01  # pace at which what came and rests becomes background, as a share: minutes to hours
 EVEN = 0.03  # relative change of exposure that is ignored
 SAMPLED = 4  # every how many pixels along x and y the exposure is estimated from
 LIT = 1.12  # greatest brightness in reflected light, as a share of the background's
@@ -104,6 +106,7 @@ def update_background(
     moving: Mask,
     seconds: float,
     gone: Mask | None = None,
+    things: Mask | None = None,
 ) -> None:
     """Update the background, in place, with one more image.
 
@@ -113,6 +116,7 @@ def update_background(
         moving: (h, w) bool, where objects are reported: there the background is replaced less easily.
         seconds: Since the last image.
         gone: (h, w) bool, where an object that was part of the background has left: it is forgotten.
+        things: (h, w) bool, where an object hides a background that was known before: it is kept for long.
     """
     pace = LearningRates(
         seconds,
@@ -123,9 +127,13 @@ def update_background(
         NOISE**2,
         (8 * NOISE) ** 2,
         3 * (FAR * NOISE) ** 2,
+        SLOWLY,
     )
     nowhere = np.zeros(moving.shape, dtype=bool)
-    update_planes(_planes(background), image, moving, nowhere if gone is None else gone, pace)
+    covered = Covered(
+        moving, nowhere if gone is None else gone, nowhere if things is None else things
+    )
+    update_planes(_planes(background), image, covered, pace)
 
 
 def _planes(background: BackgroundModel) -> BackgroundPlanes:

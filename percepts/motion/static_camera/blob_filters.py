@@ -19,6 +19,7 @@ DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of the backgroun
 EVENLY = 1.5  # greatest ratio of the relative brightness of a shadow's brightest and darkest parts
 SAME_HUE = 0.035  # greatest difference of colour in a shadow, as a share of brightness
 GHOST = 0.6  # edge strength in the image, as a share of the background's, below which it is a ghost
+THING = 1 / GHOST  # the same above which something stands before a background that was known before
 FRAGMENT = 0.2  # largest gap between a part and its object, as a share of the object's length
 
 
@@ -106,24 +107,27 @@ def is_deep_shadow(s: BlobTrack, image: Floats, background: Floats) -> bool:
     return bool(dim and np.quantile(hue, 0.9) <= SAME_HUE)
 
 
-def is_ghost(s: BlobTrack, now: Floats, background: Floats) -> bool:
-    """Whether an outline has its edges in the background model: an object has left there.
+def outline_contrast(s: BlobTrack, now: Floats, background: Floats) -> float | None:
+    """How much stronger the edges along an outline are in the image than in the background model.
 
-    A shadow also dims the edges that it falls on, so shadows are no ghosts; but one too thin to have an
-    interior is not certain to be a shadow.
+    A thing brings its outline along; where one that was part of the background has left, the outline is in
+    the background only. A shadow also dims the edges that it falls on, so shadows are neither; but one too
+    thin to have an interior is not certain to be a shadow.
 
     Args:
         s: The object.
         now: (h, w, 3) float32 image.
         background: (h, w, 3) float32 background.
+
+    Returns:
+        The ratio; None where nothing can be said.
     """
     if s.visible is None or s.merged:
-        return False
+        return None
     box, shape = s.visible
     inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
     if s.shadow and inner.any():
-        return False
+        return None
     rim = shape & (inner == 0)
-    return float(edge_strength(now, box)[rim].mean()) < GHOST * float(
-        edge_strength(background, box)[rim].mean()
-    )
+    before = float(edge_strength(background, box)[rim].mean())
+    return float(edge_strength(now, box)[rim].mean()) / max(before, 1e-6)

@@ -175,6 +175,8 @@ class TrackFusion:
         )
         for r in regions:
             x, y, w, h = r.bbox
+            if r not in older and self._is_shown(r, out):
+                continue
             if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
                 self._note_alias(r, out)
                 # A small region that was reported stays so until its blob is reported.
@@ -184,6 +186,13 @@ class TrackFusion:
             out = [s for s in out if not common_pixels(s, r) >= COMMON * s.area]
             out.append(replace(r, id=self._public_id(r, {s.id for s in out}, ids)))
         return tuple(sorted(out, key=lambda r: r.id))
+
+    def _is_shown(self, r: Region, blobs: Sequence[Region]) -> bool:
+        """Whether a region's own blob is reported: at rest, ground joins a layer, as both move alike."""
+        return any(
+            s.id == self._known_id(r) and common_pixels(s, r) > COMMON * min(s.area, r.area)
+            for s in blobs
+        )
 
     def _known_id(self, r: Region) -> int:
         """The id under which a region was reported, its own if never."""

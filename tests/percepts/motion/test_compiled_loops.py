@@ -30,6 +30,7 @@ from visup.percepts.motion.static_camera.background_model import (
     NOISE,
     RARE,
     SETTLE_S,
+    SLOWLY,
     BackgroundModel,
     update_background,
 )
@@ -97,11 +98,11 @@ def test_the_picture_learns_pixel_by_pixel_as_it_does_image_by_image(seed: int) 
     variance, seen, other_s = (rng.random((3, *SHAPE)) * 9).astype(np.float32)
     variance += np.float32(NOISE**2)
     seen[rng.random(SHAPE) < 0.2] = 0
-    moving, gone = rng.random((2, *SHAPE)) < 0.3
+    moving, gone, things = rng.random((3, *SHAPE)) < 0.3
     seconds = float(rng.random()) + 0.01
     known = BackgroundModel(mean, variance, seen, other, other_s)
-    expected = slowly_learnt(known, image, moving, seconds, gone)
-    update_background(known, image, moving, seconds, gone)
+    expected = slowly_learnt(known, image, (moving, gone, things), seconds)
+    update_background(known, image, moving, seconds, gone, things)
     for f in fields(known):
         assert np.allclose(getattr(known, f.name), getattr(expected, f.name), atol=1e-3), f.name
 
@@ -123,11 +124,11 @@ def test_exposure_that_is_told_to_be_even_has_an_even_median(seed: int, gain: fl
 def slowly_learnt(
     known: BackgroundModel,
     image: NDArray[np.float32],
-    moving: NDArray[np.bool_],
+    covered: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
     seconds: float,
-    gone: NDArray[np.bool_],
 ) -> BackgroundModel:
     """What `update_background` says, with whole images."""
+    moving, gone, things = covered
     off = ((image - known.mean) ** 2).sum(axis=2) / (3 * known.variance)
     told = known.seen_s > 0
     fits = (off < FAR**2) & ~moving & told
@@ -138,7 +139,8 @@ def slowly_learnt(
     seen = np.minimum(known.seen_s + fits * seconds, 60.0)
     alike = ((image - known.other) ** 2).sum(axis=2) < 3 * (FAR * NOISE) ** 2
     away = ~fits & told
-    other_s = np.where(away, np.where(alike, known.other_s + seconds, seconds), known.other_s)
+    lasted = np.where(things, SLOWLY, 1.0) * seconds
+    other_s = np.where(away, np.where(alike, known.other_s + lasted, lasted), known.other_s)
     step = np.where(away, np.where(alike, 0.3, 1.0), 0)
     other = known.other + step[..., None] * (image - known.other)
     other = np.where(gone[..., None], image, other)

@@ -20,7 +20,13 @@ from visup.percepts.motion.static_camera.background_model import (
     update_background,
     with_unknown,
 )
-from visup.percepts.motion.static_camera.blob_filters import is_deep_shadow, is_salient_blob
+from visup.percepts.motion.static_camera.blob_filters import (
+    GHOST,
+    THING,
+    is_deep_shadow,
+    is_salient_blob,
+    outline_contrast,
+)
 from visup.percepts.motion.static_camera.blob_track import BlobTracks, find_blobs, tone_histogram
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
 from visup.percepts.motion.static_camera.static_segmenter import region_mask, swept_mask
@@ -108,6 +114,26 @@ def test_what_was_long_seen_is_kept_where_an_object_is_told() -> None:
     for _ in range(200):
         update_background(picture, with_boxes((mask, 250.0)), mask, 1 / FPS)
     assert np.abs(picture.mean - GROUND)[mask].max() < 5
+
+
+def test_what_rests_before_ground_that_was_known_is_long_not_taken_for_ground() -> None:
+    mask, picture = box(100, 60), initial_model(GROUND)
+    for _ in range(25):
+        update_background(picture, GROUND, NOWHERE, 1 / FPS)
+    for _ in range(300):
+        update_background(picture, with_boxes((mask, 250.0)), mask, 1 / FPS, None, mask)
+    assert np.abs(picture.mean - GROUND)[mask].max() < 5
+
+
+@pytest.mark.parametrize("left", [False, True], ids=["it came", "it has left"])
+def test_what_came_has_its_outline_in_the_picture_and_what_left_in_the_model(left: bool) -> None:
+    mask = box(100, 60, 40, 40)
+    pictures = [with_boxes((mask, 250.0)), GROUND]
+    now, before = pictures[left], pictures[not left]
+    (found,) = track_blobs((), find_blobs(now, mask, 20, 0.0, 1 / FPS), 0)[0]
+    contrast = outline_contrast(found, now, before)
+    assert contrast is not None
+    assert contrast < GHOST if left else contrast > THING
 
 
 def test_a_change_of_exposure_is_no_change() -> None:
@@ -287,6 +313,17 @@ def test_small_things_are_seen_where_the_camera_rests() -> None:
     ]
     assert min(share for share, _ in late) > 0.6
     assert len({number for _, number in late}) == 1
+
+
+def test_what_comes_and_rests_does_not_shrink() -> None:
+    """Its rim has some of the tone of the ground, which the background must not follow inwards."""
+    skin = texture(3, (320, 480), 60, 255)
+    disc = (lambda n: (-20 + 2.5 * (min(n, 75) - 30), 80.0), 18.0, skin)
+    segmenter, areas = MotionSegmenter(), []
+    for shot in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 220, noise=3.0):
+        seen = [r.full_mask(SIZE[::-1]) for r in segmenter.step(shot.frame)]
+        areas.append(int((np.any(seen, axis=0) & shot.masks[0]).sum()) if seen else 0)
+    assert min(areas[90:]) > 0.9 * shot.masks[0].sum()
 
 
 def test_nothing_is_believed_of_a_picture_while_the_camera_moves() -> None:
