@@ -19,7 +19,6 @@ from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera.background_model import (
     BackgroundModel,
-    edge_strength,
     foreground_mask,
     initial_model,
     match_exposure,
@@ -58,9 +57,6 @@ LONGEST_S = (
 FLOODED = 0.6  # foreground share of the image above which the view itself has changed
 MANY_CELLS = 15  # least superpixels of a region whose outline the layers know well
 YOUNG_S = 0.3  # how long a track that was never reported is continued while missed, seconds
-EDGE = 120.0  # strength (Sobel) of edges that tell a camera that moves by a pixel
-LEAST_EDGES = 0.005  # least share of the image that such edges must fill
-SHIFTED = 0.1  # share of them that may have changed before a static camera
 SIZE = 768  # longer side of the background, pixels
 KNOWN = 0.6  # least foreground share of a region when the background shows what lies behind it
 START_S = 2.4  # age of the background up to which it may contain a newly reported object, seconds
@@ -130,12 +126,9 @@ class StaticCameraSegmenter:
         settings: MotionSettings,
     ) -> Foreground | None:
         """The foreground; None while the camera moves or there is no background yet."""
-        static = is_camera_static(scene)
-        image = _prepare(frame)
-        if static is None and self.active:
-            static = self._shows_background(image, frame, regions) or None
-        if not self._is_static(static, scene.seconds):
+        if not self._is_static(is_camera_static(scene), scene.seconds):
             return None
+        image = _prepare(frame)
         if self._background is None:
             hidden = region_mask(regions, frame.size, image.shape[:2])
             self._background = with_unknown(initial_model(image), hidden)
@@ -162,17 +155,6 @@ class StaticCameraSegmenter:
         reported = region_mask(regions, frame.size, shape)
         self._background = background
         reveal_background(background, image, ~reported)
-
-    def _shows_background(self, image: Floats, frame: Frame, regions: Sequence[Region]) -> bool:
-        """Whether the edges of the background are where they were, as they are not once the camera moves."""
-        assert self._background is not None
-        shape = image.shape[:2]
-        hidden = region_mask(regions, frame.size, shape) | _with_rim(blob_mask(self._tracks, shape))
-        background = match_exposure(self._background, image)
-        edges = edge_strength(background.mean, (0, 0, shape[1], shape[0])) > EDGE
-        edges &= ~hidden & (background.seen_s > 0)
-        change = foreground_mask(background, image)
-        return bool(edges.mean() > LEAST_EDGES and change[edges].mean() < SHIFTED)
 
     def _is_static(self, static: bool | None, seconds: float) -> bool:
         """Whether the camera is static, as far as known; otherwise the state is reset."""
