@@ -10,7 +10,7 @@ from visup.rules.geometry.regions import outline
 from visup.rules.geometry.rings import closed_rings, even_rings, joined, rings
 from visup.testing import region_of
 
-LARGE, SMALL, SPECK = (10, 10, 40, 60), (80, 30, 20, 20), (120, 5, 4, 4)
+LARGE, SMALL, SPECK = (10, 10, 40, 60), (80, 30, 20, 40), (120, 5, 4, 4)
 Box = tuple[int, int, int, int]
 
 
@@ -26,7 +26,7 @@ def extent(ring: np.ndarray) -> Box:
     return int(left), int(top), int(right - left) + 1, int(bottom - top) + 1
 
 
-@pytest.mark.parametrize("boxes", [(LARGE,), (LARGE, SPECK)])
+@pytest.mark.parametrize("boxes", [(LARGE,), (LARGE, SPECK), (LARGE, (80, 30, 20, 18))])
 def test_a_region_in_one_part_has_its_contour(boxes: tuple[Box, ...]) -> None:
     region = region_of(mask(*boxes))
     (ring,) = rings(region)
