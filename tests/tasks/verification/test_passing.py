@@ -7,9 +7,11 @@ from typing import Any
 
 import pytest
 
-from visup.agent import Coupling, Truth
+from visup.agent import Coupling, Relation, Truth
+from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
+from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.passing import goes_past, moves_on
 
 GRIPPER, PART, TARGET = 1, 2, 3
@@ -78,3 +80,15 @@ def test_a_stage_of_contact_waits_until_one_has_slowed_down(
 def test_where_nothing_is_known_of_a_contact_nobody_moves_on() -> None:
     mind = scene(False, 0.0, ON, Truth.FALSE)
     assert not moves_on(mind, (GRIPPER, TARGET))
+
+
+def test_a_contact_in_passing_neither_holds_nor_begins_in_a_stage() -> None:
+    contact = Relation("touching", (PART, TARGET), Truth.TRUE, 1.0)
+    seen = ActionObservation(
+        holds=Truth.TRUE, held_by=contact, helps=contact, entry=contact, observed=True
+    )
+    assert seen.settled is seen
+    passing = replace(seen, moves_on=True).settled
+    assert passing.holds is Truth.UNKNOWN
+    assert (passing.held_by, passing.helps, passing.entry) == (None, None, None)
+    assert passing.observed
