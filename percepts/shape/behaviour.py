@@ -54,7 +54,7 @@ class ShapeSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MatchedRegion:
-    """A region's silhouette when it was last matched, and the result."""
+    """A region's silhouette when it was last matched, and the result; when its surface was last followed."""
 
     time: float
     thumb: NDArray[np.bool_]
@@ -63,6 +63,7 @@ class _MatchedRegion:
     restrict: frozenset[str] | None
     hypotheses: tuple[Hypothesis, ...]
     areas: tuple[float | None, ...]
+    followed: float
 
     def rescaled(self, region: Region) -> Iterable[Hypothesis]:
         """The hypotheses with the region's current scale."""
@@ -123,12 +124,27 @@ class ShapeBehaviour:
         for region, silhouette, matches in zip(due, *found, strict=True):
             hypotheses = self._refined(self.database, frame, region, silhouette, matches)
             self._remembered[region.id] = _remembered(region, frame.time, restrict, hypotheses)
+        self._follow(frame, regions)
         return [
             Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
             for r in regions
             if r.id in self._remembered
             for h in self._remembered[r.id].rescaled(r)
         ]
+
+    def _follow(self, frame: Frame, regions: Sequence[Region]) -> None:
+        """Renew orientations from the motion of surfaces where silhouettes are not matched again."""
+        for region in regions:
+            old = self._remembered.get(region.id)
+            if old is None or frame.time - old.followed < self.settings.every_s - 1e-6:
+                continue
+            known = tuple(zip(old.hypotheses, old.areas, strict=True))
+            found = self._refiner.followed(frame, region, known)
+            if found is not None:
+                hypotheses, areas = tuple(h for h, _ in found), tuple(area for _, area in found)
+                self._remembered[region.id] = replace(
+                    old, followed=frame.time, hypotheses=hypotheses, areas=areas
+                )
 
     def _due(
         self,
@@ -225,6 +241,7 @@ def _remembered(
         restrict=restrict,
         hypotheses=tuple(h for h, _ in hypotheses),
         areas=tuple(area for _, area in hypotheses),
+        followed=time,
     )
 
 

@@ -209,6 +209,37 @@ def fit_of(
 
 
 @compiled
+def surface_depth(
+    mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
+    seen: tuple[NDArray[np.float64], NDArray[np.float64]],
+    turn: NDArray[np.float64],
+    distance: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Depth of the rendered surface behind the mesh's centre in each pixel, and its placement.
+
+    Args:
+        mesh: Vertices (V, 3), faces (F, 3), normals (F, 3).
+        seen: `cover` and `tone` of a `RegionPicture`.
+        turn: (3, 3) orientation, model to camera.
+        distance: From the viewer to the mesh's centre, in units of its radius.
+
+    Returns:
+        (side, side) depths in units of the radius, infinite where nothing is drawn; and x, y and radius of
+        the mesh, pixels of the square.
+    """
+    side = len(seen[0])
+    scratch = (
+        np.empty((len(mesh[0]), 3)),
+        np.empty((side, side)),
+        np.empty((side, side), np.int32),
+    )
+    place = start_place(seen[0])
+    fit_of(mesh, seen, turn, distance, place, scratch)
+    fit_of(mesh, seen, turn, distance, place, scratch)
+    return scratch[1], place
+
+
+@compiled
 def _about(axis: int, angle: float) -> NDArray[np.float64]:
     """Rotation about a camera axis."""
     turn = np.eye(3)

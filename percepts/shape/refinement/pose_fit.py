@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.refinement._pose_fit_jit import climb
+from visup.percepts.shape.refinement._pose_fit_jit import climb, surface_depth
 from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.refinement.region_picture import RegionPicture
 
@@ -28,6 +28,9 @@ COARSE = np.radians([16.0, 8.0, 4.0])
 FINE = np.radians([2.0, 1.0, 0.5])
 """Steps of the search from a recently fitted orientation, radians; a coarser last step would lag behind slow
 rotation."""
+
+STILL = np.zeros(0)
+"""No steps: the orientation is only compared."""
 
 USUAL_FOCAL = 1.2
 """Focal length of a usual lens, in widths of the picture (a horizontal field of view of 45 degrees)."""
@@ -91,6 +94,50 @@ def fitted_poses(
     return _distinct(found)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfacePoints:
+    """Where points of a picture lie on a mesh.
+
+    Attributes:
+        bodies: (N, 3) relative to the mesh's centre, z away from the viewer, pixels of the frame; NaN beside
+            the mesh.
+        distance: From the viewer to that centre, the same pixels.
+    """
+
+    bodies: NDArray[np.float64]
+    distance: float
+
+
+def surface_points(
+    model: MeshModel,
+    picture: RegionPicture,
+    orientation: NDArray[np.float64],
+    points: NDArray[np.floating],
+    focal_px: float,
+) -> SurfacePoints:
+    """Lift points of a region onto a mesh.
+
+    Args:
+        model: The mesh.
+        picture: The region.
+        orientation: (3, 3) model to camera, as fitted to it.
+        points: (N, 2) (x, y) from the centre of the region's box, pixels of the frame.
+        focal_px: Focal length, pixels of the frame.
+    """
+    mesh, seen = (model.vertices, model.faces, model.normals), (picture.cover, picture.tone)
+    _, place = surface_depth(mesh, seen, orientation, _distance(picture, focal_px))
+    # The orientation is known here, and with it the radius.
+    far = max(2.0, focal_px / float(place[2] * picture.pixel))
+    depth, place = surface_depth(mesh, seen, orientation, far)
+    side = len(depth)
+    column, row = (points / picture.pixel + side / 2).astype(int).clip(0, side - 1).T
+    z = np.where(np.isfinite(depth[row, column]), depth[row, column], np.nan)
+    about = points - (place[:2] - side / 2) * picture.pixel
+    radius = float(place[2] * picture.pixel)
+    bodies = np.column_stack([about * (1 + z / far)[:, None], z * radius])
+    return SurfacePoints(bodies, far * radius)
+
+
 def _distance(picture: RegionPicture, focal_px: float) -> float:
     """Approximate distance of the object, in units of its radius; at least two.
 
@@ -105,10 +152,11 @@ def _distance(picture: RegionPicture, focal_px: float) -> float:
 def _distinct(fits: Sequence[PoseFit]) -> list[PoseFit]:
     distinct: list[PoseFit] = []
     for fit in fits:
-        if all(_apart(fit.orientation, other.orientation) > SAME for other in distinct):
+        if all(apart(fit.orientation, other.orientation) > SAME for other in distinct):
             distinct.append(fit)
     return distinct
 
 
-def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """The angle between two orientations, radians."""
     return float(np.arccos(np.clip((np.sum(a * b) - 1.0) / 2.0, -1.0, 1.0)))

@@ -15,11 +15,15 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.refinement.pose_fit import (
     COARSE,
     FINE,
+    SAME,
+    STILL,
     USUAL_FOCAL,
     PoseFit,
+    apart,
     fitted_poses,
 )
 from visup.percepts.shape.refinement.region_picture import RegionPicture, region_picture
+from visup.percepts.shape.refinement.surface_motion import FollowedSurface, followed_surface
 
 SizedHypothesis = tuple[Hypothesis, float | None]
 """A hypothesis with the area of its silhouette, model units squared, where known."""
@@ -60,16 +64,63 @@ class FittedModel:
         overlap: Overlap of the best fit then.
         orientations: (K, 3, 3), best first, as last fitted.
         views: (K,) numbers of the views from which each was found.
+        surface: The surface, with the same orientations in an earlier picture, or None where it shows
+            too little.
     """
 
     time: float
     overlap: float
     orientations: NDArray[np.float64]
     views: tuple[int, ...]
+    surface: FollowedSurface | None = None
 
 
 FitMemory = Mapping[tuple[int, str], FittedModel]
 """(region, model) -> last fit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _KnownOrientations:
+    """Orientations known before a picture is searched.
+
+    Attributes:
+        orientations: (K, 3, 3).
+        views: (K,) numbers of their views.
+        surface: The surface by which they were followed, if it will do further.
+        followed: Whether the motion of the surface told them.
+    """
+
+    orientations: NDArray[np.float64]
+    views: tuple[int, ...]
+    surface: FollowedSurface | None
+    followed: bool
+
+    def steadied(self, fits: Sequence[PoseFit]) -> list[PoseFit]:
+        """Fits, those near an orientation that was followed with that in place of their own.
+
+        A search finds an orientation again to some degrees only, which would pass for a rotation.
+        """
+        out: dict[int, PoseFit] = {}
+        for f in fits:
+            near = [k for k, o in enumerate(self.orientations) if apart(f.orientation, o) < SAME]
+            if not near:
+                out[len(self.orientations) + f.start] = f
+            elif near[0] not in out:
+                still = self.orientations[near[0]]
+                out[near[0]] = replace(f, orientation=still, start=near[0])
+        return list(out.values())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fitted:
+    """What a fit is stored with: the picture, the hypothesis; time and overlap of the last full search."""
+
+    frame: Frame
+    region: Region
+    picture: RegionPicture
+    best: Hypothesis
+    time: float
+    overlap: float
 
 
 class PoseRefiner:
@@ -128,24 +179,94 @@ class PoseRefiner:
         more: MoreViews,
     ) -> list[SizedHypothesis]:
         """Hypotheses of one model with fitted orientations; none if it does not fit."""
+        best = own[0][0]
+        before = self.memory.get((region.id, best.name))
+        known = self._known(frame, region, before)
+        if known is not None and before is not None:
+            found = self._kept(frame, region, picture, best, before, known)
+            if found:
+                return found
+        return self._searched(frame, region, picture, own, more, known)
+
+    def followed(
+        self, frame: Frame, region: Region, hypotheses: Sequence[SizedHypothesis]
+    ) -> tuple[SizedHypothesis, ...] | None:
+        """Hypotheses with the orientations that the motion of the surface tells; None where it tells none."""
+        fitted = [h for h, _ in hypotheses if h.fitted]
+        if region.cut or not fitted:
+            return None
+        best = max(fitted, key=lambda h: h.similarity)
+        before = self.memory.get((region.id, best.name))
+        known = self._known(frame, region, before)
+        if before is None or known is None or not known.followed:
+            return None
+        found = self._kept(frame, region, region_picture(frame, region), best, before, known)
+        if not found:
+            return None
+        rest = [(h, area) for h, area in hypotheses if h.name != best.name]
+        return tuple(sorted([*found, *rest], key=lambda sized: -sized[0].similarity))
+
+    def _known(
+        self, frame: Frame, region: Region, before: FittedModel | None
+    ) -> _KnownOrientations | None:
+        """The orientations known of a body: as its surface has turned, else as they were."""
+        if before is None:
+            return None
+        if before.surface is not None:
+            numbers, now = before.surface.turned(frame, region)
+            if len(numbers):
+                worn = before.surface.is_worn(numbers, now)
+                views = tuple(before.views[k] for k in numbers)
+                return _KnownOrientations(now, views, None if worn else before.surface, True)
+        return _KnownOrientations(before.orientations, before.views, None, False)
+
+    def _kept(
+        self,
+        frame: Frame,
+        region: Region,
+        picture: RegionPicture,
+        best: Hypothesis,
+        before: FittedModel,
+        known: _KnownOrientations,
+    ) -> list[SizedHypothesis]:
+        """The known orientations, if they are recent and still fit."""
+        s = self.settings
+        if frame.time - before.time >= s.renew_s:
+            return []
+        steps = STILL if known.followed else FINE
+        fits = self._search(frame, best.name, picture, list(known.orientations), steps)
+        if not fits or fits[0].overlap < before.overlap - s.lost:
+            return []
+        at = _Fitted(frame, region, picture, best, before.time, before.overlap)
+        return self._stored(at, fits, known.views, known.surface)
+
+    def _searched(
+        self,
+        frame: Frame,
+        region: Region,
+        picture: RegionPicture,
+        own: Sequence[SizedHypothesis],
+        more: MoreViews,
+        known: _KnownOrientations | None,
+    ) -> list[SizedHypothesis]:
+        """A full search from the views of a model and from what was known; empty if nothing fits."""
         s, best = self.settings, own[0][0]
-        key = region.id, best.name
-        before = self.memory.get(key)
-        if before is not None and frame.time - before.time < s.renew_s:
-            starts, numbers = list(before.orientations), before.views
-            fits = self._search(frame, best.name, picture, starts, FINE)
-            if fits and fits[0].overlap >= before.overlap - s.lost:
-                return self._stored(key, before.time, before.overlap, fits, numbers, best)
         wide = _orientations([h for h, _ in [*own, *more(best.name)]])[: s.starts]
         starts = [turn for _, turn in wide]
         numbers = tuple(view for view, _ in wide)
-        if before is not None:
-            starts, numbers = [*before.orientations, *starts], (*before.views, *numbers)
+        if known is not None:
+            starts, numbers = [*known.orientations, *starts], (*known.views, *numbers)
         fits = self._search(frame, best.name, picture, starts, COARSE)
         if not fits or fits[0].overlap < s.least_overlap:
-            self.memory.pop(key, None)
+            self.memory.pop((region.id, best.name), None)
             return []
-        return self._stored(key, frame.time, fits[0].overlap, fits, numbers, best)
+        overlap, surface = fits[0].overlap, None
+        if known is not None and known.followed:
+            fits, surface = known.steadied(fits), known.surface
+            first = [fits[0].orientation]
+            overlap = self._search(frame, best.name, picture, first, STILL)[0].overlap
+        at = _Fitted(frame, region, picture, best, frame.time, overlap)
+        return self._stored(at, fits, numbers, surface)
 
     def _search(
         self,
@@ -158,7 +279,7 @@ class PoseRefiner:
         focal = USUAL_FOCAL * frame.size[0]
         mesh, kept = self.meshes[name], self.settings.kept
         fits = fitted_poses(mesh, picture, starts, steps=steps, focal_px=focal)[:kept]
-        if steps is FINE:
+        if steps is not COARSE:
             return fits
         near = [f.orientation for f in fits]
         fine = fitted_poses(mesh, picture, near, steps=FINE, focal_px=focal)
@@ -166,17 +287,23 @@ class PoseRefiner:
 
     def _stored(
         self,
-        key: tuple[int, str],
-        time: float,
-        overlap: float,
+        at: _Fitted,
         fits: Sequence[PoseFit],
         numbers: Sequence[int],
-        best: Hypothesis,
+        surface: FollowedSurface | None,
     ) -> list[SizedHypothesis]:
-        """Store the fits and return them as hypotheses."""
+        """Store the fits and return them as hypotheses; without a surface, a new one is followed from now."""
         turns = np.stack([f.orientation for f in fits])
         chosen = tuple(numbers[f.start] for f in fits)
-        self.memory[key] = FittedModel(time, overlap, turns, chosen)
+        best, key = at.best, (at.region.id, at.best.name)
+        starts = [f.start for f in fits]
+        if surface is None or sorted(starts) != list(range(len(surface.orientations))):
+            focal = USUAL_FOCAL * at.frame.size[0]
+            mesh = self.meshes[best.name]
+            surface = followed_surface(at.frame, at.region, mesh, at.picture, turns, focal)
+        else:
+            surface = surface.ordered(starts)
+        self.memory[key] = FittedModel(at.time, at.overlap, turns, chosen, surface)
         directions, rotations = views(turns)
         top, rank = fits[0].worth, self.settings.rank
         return [

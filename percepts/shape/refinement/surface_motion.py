@@ -1,0 +1,233 @@
+"""Rotation of a rigid body since an earlier picture, from points on its surface.
+
+An outline tells the orientation of a body to some degrees, and its errors last as long as the outline. Points
+on the surface are followed to a fraction of a pixel, so what they tell is how far the body has turned: the
+points lie on the mesh as it was fitted to the earlier picture, and the mesh is turned, moved and scaled until
+they are where they were found again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from visup.agent.model.records import Frame, Region
+from visup.percepts.shape.refinement.mesh_model import MeshModel
+from visup.percepts.shape.refinement.pose_fit import SurfacePoints, surface_points
+from visup.percepts.shape.refinement.region_picture import RegionPicture
+
+Floats = NDArray[np.float64]
+
+MOST_POINTS = 80
+"""Points followed at most."""
+
+FEWEST = 10
+"""Fewest points that tell a rotation."""
+
+LEAST_SHARE = 0.5
+"""Least share of the followed points that one rotation must explain: else something else is seen."""
+
+EXPLAINED_PX = 1.0
+"""Distance within which a rotation explains a point, pixels."""
+
+FAR = np.cos(np.radians(12.0))
+"""Cosine of the rotation after which a new picture is taken, since the surface looks different."""
+
+_MARGIN = 0.25
+_QUALITY, _APART_PX = 0.02, 4
+_RETURNS_PX = 0.3
+_WINDOW = (15, 15)
+_ROUNDS = 8
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfacePicture:
+    """A picture of a body with points on it that can be found again.
+
+    Attributes:
+        grey: (h, w) uint8, the surroundings of its region.
+        points: (N, 2) float32, (x, y) in `grey`.
+    """
+
+    grey: NDArray[np.uint8]
+    points: NDArray[np.float32]
+
+    def found_in(self, frame: Frame, region: Region) -> tuple[Floats, NDArray[np.bool_]]:
+        """The points in a later frame.
+
+        Args:
+            frame: The frame.
+            region: The region of the body in it.
+
+        Returns:
+            (N, 2) positions (x, y) relative to the region's centre as `points` are to that of `grey`, and
+            (N,) which were found: those that are followed back to where they were.
+        """
+        now = _surroundings(frame, region, (self.grey.shape[1], self.grey.shape[0]))
+        there, seen, _ = cv2.calcOpticalFlowPyrLK(
+            self.grey, now, self.points, self.points.copy(), winSize=_WINDOW
+        )
+        back, again, _ = cv2.calcOpticalFlowPyrLK(
+            now, self.grey, there, there.copy(), winSize=_WINDOW
+        )
+        off = np.hypot(*(back - self.points).T)
+        found = (seen[:, 0] > 0) & (again[:, 0] > 0) & (off < _RETURNS_PX)
+        return np.asarray(there, np.float64), np.asarray(found, np.bool_)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FollowedSurface:
+    """The surface of a body, followed from an earlier picture.
+
+    Attributes:
+        picture: The picture.
+        orientations: (K, 3, 3) possible orientations in it.
+        points: Where its points lie on the mesh, for each of them.
+    """
+
+    picture: SurfacePicture
+    orientations: Floats
+    points: tuple[SurfacePoints, ...]
+
+    def turned(self, frame: Frame, region: Region) -> tuple[NDArray[np.intp], Floats]:
+        """The orientations in a later frame.
+
+        Returns:
+            (M,) numbers of those that agree with how the surface moved, and (M, 3, 3) what they are now.
+        """
+        there, found = self.picture.found_in(frame, region)
+        height, width = self.picture.grey.shape
+        there -= (np.array([width, height]) - 1) / 2
+        agree, turns = [], []
+        for k, on in enumerate(self.points):
+            use = found & ~np.isnan(on.bodies[:, 2])
+            turn = rotation_since(on.bodies[use], there[use], on.distance)
+            if turn is not None:
+                agree.append(k)
+                turns.append(turn @ self.orientations[k])
+        return np.array(agree, np.intp), np.array(turns).reshape(-1, 3, 3)
+
+    def is_worn(self, numbers: NDArray[np.intp], now: Floats) -> bool:
+        """Whether the body has turned so far since the picture that a new one is needed."""
+        if len(numbers) < len(self.orientations):
+            return True
+        cosine = (np.einsum("kij,kij->k", now, self.orientations[numbers]) - 1) / 2
+        return bool((cosine < FAR).any())
+
+    def ordered(self, numbers: Sequence[int]) -> FollowedSurface:
+        """The same surface with its orientations in another order."""
+        points = tuple(self.points[k] for k in numbers)
+        return FollowedSurface(self.picture, self.orientations[list(numbers)], points)
+
+
+def followed_surface(
+    frame: Frame,
+    region: Region,
+    model: MeshModel,
+    picture: RegionPicture,
+    orientations: Floats,
+    focal_px: float,
+) -> FollowedSurface | None:
+    """Begin to follow the surface of a body; None where it shows too little.
+
+    Args:
+        frame: The frame that shows it.
+        region: Its region.
+        model: Its mesh.
+        picture: The region as poses are fitted to it.
+        orientations: (K, 3, 3) those fitted.
+        focal_px: Focal length, pixels.
+    """
+    seen = surface_picture(frame, region)
+    if seen is None:
+        return None
+    height, width = seen.grey.shape
+    centred = seen.points.astype(np.float64) - (np.array([width, height]) - 1) / 2
+    points = (surface_points(model, picture, o, centred, focal_px) for o in orientations)
+    return FollowedSurface(seen, orientations, tuple(points))
+
+
+def surface_picture(frame: Frame, region: Region) -> SurfacePicture | None:
+    """The picture of a region; None where too few points could be found again.
+
+    Args:
+        frame: The frame that shows it.
+        region: The region.
+    """
+    _, _, w, h = region.bbox
+    size = (round(w * (1 + 2 * _MARGIN)), round(h * (1 + 2 * _MARGIN)))
+    grey = _surroundings(frame, region, size)
+    mask = np.zeros(grey.shape, np.uint8)
+    left, top = round((size[0] - w) / 2), round((size[1] - h) / 2)
+    mask[top : top + h, left : left + w] = region.mask
+    inside = cv2.erode(mask, np.ones((5, 5), np.uint8))
+    points = cv2.goodFeaturesToTrack(grey, MOST_POINTS, _QUALITY, _APART_PX, mask=inside)
+    if points is None or len(points) < FEWEST:
+        return None
+    return SurfacePicture(grey, np.asarray(points[:, 0], np.float32))
+
+
+def _surroundings(frame: Frame, region: Region, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """The grey picture of a size (width, height) about the centre of a region's box."""
+    x, y, w, h = region.bbox
+    crop = cv2.getRectSubPix(frame.image, size, (x + (w - 1) / 2, y + (h - 1) / 2))
+    return np.asarray(cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def rotation_since(bodies: Floats, there: Floats, distance: float) -> Floats | None:
+    """By how much a body has turned, as seen from a camera that looks at it.
+
+    Args:
+        bodies: (N, 3) points of the body as it was: x and y relative to its centre and towards the viewer's
+            far side z, pixels.
+        there: (N, 2) where they are seen now, pixels.
+        distance: From the viewer to the body's centre, pixels at the body.
+
+    Returns:
+        (3, 3), or None where no rotation explains enough of the points.
+
+    Example:
+        >>> rng = np.random.default_rng(0)
+        >>> body = rng.uniform(-30, 30, (40, 3))
+        >>> turned = Rotation.from_rotvec([0.02, -0.03, 0.01])
+        >>> p = turned.apply(body)
+        >>> seen = 1.1 * p[:, :2] / (1 + p[:, 2:] / 200) + (3, -2)
+        >>> found = rotation_since(body, seen, 200.0)
+        >>> Rotation.from_matrix(found).as_rotvec().round(3).tolist()
+        [0.02, -0.03, 0.01]
+    """
+    if len(bodies) < FEWEST:
+        return None
+    motion = np.zeros(6)
+    motion[3:5] = np.median(there - _seen(bodies, motion, distance), axis=0)
+    for _ in range(_ROUNDS):
+        off = there - _seen(bodies, motion, distance)
+        slopes = np.stack(
+            [
+                (_seen(bodies, motion + _STEP * e, distance) - there + off) / _STEP
+                for e in np.eye(6)
+            ],
+            axis=-1,
+        )
+        weight = 1 / (1 + (off**2).sum(axis=1) / (0.5 * EXPLAINED_PX) ** 2) ** 2
+        flat, each = slopes.reshape(-1, 6), np.repeat(weight, 2)
+        normal = (flat * each[:, None]).T @ flat
+        normal[np.diag_indices(6)] *= 1 + 1e-6
+        motion = motion + np.linalg.solve(normal + 1e-9 * np.eye(6), flat.T @ (each * off.ravel()))
+    explained = np.hypot(*(there - _seen(bodies, motion, distance)).T) < EXPLAINED_PX
+    if np.count_nonzero(explained) < max(FEWEST, LEAST_SHARE * len(bodies)):
+        return None
+    return np.asarray(Rotation.from_rotvec(motion[:3]).as_matrix(), np.float64)
+
+
+def _seen(bodies: Floats, motion: Floats, distance: float) -> Floats:
+    """(N, 2) where points of a body are seen after a rotation (3), a shift (2) and a growth (1)."""
+    turned = Rotation.from_rotvec(motion[:3]).apply(bodies)
+    nearer = np.exp(motion[5]) / (1 + turned[:, 2:] / distance)
+    return np.asarray(turned[:, :2] * nearer + motion[3:5], np.float64)

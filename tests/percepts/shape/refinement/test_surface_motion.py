@@ -1,0 +1,97 @@
+"""Points on a surface tell how far a body has turned, and that something else has come in its place."""
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from visup.agent import Frame, Region
+from visup.percepts.shape.refinement._pose_fit_jit import _draw, _project
+from visup.percepts.shape.refinement.mesh_model import MeshModel, mesh_model
+from visup.percepts.shape.refinement.pose_fit import USUAL_FOCAL, PoseFit
+from visup.percepts.shape.refinement.pose_refiner import _KnownOrientations
+from visup.percepts.shape.refinement.region_picture import region_picture
+from visup.percepts.shape.refinement.surface_motion import FollowedSurface, followed_surface
+from visup.render.meshes.spacecraft import spartan
+from visup.testing import region_of
+
+SIDE = 240
+RADIUS_PX = 70.0
+FINER = 4
+FAR = USUAL_FOCAL * SIDE / RADIUS_PX
+
+
+def satellite() -> MeshModel:
+    mesh = spartan()
+    return mesh_model("satellite", mesh.vertices, mesh.faces)
+
+
+def seen(model: MeshModel, turn: NDArray[np.float64], tones: int = 0) -> tuple[Frame, Region]:
+    """A picture of a body with a tone of its own on each face, without steps, and its region."""
+    side = SIDE * FINER
+    points, depth = np.empty((len(model.vertices), 3)), np.empty((side, side))
+    number = np.empty((side, side), np.int32)
+    place = np.array([side / 2, side / 2, RADIUS_PX * FINER])
+    _project(model.vertices, turn, FAR, place, points)
+    _draw(points, model.faces, depth, number)
+    tone = np.random.default_rng(tones).integers(60, 255, len(model.faces)).astype(np.uint8)
+    drawn = np.where(number >= 0, tone[np.maximum(number, 0)], 0).astype(np.uint8)
+    grey = cv2.resize(drawn, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    cover = cv2.resize((number >= 0).astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    return Frame(0, 0.0, np.repeat(grey[..., None], 3, axis=2)), region_of(cover > 0.5)
+
+
+def begun(model: MeshModel, true: NDArray[np.float64]) -> FollowedSurface:
+    frame, region = seen(model, true)
+    picture = region_picture(frame, region)
+    focal = USUAL_FOCAL * SIDE
+    surface = followed_surface(frame, region, model, picture, true[None], focal)
+    assert surface is not None
+    return surface
+
+
+def apart_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    return float(np.degrees(Rotation.from_matrix(a @ b.T).magnitude()))
+
+
+def test_a_rotation_is_told_to_a_fraction_of_a_degree() -> None:
+    """Most surely in the plane; a face seen from ahead tells little of others."""
+    model, errors, rolls = satellite(), [], []
+    for seed in range(12):
+        before = Rotation.random(random_state=seed).as_matrix()
+        axis = np.random.default_rng(seed).normal(size=3)
+        axis *= np.radians(4.0) / np.linalg.norm(axis)
+        after = Rotation.from_rotvec(axis).as_matrix() @ before
+        numbers, (now, *_) = begun(model, before).turned(*seen(model, after))
+        assert numbers.tolist() == [0]
+        errors.append(apart_deg(now, after))
+        rolls.append(np.degrees(abs(Rotation.from_matrix(now @ after.T).as_rotvec()[2])))
+    assert np.median(errors) < 0.7
+    assert np.median(rolls) < 0.25
+
+
+def test_another_surface_is_not_followed() -> None:
+    model, true = satellite(), Rotation.random(random_state=1).as_matrix()
+    other = Rotation.random(random_state=7).as_matrix()
+    numbers, _ = begun(model, true).turned(*seen(model, other, tones=3))
+    assert not len(numbers)
+
+
+@pytest.mark.parametrize(("degrees", "worn"), [(3.0, False), (15.0, True)])
+def test_a_picture_is_worn_once_the_body_has_turned_far(degrees: float, worn: bool) -> None:
+    true = Rotation.random(random_state=1).as_matrix()
+    turned = Rotation.from_rotvec([0.0, np.radians(degrees), 0.0]).as_matrix() @ true
+    surface = begun(satellite(), true)
+    assert surface.is_worn(np.array([0]), turned[None]) is worn
+    assert surface.is_worn(np.array([], np.intp), np.zeros((0, 3, 3)))
+
+
+def test_a_search_that_finds_an_orientation_again_leaves_it_as_it_was_followed() -> None:
+    known = Rotation.random(2, random_state=1).as_matrix()
+    near = Rotation.from_rotvec([0.05, 0.0, 0.0]).as_matrix() @ known[1]
+    fits = [PoseFit(near, 0.9, 0.5, 1.0, 4), PoseFit(known[0].T, 0.8, 0.5, 1.0, 3)]
+    first, second = _KnownOrientations(known, (5, 6), None, True).steadied(fits)
+    assert first.start == 1
+    assert np.array_equal(first.orientation, known[1])
+    assert second is fits[1]
