@@ -45,8 +45,8 @@ more, and by up to 1.37."""
 MOST_SHARED = 0.7
 """More shared outline in a good run counts as this much: half of it is more than one side of a square. What
 lies in front of its place shares 0.45 of its outline or all of it, as the camera stands (*pick*)."""
-LEAST_SHARED = 0.1
-"""Less shared outline in a good run tells nothing: outlines just touch."""
+LEAST_SHARED = 0.25
+"""Less shared outline in a good run than a side of a square tells nothing: a corner or an end meets."""
 PLACED_S = 0.2
 """How long two must be elsewhere, seconds: outlines jump while one is half hidden."""
 SETTLED_S = 2.0
