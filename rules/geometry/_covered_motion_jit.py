@@ -4,7 +4,8 @@ Where a body is covered its outline ends because another one begins, and that ed
 does. Of a resting box that is covered from one side as many directions move as rest. So the outline alone is
 trusted when nearly all of it moves as one. Otherwise there are several explanations, each that of one half of
 the outline: the one that most of it moves along with is the body's, where the image motion inside it counts
-as some more directions; two that are about as good leave it unknown.
+as some more directions; two that are about as good leave it unknown. Of a body that the image border cuts too
+few directions are left for halves; its outline is believed unless its image contradicts it.
 """
 
 from __future__ import annotations
@@ -114,6 +115,25 @@ def _explanations(
 
 
 @compiled
+def _contradicted(
+    slopes: Floats,
+    usable: Flags,
+    directions: Floats,
+    motions: tuple[tuple[float, float], tuple[float, float, float]],
+    near: float,
+) -> bool:
+    """Whether the image of a body moves otherwise than its outline, and explains about as many directions."""
+    (x, y), (u, v, sigma) = motions
+    if not np.isfinite(x) or not np.isfinite(u):
+        return False
+    alike = moving_along(slopes, usable, directions, (x, y), near)
+    seen = moving_along(slopes, usable, directions, (u, v), near)
+    apart = 2.0 * max(near + sigma, UNEVEN * np.hypot(x, y))
+    as_good = seen >= SOME and seen + IMAGE_COUNTS > alike - CLEARLY
+    return bool(as_good and np.hypot(u - x, v - y) > apart)
+
+
+@compiled
 def uncovered_motion(
     slopes: Floats,
     usable: Flags,
@@ -139,8 +159,11 @@ def uncovered_motion(
     for k in range(len(slopes)):
         known += usable[k]
     alike = moving_along(slopes, usable, directions, (x, y), near) if np.isfinite(x) else 0
-    if known < len(slopes) or alike >= AS_ONE * known:
-        return x, y  # where the image border cuts it, or another body covers it, is known
+    if alike >= AS_ONE * known:
+        return x, y
+    if known < len(slopes):  # the image border cuts it
+        doubted = _contradicted(slopes, usable, directions, motions, near)
+        return (np.nan, np.nan) if doubted else (x, y)
     found = _explanations(slopes, usable, directions, motions, near)
     best = -1
     for e in range(len(found)):

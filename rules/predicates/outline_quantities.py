@@ -1,8 +1,9 @@
-"""Quantities of outlines: orientation and openness."""
+"""Quantities of outlines: orientation, openness and how much of one lies along another."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import combinations
 from types import MappingProxyType
 
 import cv2
@@ -11,7 +12,10 @@ from numpy.typing import NDArray
 
 from visup.agent import ObjectBelief, Presence
 from visup.rules.formula.truth import MAYBE, NO, YES
+from visup.rules.geometry.borders import common_border
+from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot, exact
+from visup.rules.relations.kinematics import RelationSettings
 
 LONG = 1.3
 """Least ratio of length to width for a meaningful long axis."""
@@ -19,6 +23,9 @@ LONG = 1.3
 ALIGNED_DEG = 10.0
 """Axes that differ by less are aligned; by more than `APART_DEG` they are not; in between is unknown."""
 APART_DEG = 15.0
+
+ALONG = RelationSettings().touch_enter
+"""Gap up to which one outline lies along another, image diagonals: that at which two touch."""
 
 
 def orientation(facts: Snapshot) -> Floats:
@@ -50,6 +57,21 @@ OUTLINE_RELATIONS: Mapping[str, tuple[Callable[[Snapshot], Codes], str]] = Mappi
 def openness(facts: Snapshot) -> Floats:
     """Free share of each outline's convex hull, 0 to 1: for jaws, a door, scissors."""
     return exact(np.array([_free(b) for b in facts.beliefs], dtype=float))
+
+
+def shared_outline(facts: Snapshot) -> Floats:
+    """Share of one outline that lies along the other, of all pairs, 0 to 1: the greater one of the two.
+
+    Unknown if one is out of view.
+    """
+    beliefs, near = facts.beliefs, ALONG * image_diagonal(facts.mind.frame_size)
+    low = np.full((len(beliefs), len(beliefs)), -np.inf)
+    high = -low
+    seen = [k for k, b in enumerate(beliefs) if b.presence is Presence.SEEN]
+    for i, j in combinations(seen, 2):
+        share = common_border(beliefs[i].region, beliefs[j].region, near)
+        low[i, j] = low[j, i] = high[i, j] = high[j, i] = share
+    return np.array((low, high))
 
 
 def _axes(facts: Snapshot) -> NDArray[np.float64]:

@@ -360,6 +360,9 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
         "orientation": QuantityDefinition(_ONE, ANGLE, outline.orientation, "of the long axis"),
         "axis_angle": QuantityDefinition(_TWO, ANGLE, outline.axis_angle, "between the long axes"),
         "openness": QuantityDefinition(_ONE, SHARE, outline.openness, "of the hull, left free"),
+        "shared_outline": QuantityDefinition(
+            _TWO, SHARE, outline.shared_outline, "of one, along the other: the greater share"
+        ),
         "confidence": QuantityDefinition(_ONE, SHARE, image.confidence, "of the identity"),
         "centre_distance": QuantityDefinition(
             _TWO, LENGTH, image.centre_distance, "between the centres"

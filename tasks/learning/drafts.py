@@ -27,7 +27,7 @@ from visup.tasks.learning.order import (
     symbols_of,
 )
 from visup.tasks.learning.periods import Period, course_of
-from visup.tasks.learning.places import FinalOverlap
+from visup.tasks.learning.places import FinalPlace
 from visup.tasks.learning.precedence import Precedence, invariants
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.rests import Halt, Rest
@@ -92,7 +92,7 @@ class Draft:
     periods: dict[Loop, Period] = field(default_factory=dict)
     rests: tuple[Rest, ...] = ()
     order: tuple[Precedence, ...] = ()
-    places: tuple[FinalOverlap, ...] = ()
+    places: tuple[FinalPlace, ...] = ()
     halt: Halt | None = None
 
     def text(self) -> str:

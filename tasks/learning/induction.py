@@ -32,6 +32,7 @@ from visup.tasks.learning.order import (
     plan_of,
     shared,
     symbols_of,
+    with_approaches,
     with_loops,
     without,
 )
@@ -44,6 +45,8 @@ from visup.tasks.learning.traces import RunTrace, Span
 
 SHARE = 0.8
 """Least share of good runs in which an event occurs for it to be part of the course."""
+APPROACH_SHARE = 0.6
+"""The same for the approach to a meeting that is part of the course."""
 FORBIDDEN = ("touching", "coupled")
 """Actions that are forbidden when they occur in bad runs only."""
 
@@ -91,7 +94,7 @@ def learn_task(
     if not times:  # without loops, surplus repeats in some runs are noise
         rows = aligned(rows)
         folded = [tuple(e.item for e in row) for row in rows]
-    core = shared(folded, SHARE)
+    core = with_approaches(shared(folded, SHARE), shared(folded, APPROACH_SHARE))
     if not core:
         raise TaskError(
             "the runs have nothing in common that a task could ask for",

@@ -162,6 +162,21 @@ def shared(words: Sequence[Word], share: float) -> list[Occurrence]:
     return sorted(core, key=lambda o: (mean(places[o]), repr(o)))
 
 
+def with_approaches(core: Sequence[Occurrence], frequent: Sequence[Occurrence]) -> list[Occurrence]:
+    """The core with those of the frequent occurrences that are approaches to a meeting of the core.
+
+    Who meets has come nearer before, though not in every view: what is lifted over the other and let down
+    on it may seem to draw away.
+
+    Args:
+        core: Occurrences of nearly all words.
+        frequent: Occurrences of fewer words, in order; all of the core are among them.
+    """
+    met = {s[1] for o in core for s in symbols_of(o[0]) if s[0] in ("touching", "coupled")}
+    nears = {o for o in frequent if o[0] in {("converging", pair) for pair in met} and o[1] == 0}
+    return [o for o in frequent if o in nears or o in core]
+
+
 def plan_of(
     words: Sequence[Word],
     core: Sequence[Occurrence],

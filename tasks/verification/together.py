@@ -1,6 +1,7 @@
 """Actions of one stage joined by `&`: having held one after the other is not holding at the same time.
 
-Each action has a monitor of its own. The one that ceased before another one began has to hold once more.
+Each action has a monitor of its own. The one that ceased before another one began has to hold once more. Of
+actions that must hold for as long, in one stage, none has held for longer than all of them have together.
 """
 
 from __future__ import annotations
@@ -44,8 +45,28 @@ def at_the_same_time(
             lapsed = {id(x) for x in group if _alone(x, group, gap, tolerance_s)}
             if lapsed:
                 new = [_without_hold(x) if id(x) in lapsed else x for x in leaves(state)]
-                return with_leaves(state, iter(new))
+                state = with_leaves(state, iter(new))
+            return _for_as_long(state)
     return state
+
+
+def _for_as_long(state: State[StepMonitor]) -> State[StepMonitor]:
+    """A state in which a `for` counts while all actions hold that must hold for as long."""
+    groups: dict[tuple[str, float], list[Leaf[StepMonitor]]] = {}
+    for part in state.parts if isinstance(state, ParallelState) else ():
+        if isinstance(part, Leaf) and part.step.hold_s is not None and not part.step.is_told:
+            groups.setdefault((part.step.stage, part.step.hold_s), []).append(part)
+    waiting = [g for g in groups.values() if not all(x.payload.fulfilled for x in g)]
+    held = {id(x): min(y.payload.held_s for y in group) for group in waiting for x in group}
+    if not held:
+        return state
+    new = [_held_for(x, held[id(x)]) if id(x) in held else x for x in leaves(state)]
+    return with_leaves(state, iter(new))
+
+
+def _held_for(leaf: Leaf[StepMonitor], held_s: float) -> Leaf[StepMonitor]:
+    monitor = replace(leaf.payload, held_s=held_s, fulfilled=False, fulfilled_at=None)
+    return replace(leaf, payload=monitor)
 
 
 def _alone(

@@ -80,6 +80,44 @@ def test_an_outline_that_moves_as_one_is_believed_whatever_the_image_says(
     assert told(slopes, (*image, 0.3)) == pytest.approx(own, abs=1.0)
 
 
+def told_of_cut(
+    slopes: Floats, first: int, image: tuple[float, float, float], left_out: int = 5
+) -> tuple[Motion, Motion]:
+    """Motion of an outline that the image border cuts in some directions, alone and with the image's."""
+    usable = ALL.copy()
+    usable[np.arange(first, first + left_out) % 16] = False
+    outline = common_motion(slopes, usable, DIRECTIONS, 4.5)
+    return outline, uncovered_motion(slopes, usable, DIRECTIONS, (outline, image), NEAR)
+
+
+@some
+@given(velocity, st.integers(0, 15), st.integers(5, 10), st.integers(3, 6))
+def test_a_body_at_rest_cut_by_the_border_does_not_move_with_what_covers_it(
+    edge: Motion, cut: int, off: int, count: int
+) -> None:
+    slopes = covered((0.0, 0.0), edge, cut + off, count)
+    _, (x, y) = told_of_cut(slopes, cut, (0.0, 0.0, 0.3))
+    assert np.isnan(x) or np.hypot(x, y) <= 2 * (NEAR + 0.3) + 1e-6
+
+
+@some
+@given(velocity, velocity, st.integers(0, 15))
+def test_what_is_cut_by_the_border_and_moves_as_one_is_believed_whatever_the_image_says(
+    own: Motion, image: Motion, cut: int
+) -> None:
+    _, found = told_of_cut(DIRECTIONS @ own, cut, (*image, 0.3))
+    assert found == pytest.approx(own, abs=0.5)
+
+
+@some
+@given(velocity, velocity, st.integers(0, 15), st.integers(0, 15), st.integers(0, 9))
+def test_without_image_motion_what_is_cut_by_the_border_moves_as_its_outline(
+    own: Motion, edge: Motion, cut: int, first: int, count: int
+) -> None:
+    outline, found = told_of_cut(covered(own, edge, first, count), cut, UNSEEN)
+    assert found == pytest.approx(outline, nan_ok=True)
+
+
 def by_counting(slopes: Floats, outline: Motion, image: tuple[float, float, float]) -> Motion:
     """`uncovered_motion` by arrays, with half outlines fitted by a library's solver."""
 

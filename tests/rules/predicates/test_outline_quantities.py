@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.rules.predicates.test_certainty import mind_of
+from tests.rules.scenes import box_region
 from visup.agent import Mind, Presence
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
@@ -68,3 +69,16 @@ def test_what_is_round_or_out_of_sight_lies_no_way() -> None:
 def test_open_jaws_leave_more_of_their_hull_free_than_closed_ones() -> None:
     mind = outlined(np.array(JAWS), np.array(CLOSED))
     assert asked(mind, "openness")[0] == pytest.approx([0.5, 0.0], abs=0.01)
+
+
+def test_what_lies_against_another_shares_an_outline_with_it() -> None:
+    mind = mind_of((100, 100, 60, 60), (300, 110, 40, 40), (500, 100, 40, 40))
+    beside = box_region(2, (160.0, 110.0, 40.0, 40.0))
+    assert beside is not None
+    mind = mind.with_objects(replace(mind.objects[2], region=beside))
+    found = asked(mind, "shared_outline")
+    assert found[:, 0, 1] == pytest.approx([0.29, 0.29], abs=0.05)
+    assert found[:, 1, 0].tolist() == found[:, 0, 1].tolist()
+    assert found[:, 0, 2].tolist() == [0.0, 0.0]
+    hidden = mind.with_objects(replace(mind.objects[2], presence=Presence.HIDDEN))
+    assert asked(hidden, "shared_outline")[:, 0, 1].tolist() == [-inf, inf]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.tasks.scripted import REGION, Script, Spell, play
+from tests.tasks.scripted import Script, Spell, play
 from visup.agent import Mind, Outcome, Verdict
 from visup.tasks.analysis.judging import judged
 from visup.tasks.checks.load import parse_task
@@ -16,10 +16,11 @@ from visup.tasks.learning.carrying import with_carrying
 from visup.tasks.learning.induction import learn_task
 from visup.tasks.learning.meetings import meetings_of, pairs_by_weight
 from visup.tasks.learning.order import Carry
-from visup.tasks.learning.places import FinalOverlap, places_of
+from visup.tasks.learning.places import MOST_SHARED, FinalPlace, places_of
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.rests import halt_of
 from visup.tasks.learning.traces import Happening, RunTrace, Span, trace_of
+from visup.testing import region_of
 
 GRIPPER, PART, FIXTURE = 1, 2, 3
 NAMES = {GRIPPER: {"gripper": 0.9}, PART: {"part": 0.9}, FIXTURE: {"fixture": 0.9}}
@@ -103,6 +104,10 @@ def test_what_the_carrier_touches_until_it_has_drawn_back_is_no_meeting(
 def lying(name: str, share: float) -> RunTrace:
     """A part comes to the fixture, meets it after 6 s and lies with a share of its box over it."""
     boxes = {FIXTURE: (100, 100, 60, 60), PART: (160 - round(40 * share), 100, 40, 40)}
+    regions = {
+        n: region_of(np.ones((h, w), dtype=bool), n, at=(x, y), size=(640, 480))
+        for n, (x, y, w, h) in boxes.items()
+    }
     spells = [
         Spell("converging", 2.0, 6.2, (PART, FIXTURE)),
         Spell("touching", 6.0, 1e9, (PART, FIXTURE)),
@@ -114,8 +119,7 @@ def lying(name: str, share: float) -> RunTrace:
 
     def keep(mind: Mind, observation: object) -> Outcome:
         objects = {
-            n: replace(o, region=replace(REGION, bbox=boxes[n]), last_seen=mind.time)
-            for n, o in mind.objects.items()
+            n: replace(o, region=regions[n], last_seen=mind.time) for n, o in mind.objects.items()
         }
         minds.append(replace(mind, objects=objects))
         return Outcome(mind)
@@ -128,19 +132,26 @@ def test_what_lies_beside_its_place_is_refused_though_it_touches_it() -> None:
     learned = learn_task(
         "put", [lying(f"good{k}", share) for k, share in enumerate((0.9, 1.0, 0.8))]
     )
-    assert "overlap(fixture, part) > " in learned.text
+    assert "shared_outline(fixture, part) > " in learned.text
     assert set(learned.good.values()) == {Verdict.SUCCEEDED}
     task = parse_task(learned.text)
     assert judged(task, lying("near", 0.75).minds).verdict is Verdict.SUCCEEDED
     assert judged(task, lying("beside", 0.05).minds).verdict is not Verdict.SUCCEEDED
 
 
-def test_where_outlines_just_touch_their_overlap_tells_nothing() -> None:
+def test_where_outlines_just_touch_their_shared_outline_tells_nothing() -> None:
     rows = [[event("touching", PLACED, 6.0)]]
-    assert not list(places_of((("touching", PLACED), 0), rows, [lying("a", 0.05)], []))
+    assert not list(places_of((("touching", PLACED), 0), rows, [lying("a", -0.1)], []))
     (place,) = places_of((("touching", PLACED), 0), rows, [lying("a", 0.5)], [])
-    assert isinstance(place, FinalOverlap)
-    assert np.isclose(place.seen, 800 / (3600 + 1600 - 800))
+    assert isinstance(place, FinalPlace)
+    # Half of its upper and lower side, one of which lies along that of the fixture, and a side.
+    assert place.seen == pytest.approx(80 / 160, abs=0.05)
+
+
+def test_no_more_is_asked_of_what_lies_within_its_place_than_of_what_lies_against_it() -> None:
+    contact = ("touching", PLACED)
+    within, beside = (FinalPlace(contact, (contact, 0), s) for s in (1.0, MOST_SHARED))
+    assert within.least == beside.least == 35
 
 
 def test_nobody_comes_to_rest_in_a_stage_that_is_no_contact() -> None:

@@ -170,6 +170,43 @@ def test_what_is_joined_by_and_holds_at_the_same_time(until: float, expected: bo
     assert expected is not any("not while what is joined" in e.text for e in played.events)
 
 
+LONG = (
+    "<t> ::= <a> <b>\n<a> ::= touching(leg_1, top)\n"
+    "<b> ::= (touching(leg_2, top) & touching(leg_3, top)) for 4 s"
+)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        ((5.0, 14.0), (8.0, 20.0), True),
+        ((5.0, 10.0), (8.0, 20.0), False),  # together for 2 s only
+        ((5.0, 11.0), (12.0, 20.0), False),  # one after the other, with little between them
+    ],
+)
+def test_a_for_around_actions_counts_while_all_of_them_hold(
+    first: tuple[float, float], second: tuple[float, float], expected: bool
+) -> None:
+    spells = (
+        Spell("touching", 2.0, 1e9, (TOP, 2)),
+        Spell("touching", *first, (TOP, 3)),
+        Spell("touching", *second, (TOP, 4)),
+    )
+    script = Script(spells, objects=HERE, identities=NAMES)
+    assert (verdict(LONG, script, 30.0) is Verdict.SUCCEEDED) is expected
+
+
+def test_a_for_around_actions_bears_a_short_break_of_one() -> None:
+    spells = (
+        Spell("touching", 2.0, 1e9, (TOP, 2)),
+        Spell("touching", 5.0, 1e9, (TOP, 3)),
+        Spell("touching", 5.0, 7.0, (TOP, 4)),
+        Spell("touching", 7.3, 1e9, (TOP, 4)),
+    )
+    script = Script(spells, objects=HERE, identities=NAMES)
+    assert verdict(LONG, script, 30.0) is Verdict.SUCCEEDED
+
+
 def test_what_goes_on_does_not_excuse_what_was_done_before_its_turn() -> None:
     """A table that is stood up before its last leg is on, though the legs are required as well."""
     text = (
