@@ -16,11 +16,12 @@ from visup.agent import (
     Region,
 )
 from visup.agent.contract.contract import COMPILING_HANG_S
+from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.scene import Scene, prepare_scene
 from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.output.explaining import shares, unexplained
+from visup.percepts.appearance.output.explaining import moving_body, shares, unexplained
 from visup.percepts.appearance.output.thing_region import confidence, thing_outline, thing_region
-from visup.percepts.appearance.tracking.track import Blob, ThingTrack
+from visup.percepts.appearance.tracking.track import ThingTrack
 from visup.percepts.appearance.tracking.tracker import ThingTracker
 from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
 from visup.percepts.motion.outlines.region_outline import RegionOutline
@@ -84,7 +85,8 @@ class AppearanceBehaviour:
             return []
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
-        tracks = self._tracker.step(scene, lambda blob: self._id_of(blob, moving, scene))
+        bodies = [moving_body(r, scene) for r in moving]
+        tracks = self._tracker.step(scene, lambda blob: self._id_of(blob, moving, scene), bodies)
         if not image_is_trusted(observation):
             return []
         before = None if last is None else last.time

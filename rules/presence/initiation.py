@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import hypot
 
 from visup.agent import ObjectBelief
 from visup.rules.presence.association import hypotheses_by_object
@@ -12,6 +13,9 @@ from visup.rules.presence.object_tracks import at_border
 from visup.rules.presence.reidentification import absorb_parts, parts_of
 from visup.rules.presence.step_context import StepContext
 from visup.rules.wording.conditions import Condition, at_least
+
+MOVES_SIGMA = 3.0
+"""Speed beyond which what was recognised by appearance is moving, its standard deviations."""
 
 STATIONARY_S = 1.0
 """An object in view for longer than this before it moved did not enter now, seconds."""
@@ -40,6 +44,8 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
     yield at_least("sightings", track.sightings, s.least_sightings)
     yield Condition("not part of another object", not context.may_be_part(belief))
     named = belief.id in context.recognised
+    if named and _is_moving(belief) and not _is_known_already(context, belief):
+        return
     hidden = not named and in_place_of_hidden(belief, context.mind, context.of)
     yield Condition("not in the place of a hidden object", not hidden)
     if not belief.candidates:
@@ -62,6 +68,21 @@ def _known_at_first_sight(context: StepContext, belief: ObjectBelief) -> bool:
         return False
     found = hypotheses_by_object(context.mind, context.observation).get(belief.id, ())
     return max((h.similarity for h in found), default=0.0) >= context.settings.sure_similarity
+
+
+def _is_moving(belief: ObjectBelief) -> bool:
+    """Whether its region moves beyond doubt; what looks like a known thing and moves is that thing."""
+    region = belief.region
+    return hypot(*region.velocity) > MOVES_SIGMA * region.velocity_sigma > 0.0
+
+
+def _is_known_already(context: StepContext, belief: ObjectBelief) -> bool:
+    """Whether another object has the name by which it was recognised: it may be that one, seen again."""
+    found = hypotheses_by_object(context.mind, context.observation).get(belief.id, ())
+    names = {h.name for h in found}
+    return any(
+        o.confirmed and o.name in names for o in context.mind.objects.values() if o.id != belief.id
+    )
 
 
 def _is_early(context: StepContext, belief: ObjectBelief) -> bool:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from visup.agent import Region
 from visup.agent.model.fast_replace import replace
+from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.tracking.track import Blob
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 
 SMALL = 384  # longer side of the picture for comparing regions, pixels
@@ -58,6 +59,18 @@ def shares(region: Region, blob: Blob, scene: Scene) -> float:
     there = _small(region, (here.shape[0], here.shape[1]), scene.scale)
     both, either = int(np.sum(here & there)), int(np.sum(here | there))
     return both / max(either, 1)
+
+
+def moving_body(region: Region, scene: Scene) -> MovingBody:
+    """A moving region in working pixels of the scene."""
+    x, y, w, h = region.bbox
+    width, height = scene.size
+    left, top = min(int(x * scene.scale), width - 1), min(int(y * scene.scale), height - 1)
+    right = min(max(left + 1, round((x + w) * scene.scale)), width)
+    bottom = min(max(top + 1, round((y + h) * scene.scale)), height)
+    size = right - left, bottom - top
+    mask = cv2.resize(region.mask.view(np.uint8), size, interpolation=cv2.INTER_AREA)
+    return MovingBody(region.id, Blob((left, top, right, bottom), np.asarray(mask) > 0), region.cut)
 
 
 def _near(things: Sequence[Region], size: tuple[int, int]) -> tuple[Mask, float]:

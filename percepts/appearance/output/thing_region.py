@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 
 from visup.agent import Region
+from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
+from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.motion.outlines.region_outline import RegionOutline, describe_mask
 
 OVER_S = 0.2  # time over which a velocity is measured, seconds

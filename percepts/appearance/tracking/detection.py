@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.colours import colour_bins
+from visup.percepts.appearance.looks.colours import OWN, colour_bins
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
-from visup.percepts.appearance.tracking.verification import OWN, Match, verify
+from visup.percepts.appearance.tracking.verification import Match, verify
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.bodies import MovingBody, body_colours
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
 from visup.percepts.appearance.tracking.detection import colour_peaks, search
-from visup.percepts.appearance.tracking.track import Blob, ThingTrack
+from visup.percepts.appearance.tracking.track import ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
 SURE = 0.6  # score that other objects were not observed to reach
@@ -24,6 +26,9 @@ AT_HOME = 0.1  # bonus of the position where an object was taught
 RECENT_SIZES = (0.85, 1.0, 1.18)
 SIZES = (0.75, 0.87, 1.0, 1.15, 1.32)
 TURNS = (-0.4, 0.4)
+BODY_ALIKE = 0.5  # least common share of the colours of a moving body and of an object
+BODY_SIZES = (0.5, 1.8)  # sides of a moving body that may be an object, in its own
+BODY_CUT = 0.25  # the least one of a body that the border cuts
 TAKEN = 0.5  # share of a position covered by another object from which it is taken
 
 
@@ -90,6 +95,40 @@ def moving_places(
     if not fine:
         fine = _gathered(scene, it, PatchPose(0, 0, unit), where)
     return [ThingPlace(view.name, number, it, m, m.score) for m in fine]
+
+
+def body_places(
+    scene: Scene, view: ViewModel, number: int, bodies: Sequence[MovingBody]
+) -> list[ThingPlace]:
+    """Bodies in motion that have the colours of an object and about its size.
+
+    What moves by itself is one thing, and its outline is known. So its colours are sufficient, though it was
+    taught in another posture, or from another side.
+
+    Args:
+        scene: The frame.
+        view: The taught view.
+        number: Its number.
+        bodies: The moving bodies.
+    """
+    found = (_place_of(scene, view, number, b) for b in bodies)
+    return [f for f in found if f is not None]
+
+
+def _place_of(scene: Scene, view: ViewModel, number: int, body: MovingBody) -> ThingPlace | None:
+    it = view.appearance
+    unit = view.pose.scale * max(scene.size) / max(view.size)
+    size = float(np.sqrt(body.blob.area)) / (2 * it.radius * unit)
+    least, most = BODY_SIZES
+    if not (BODY_CUT if body.cut else least) < size < most:
+        return None
+    excess, alike = body_colours(scene, it, body.blob)
+    if excess < GATHERED or alike < BODY_ALIKE:
+        return None
+    left, top, right, bottom = body.blob.window
+    pose = PatchPose((left + right - 1) / 2, (top + bottom - 1) / 2, unit)
+    share = float(np.sqrt(min(1.0, excess) * alike))
+    return ThingPlace(view.name, number, it, Match(pose, share, share), share)
 
 
 def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.colours import learn_colours
 from visup.percepts.appearance.looks.pose import Window, cut_patch
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, learned_filter, surroundings
-from visup.percepts.appearance.tracking.track import Blob, RestMemory, State, ThingTrack
+from visup.percepts.appearance.tracking.track import RestMemory, State, ThingTrack
 
 Floats = NDArray[np.float32]
 

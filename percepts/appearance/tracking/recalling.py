@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
 from visup.percepts.appearance.tracking.detection import search
 from visup.percepts.appearance.tracking.finding import SURE, footprint, overlap
 from visup.percepts.appearance.tracking.following import noted
-from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
+from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
 MOVING_S, RESTING_S = 0.3, 2.0  # between two comparisons

@@ -8,12 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.colours import colour_bins
 from visup.percepts.appearance.looks.pose import PatchPose, Window, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
 from visup.percepts.appearance.tracking._rest_check_jit import like_before
-from visup.percepts.appearance.tracking.track import Blob, RestMemory
+from visup.percepts.appearance.tracking.track import RestMemory
 from visup.percepts.appearance.tracking.verification import explained_pixels, template_of
 
 Floats = NDArray[np.float32]

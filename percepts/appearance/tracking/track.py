@@ -8,7 +8,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.pose import PatchPose, Window
+from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.thing_model import Appearance
 
 Bytes = NDArray[np.uint8]
@@ -24,24 +25,6 @@ class State(StrEnum):
 
 
 IN_VIEW = (State.MOVING, State.RESTING)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Blob:
-    """Pixels of the working picture.
-
-    Attributes:
-        window: (left, top, right, bottom), half open.
-        mask: (bottom - top, right - left) bool.
-    """
-
-    window: Window
-    mask: NDArray[np.bool_]
-
-    @property
-    def area(self) -> int:
-        """Pixels in the mask."""
-        return int(np.count_nonzero(self.mask))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
@@ -19,6 +21,7 @@ from visup.percepts.appearance.tracking.finding import (
     SURE,
     ThingPlace,
     assigned,
+    body_places,
     candidates,
     footprint,
     lost_places,
@@ -47,7 +50,7 @@ from visup.percepts.appearance.tracking.segmentation import (
     thing_scores,
     unchanged,
 )
-from visup.percepts.appearance.tracking.track import IN_VIEW, Blob, State, ThingTrack
+from visup.percepts.appearance.tracking.track import IN_VIEW, State, ThingTrack
 
 Mask = NDArray[np.bool_]
 
@@ -102,12 +105,15 @@ class ThingTracker:
         """Restore the state of a tracker of the same views."""
         vars(self).update(state)
 
-    def step(self, scene: Scene, new_id: Callable[[Blob], int]) -> tuple[ThingTrack, ...]:
+    def step(
+        self, scene: Scene, new_id: Callable[[Blob], int], bodies: Sequence[MovingBody] = ()
+    ) -> tuple[ThingTrack, ...]:
         """Track the objects in the next frame.
 
         Args:
             scene: The frame.
             new_id: Returns the id of an object detected for the first time.
+            bodies: What moves by itself in it, as far as that is segmented.
 
         Returns:
             One track for each name, in the order of teaching.
@@ -122,7 +128,7 @@ class ThingTracker:
             self._camera, self._scenery = STILL, CameraTrack()
             self.tracks = tuple(_forgotten(t) for t in self.tracks)
         self._change.update(scene, STILL if self._camera is None else self._camera)
-        self._find(scene)
+        self._find(scene, bodies)
         self._share_pixels(scene, same)
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
         return self.tracks
@@ -166,31 +172,46 @@ class ThingTracker:
         owner = np.concatenate([np.full(len(p), k) for k, p in points]).astype(np.int64)
         return follow_points(old, scene, np.concatenate([p for _, p in points]), owner)
 
-    def _find(self, scene: Scene) -> None:
-        """Search for objects that are not in view: all of them at first, then one at a time."""
+    def _find(self, scene: Scene, bodies: Sequence[MovingBody]) -> None:
+        """Search for objects that are not in view: all of them at first, then one at a time.
+
+        Bodies in motion are compared in every frame with those that have never been in view. One that was is
+        sought by how it looked; a body with its colours may be another one that was there all the time.
+        """
         lost = sorted((t for t in self.tracks if t.state not in IN_VIEW), key=lambda t: t.asked)
         first = self._count == 1
         due = lost if first else lost[: self._count % EVERY == 0]
+        found = self._searched(scene, due)
+        new = {t.name for t in lost if not t.id}
+        found += self._moving(scene, bodies, new - {f.name for f in found})
+        taken = [b for t in self.tracks if t.state in IN_VIEW for b in _occupied(t, scene)]
+        placed = self._settled(assigned(scene, found, taken), scene)
         names = {t.name for t in due}
-        found = [
-            c
-            for number, view in enumerate(self.views)
-            if view.name in names
-            for c in candidates(scene, view, number)
-        ]
+        asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
+        self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
+
+    def _searched(self, scene: Scene, due: Sequence[ThingTrack]) -> list[ThingPlace]:
+        """Places of objects in the whole picture, and in what has changed recently."""
+        names = {t.name for t in due}
+        found = [c for k, v in self._views_of(names) for c in candidates(scene, v, k)]
         found += [c for t in due for c in lost_places(scene, t)]
         lately = self._change.lately(scene)
         if lately is not None:
-            found += [
-                c
-                for number, view in enumerate(self.views)
-                if view.name in names - {f.name for f in found}
-                for c in moving_places(scene, view, number, lately)
-            ]
-        taken = [b for t in self.tracks if t.state in IN_VIEW for b in _occupied(t, scene)]
-        placed = self._settled(assigned(scene, found, taken), scene)
-        asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
-        self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
+            left = self._views_of(names - {f.name for f in found})
+            found += [c for k, v in left for c in moving_places(scene, v, k, lately)]
+        return found
+
+    def _moving(
+        self, scene: Scene, bodies: Sequence[MovingBody], names: Collection[str]
+    ) -> list[ThingPlace]:
+        """Places of objects among the bodies that are not known to be one."""
+        known = {t.id for t in self.tracks}
+        free = [b for b in bodies if b.id not in known]
+        return [c for k, v in self._views_of(names) for c in body_places(scene, v, k, free)]
+
+    def _views_of(self, names: Collection[str]) -> list[tuple[int, ViewModel]]:
+        """The views of some objects, each with its number."""
+        return [(k, v) for k, v in enumerate(self.views) if v.name in names]
 
     def _settled(self, placed: Mapping[str, ThingPlace], scene: Scene) -> dict[str, ThingPlace]:
         """Resolve positions of look-alikes that are not all searched at once."""

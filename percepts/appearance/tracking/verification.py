@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.colours import ColourModel, colour_bins
+from visup.percepts.appearance.looks.colours import OWN, ColourModel, colour_bins
 from visup.percepts.appearance.looks.correlation_filter import CorrelationFilter, peak_of
 from visup.percepts.appearance.looks.features import CELL, cell_features
 from visup.percepts.appearance.looks.pose import PatchPose
@@ -20,7 +20,6 @@ Bytes = NDArray[np.uint8]
 
 _NEAR = np.array([16, 9, 9], dtype=np.int16)  # tolerance of a matching pixel, steps of Lab
 _LIGHTER = 30.0  # most overall change of lightness, steps
-OWN = 0.7  # log odds from which a colour is the object's own
 _BLOCK = np.ones((3, 3), np.uint8)
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.rules.runs import reason
+from tests.rules.runs import events_of, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import (
     Binding,
@@ -23,8 +23,10 @@ from visup.agent import (
     Verdict,
 )
 from visup.rules.presence.objects import ObjectReasoner, ObjectSettings
+from visup.rules.presence.settings import PresenceSettings
 
 S = ObjectSettings()
+P = PresenceSettings()
 THERE = box_region(7, (20, 20, 60, 40))
 assert THERE is not None
 HIDDEN = ObjectBelief(
@@ -85,3 +87,31 @@ def test_what_is_recognised_by_its_looks_is_nobodys_part_and_comes_back_as_itsel
     mind = reason(looks())[-1].mind
     named = {b.name: b.id for b in mind.objects.values() if b.confirmed}
     assert named == {"tray": 1, "arm": 2}
+
+
+def entered_at(names: dict[int, list[tuple[str, float]]], speed: float) -> float | None:
+    """When region 2 has entered, which comes at 3 s, inside the image, beside a tray at rest."""
+
+    def looks() -> Iterator[Observation]:
+        for i in range(150):
+            tray = box_region(1, (300, 220, 40, 30))
+            now = i / 25 - 3.0
+            arm = box_region(2, (60 + speed * now, 60, 80, 50)) if now >= 0 else None
+            moving = replace(arm, velocity=(speed, 0.0), velocity_sigma=4.0) if arm else None
+            yield seen(i, [tray, moving], names=names)
+
+    told = events_of(reason(looks()), ["entry", "noticed"])
+    return next((t for _, who, t in told if who == 2), None)
+
+
+def test_what_is_recognised_and_moves_enters_at_once() -> None:
+    tray, arm = ("tray", 0.9), ("arm", 0.9)
+    sightings_s = P.least_sightings / 25
+    known = entered_at({1: [tray], 2: [arm]}, 40.0)
+    assert known == pytest.approx(3.0 + sightings_s, abs=0.05)
+    at_rest = entered_at({1: [tray], 2: [arm]}, 0.0)
+    assert at_rest == pytest.approx(3.0 + P.entry_inside_s, abs=0.1)
+    unknown = entered_at({1: [tray]}, 40.0)
+    assert unknown == pytest.approx(3.0 + P.entry_inside_s, abs=0.1)
+    again = entered_at({1: [tray], 2: [tray]}, 40.0)
+    assert again is None or again >= 3.0 + P.entry_inside_s - 0.1
