@@ -101,9 +101,11 @@ def test_what_the_carrier_touches_until_it_has_drawn_back_is_no_meeting(
     assert {m.pair for m in meetings} == {HELD, PLACED} | ({beyond} if counted else set())
 
 
-def lying(name: str, share: float) -> RunTrace:
-    """A part comes to the fixture, meets it after 6 s and lies with a share of its box over it."""
-    boxes = {FIXTURE: (100, 100, 60, 60), PART: (160 - round(40 * share), 100, 40, 40)}
+def lying(name: str, share: float, down: int = 0) -> RunTrace:
+    """A part comes to the fixture, meets it after 6 s and lies with a share of its width over it.
+
+    `down` is how far below the fixture's upper edge its own one is, pixels."""
+    boxes = {FIXTURE: (100, 100, 60, 60), PART: (160 - round(40 * share), 100 + down, 40, 40)}
     regions = {
         n: region_of(np.ones((h, w), dtype=bool), n, at=(x, y), size=(640, 480))
         for n, (x, y, w, h) in boxes.items()
@@ -141,7 +143,8 @@ def test_what_lies_beside_its_place_is_refused_though_it_touches_it() -> None:
 
 def test_where_outlines_just_touch_their_shared_outline_tells_nothing() -> None:
     rows = [[event("touching", PLACED, 6.0)]]
-    assert not list(places_of((("touching", PLACED), 0), rows, [lying("a", -0.1)], []))
+    for apart in (lying("a", -0.1), lying("a", 0.05, down=58)):  # a gap; corners that meet
+        assert not list(places_of((("touching", PLACED), 0), rows, [apart], []))
     (place,) = places_of((("touching", PLACED), 0), rows, [lying("a", 0.5)], [])
     assert isinstance(place, FinalPlace)
     # Half of its upper and lower side, one of which lies along that of the fixture, and a side.
