@@ -85,7 +85,7 @@ class AppearanceBehaviour:
             return []
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
-        bodies = [moving_body(r, scene) for r in moving]
+        bodies = [moving_body(r, scene) for r in moving] if self._tracker.seeks_new else []
         tracks = self._tracker.step(scene, lambda blob: self._id_of(blob, moving, scene), bodies)
         if not image_is_trusted(observation):
             return []

@@ -139,12 +139,11 @@ class ShapeBehaviour:
             if old is None or frame.time - old.followed < self.settings.every_s - 1e-6:
                 continue
             known = tuple(zip(old.hypotheses, old.areas, strict=True))
-            found = self._refiner.followed(frame, region, known)
-            if found is not None:
-                hypotheses, areas = tuple(h for h, _ in found), tuple(area for _, area in found)
-                self._remembered[region.id] = replace(
-                    old, followed=frame.time, hypotheses=hypotheses, areas=areas
-                )
+            found = self._refiner.followed(frame, region, known) or known
+            hypotheses, areas = tuple(h for h, _ in found), tuple(area for _, area in found)
+            self._remembered[region.id] = replace(
+                old, followed=frame.time, hypotheses=hypotheses, areas=areas
+            )
 
     def _due(
         self,

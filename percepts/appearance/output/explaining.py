@@ -63,14 +63,7 @@ def shares(region: Region, blob: Blob, scene: Scene) -> float:
 
 def moving_body(region: Region, scene: Scene) -> MovingBody:
     """A moving region in working pixels of the scene."""
-    x, y, w, h = region.bbox
-    width, height = scene.size
-    left, top = min(int(x * scene.scale), width - 1), min(int(y * scene.scale), height - 1)
-    right = min(max(left + 1, round((x + w) * scene.scale)), width)
-    bottom = min(max(top + 1, round((y + h) * scene.scale)), height)
-    size = right - left, bottom - top
-    mask = cv2.resize(region.mask.view(np.uint8), size, interpolation=cv2.INTER_AREA)
-    return MovingBody(region.id, Blob((left, top, right, bottom), np.asarray(mask) > 0), region.cut)
+    return MovingBody(region.id, _scaled(region, scene.size, scene.scale), region.cut)
 
 
 def _near(things: Sequence[Region], size: tuple[int, int]) -> tuple[Mask, float]:
@@ -88,14 +81,22 @@ def _near(things: Sequence[Region], size: tuple[int, int]) -> tuple[Mask, float]
 
 
 def _small(region: Region, shape: tuple[int, int], scale: float) -> Mask:
-    x, y, w, h = region.bbox
-    x0, y0 = min(int(x * scale), shape[1] - 1), min(int(y * scale), shape[0] - 1)
-    x1 = min(max(x0 + 1, round((x + w) * scale)), shape[1])
-    y1 = min(max(y0 + 1, round((y + h) * scale)), shape[0])
+    """(h, w) bool: a region in a picture of another scale."""
+    blob = _scaled(region, (shape[1], shape[0]), scale)
+    left, top, right, bottom = blob.window
     out = np.zeros(shape, dtype=bool)
-    part = cv2.resize(region.mask.view(np.uint8), (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-    out[y0:y1, x0:x1] = np.asarray(part) > 0
+    out[top:bottom, left:right] = blob.mask
     return out
+
+
+def _scaled(region: Region, size: tuple[int, int], scale: float) -> Blob:
+    """The pixels of a region in a picture of another scale and of a size (width, height)."""
+    x, y, w, h = region.bbox
+    x0, y0 = min(int(x * scale), size[0] - 1), min(int(y * scale), size[1] - 1)
+    x1 = min(max(x0 + 1, round((x + w) * scale)), size[0])
+    y1 = min(max(y0 + 1, round((y + h) * scale)), size[1])
+    part = cv2.resize(region.mask.view(np.uint8), (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+    return Blob((x0, y0, x1, y1), np.asarray(part) > 0)
 
 
 def _rest_of(

@@ -97,6 +97,11 @@ class ThingTracker:
         found[:, 2] /= self.scene.scale
         return found
 
+    @property
+    def seeks_new(self) -> bool:
+        """Whether an object has never been in view: only such are sought among moving bodies."""
+        return any(not t.id for t in self.tracks)
+
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far."""
         return {k: v for k, v in vars(self).items() if k not in ("views", "_alike")}
@@ -113,7 +118,7 @@ class ThingTracker:
         Args:
             scene: The frame.
             new_id: Returns the id of an object detected for the first time.
-            bodies: What moves by itself in it, as far as that is segmented.
+            bodies: What moves by itself in it, as far as that is segmented; see `seeks_new`.
 
         Returns:
             One track for each name, in the order of teaching.

@@ -95,10 +95,13 @@ class _KnownOrientations:
     surface: FollowedSurface | None
     followed: bool
 
-    def steadied(self, fits: Sequence[PoseFit]) -> list[PoseFit]:
+    def steadied(self, fits: Sequence[PoseFit]) -> tuple[list[PoseFit], FollowedSurface | None]:
         """Fits, those near an orientation that was followed with that in place of their own.
 
         A search finds an orientation again to some degrees only, which would pass for a rotation.
+
+        Returns:
+            The fits, and the surface if it tells all of their orientations.
         """
         out: dict[int, PoseFit] = {}
         for f in fits:
@@ -108,7 +111,8 @@ class _KnownOrientations:
             elif near[0] not in out:
                 still = self.orientations[near[0]]
                 out[near[0]] = replace(f, orientation=still, start=near[0])
-        return list(out.values())
+        told = all(k < len(self.orientations) for k in out)
+        return list(out.values()), self.surface if told else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -262,7 +266,7 @@ class PoseRefiner:
             return []
         overlap, surface = fits[0].overlap, None
         if known is not None and known.followed:
-            fits, surface = known.steadied(fits), known.surface
+            fits, surface = known.steadied(fits)
             first = [fits[0].orientation]
             overlap = self._search(frame, best.name, picture, first, STILL)[0].overlap
         at = _Fitted(frame, region, picture, best, frame.time, overlap)

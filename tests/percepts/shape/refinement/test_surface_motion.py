@@ -91,7 +91,19 @@ def test_a_search_that_finds_an_orientation_again_leaves_it_as_it_was_followed()
     known = Rotation.random(2, random_state=1).as_matrix()
     near = Rotation.from_rotvec([0.05, 0.0, 0.0]).as_matrix() @ known[1]
     fits = [PoseFit(near, 0.9, 0.5, 1.0, 4), PoseFit(known[0].T, 0.8, 0.5, 1.0, 3)]
-    first, second = _KnownOrientations(known, (5, 6), None, True).steadied(fits)
+    surface = begun(satellite(), known[0])
+    before = _KnownOrientations(known, (5, 6), surface, True)
+    (first, second), told = before.steadied(fits)
+    assert told is None  # the surface says nothing of the second one
+    assert before.steadied(fits[:1])[1] is surface
     assert first.start == 1
     assert np.array_equal(first.orientation, known[1])
     assert second is fits[1]
+
+
+def test_an_orientation_that_a_search_has_left_is_not_told_by_the_surface() -> None:
+    """It began from the second known one, and is far from it now: numbers alone do not tell that."""
+    known = Rotation.random(2, random_state=1).as_matrix()
+    fits = [PoseFit(known[0], 0.9, 0.5, 1.0, 0), PoseFit(known[0].T, 0.8, 0.5, 1.0, 1)]
+    surface = begun(satellite(), known[0])
+    assert _KnownOrientations(known, (5, 6), surface, True).steadied(fits)[1] is None
