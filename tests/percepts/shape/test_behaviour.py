@@ -269,3 +269,15 @@ def test_a_region_that_rests_is_matched_less_often_and_told_in_every_frame(
     other = Directive("rest", "known", {"behaviour": "shape", "region": 2, "every_s": 1.0})
     assert looks() == looks(other) == 9  # after 0.2 s, at the next other silhouette
     assert looks(rest) == 3
+
+
+def test_a_surface_that_cannot_be_followed_is_tried_no_more_often_than_silhouettes(
+    database: Counting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """2 s of one region, 25 frames a second: it is matched in the first frame alone."""
+    behaviour, tried = ShapeBehaviour(database, ShapeSettings(renew_s=9.0)), list[float]()
+    monkeypatch.setattr(behaviour._refiner, "followed", lambda frame, *_: tried.append(frame.time))
+    for index in range(50):
+        hypotheses(behaviour, index / 25, [region(ZOO["star"])])
+    assert database.queries == 1
+    assert tried == pytest.approx(np.arange(0.2, 2.0, 0.2))
