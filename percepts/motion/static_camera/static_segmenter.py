@@ -42,6 +42,7 @@ from visup.percepts.motion.static_camera.blob_track import (
 )
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
 from visup.percepts.motion.static_camera.camera_static import is_camera_static
+from visup.percepts.motion.static_camera.slow_parts import GroundBelief, SlowChange, with_slow_parts
 from visup.percepts.motion.static_camera.track_fusion import (
     FusionFrame,
     MotionEvidence,
@@ -72,6 +73,7 @@ class StaticCameraSegmenter:
     """
 
     def __init__(self) -> None:
+        self._slow = SlowChange()
         self._forget()
         self._fusion = TrackFusion()
 
@@ -80,6 +82,8 @@ class StaticCameraSegmenter:
         self._tracks: BlobTracks = ()
         self._time = self._since = self._static_s = 0.0
         self._last_key = 0
+        self._bare = GroundBelief()
+        self._slow.forget()
         self.active = False
 
     def step(
@@ -104,6 +108,7 @@ class StaticCameraSegmenter:
         Returns:
             Regions by id: those of the layers unless the camera is static.
         """
+        regions = self._completed(scene, regions, frame.size)
         fresh = [r for r in regions if not self._fusion.knows(r.id)]
         self._fusion.note(regions, frame.time, settings.memory_s)
         many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
@@ -116,6 +121,23 @@ class StaticCameraSegmenter:
         fused = FusionFrame(frame.size, foreground, evidence, many)
         out, self._tracks = self._fusion.fuse(fused, self._tracks, regions, ids)
         return out
+
+    def _completed(
+        self, scene: FrameMeasurements, regions: Sequence[Region], size: tuple[int, int]
+    ) -> tuple[Region, ...]:
+        """The regions, those older than the background with the parts of them that hardly move."""
+        old = [r for r in regions if not self.active or self._fusion.is_old(r.id)]
+        if self._static_s <= 0 or (self.active and not old):
+            self._slow.forget()
+            return tuple(regions)
+        self._slow.note(scene.image)
+        slow = self._slow.pixels() if old else None
+        if slow is None:
+            return tuple(regions)
+        known, parts = with_slow_parts(old, slow, self._bare.share, scene, size)
+        self._slow.keep(parts)
+        whole = {r.id: r for r in known}
+        return tuple(whole.get(r.id, r) for r in regions)
 
     def _foreground(
         self,
@@ -155,6 +177,7 @@ class StaticCameraSegmenter:
         reported = region_mask(regions, frame.size, shape)
         self._background = background
         reveal_background(background, image, ~reported)
+        self._bare.cover(reported)
 
     def _is_static(self, static: bool | None, seconds: float) -> bool:
         """Whether the camera is static, as far as known; otherwise the state is reset."""
@@ -173,6 +196,7 @@ class StaticCameraSegmenter:
         self._time = now
         background = match_exposure(self._background, image)
         change = foreground_mask(background, image)
+        self._bare.update(change | (background.seen_s <= 0), seconds)
         if change.mean() > FLOODED:
             self._forget()
             return None

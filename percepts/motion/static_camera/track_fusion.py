@@ -79,6 +79,10 @@ class TrackFusion:
         """Whether a region of the layers was seen recently."""
         return number in self._last
 
+    def is_old(self, number: int) -> bool:
+        """Whether a region was reported before the background was known, and is not yet shown by a blob."""
+        return number in self._old
+
     def note(self, regions: Sequence[Region], now: float, memory_s: float) -> None:
         """Record the current regions of the layers, and forget expired ones.
 

@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.percepts.motion.clips import FPS, SIZE, clip, texture, window
+from visup.agent import Frame
+from visup.percepts.motion.features.work_image import WorkImage, prepare_image
+from visup.percepts.motion.segmenter import MotionSegmenter
+from visup.percepts.motion.static_camera.slow_parts import (
+    ALWAYS_S,
+    BACK_S,
+    GroundBelief,
+    SlowChange,
+)
+
+GROUND = texture(3, SIZE)
+SKIN = texture(4, SIZE)
+YS, XS = np.mgrid[: SIZE[0], : SIZE[1]]
+BODY = np.hypot(XS - 120, YS - 80) < 40
+
+
+def work_image(n: int, grey: np.ndarray) -> WorkImage:
+    noise = np.random.default_rng(n).normal(0, 1.0, grey.shape)
+    image = np.clip(grey + noise, 0, 255).astype(np.uint8)
+    return prepare_image(Frame(n, n / FPS, image), 512)
+
+
+def slow_after(greys: list[np.ndarray]) -> np.ndarray:
+    change = SlowChange()
+    for n, grey in enumerate(greys):
+        change.note(work_image(n, grey))
+    found = change.pixels()
+    assert found is not None
+    return found
+
+
+def with_body(shift: float) -> np.ndarray:
+    cover = np.clip(40.5 - np.hypot(XS - 120 - shift, YS - 80), 0, 1)
+    return np.asarray(GROUND * (1 - cover) + window(SKIN, -shift, 0, SIZE) * cover)
+
+
+@pytest.mark.parametrize("px_per_s", [1.0, 3.0])
+def test_a_body_that_shifts_by_parts_of_a_pixel_changes_slowly(px_per_s: float) -> None:
+    slow = slow_after([with_body(px_per_s * n / FPS) for n in range(20)])
+    near = cv2.dilate(BODY.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    assert slow[BODY].mean() > 0.3
+    assert slow[~near].mean() < 0.01
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.01])
+def test_noise_leaves_and_exposure_change_nothing_slowly(gain: float) -> None:
+    rng = np.random.default_rng(0)
+
+    def trembling(n: int) -> np.ndarray:
+        x, y = rng.normal(0, 1.5, 2).tolist()
+        return np.asarray(np.where(BODY, window(SKIN, x, y, SIZE), GROUND) * gain**n * 0.7)
+
+    slow = slow_after([trembling(n) for n in range(25)])
+    assert slow.mean() < 0.03
+
+
+def test_what_was_uncovered_and_rests_since_does_not_change_slowly() -> None:
+    slow = slow_after([with_body(0.0)] * 12 + [GROUND.astype(np.float64)] * 5)
+    assert slow[BODY].mean() < 0.1
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.booleans(), min_size=1, max_size=60))
+def test_ground_is_the_surer_the_longer_it_is_seen_and_soon_after_it_was_hidden(
+    hidden: list[bool],
+) -> None:
+    belief, step, seen_s = GroundBelief(), 1 / FPS, 0.0
+    for now in hidden:
+        belief.update(np.array([[now]]), step)
+        seen_s = 0.0 if now else seen_s + step
+        was = any(hidden)
+        assert belief.share is not None
+        at_most, at_least = min(seen_s / BACK_S, 1), min(seen_s / ALWAYS_S, 1)
+        assert at_least - 1e-4 <= belief.share[0, 0] <= at_most + 1e-4
+        if was and now:
+            assert belief.share[0, 0] == 0
+
+
+def test_what_is_reported_is_no_bare_ground() -> None:
+    belief = GroundBelief()
+    for _ in range(80):
+        belief.update(np.zeros((2, 2), dtype=bool), 1 / FPS)
+    belief.cover(np.eye(2, dtype=bool))
+    assert belief.share is not None
+    assert np.allclose(belief.share, 1 - np.eye(2), atol=1e-5)
+
+
+def test_a_body_is_seen_whole_though_only_a_part_of_it_moves() -> None:
+    def arm(n: int) -> tuple[float, float]:
+        return 120 + 22 * np.sin(1.5 * n / FPS), 52.0
+
+    def trunk(n: int) -> tuple[float, float]:
+        return 120 + 0.6 * np.sin(3 * n / FPS), 100.0
+
+    ground, skin = texture(6, (400, 600), 20, 140), texture(5, (400, 600), 120, 250)
+    segmenter = MotionSegmenter()
+    shares = []
+    for shot in clip(ground, lambda _: (50, 50), [(trunk, 34, skin), (arm, 20, skin)], 24):
+        whole = shot.masks[0] | shot.masks[1]
+        seen = np.zeros(SIZE, dtype=bool)
+        for r in segmenter.step(shot.frame):
+            seen |= r.full_mask(shot.frame.size)
+        shares.append((seen & whole).sum() / (seen | whole).sum())
+    # Without the change it is a third throughout, the arm; and what was found does not flicker.
+    assert min(shares[12:]) > 0.8
