@@ -176,8 +176,8 @@ def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) 
     if bare is not None:
         seen = cv2.resize(bare, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
         ground = ground + BARE * cells.mean(np.asarray(seen, np.float32))
-    rates = (np.asarray(r, np.float32) for r in (OWN * mine + CHANGED * change, ground))
-    share = _random_walk(*rates, cells)
+    body = np.asarray(OWN * mine + CHANGED * change, np.float32)
+    share = _random_walk(body, np.asarray(ground, np.float32), cells)
     inside = (cells.paint(share > 0.5) > 0) | own
     count, labels = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
     touched = np.zeros(count, dtype=bool)
