@@ -171,7 +171,11 @@ class Advance:
             t.entered for t in transitions if not (self._goes_round(t) or _waits(t)) and t.entered
         ]
         entries, met = observed_entries(
-            (hypothesis.entries, hypothesis.met), possible, self._entry, self.now
+            (hypothesis.entries, hypothesis.met),
+            possible,
+            self._entry,
+            self.now,
+            refuted=lambda step: self.observe(step).passes,
         )
         return replace(hypothesis, entries=entries, met=met)
 

@@ -31,6 +31,7 @@ class ActionObservation:
         pauses: All pauses of the task so far.
         absent: Whether one of its actors is optional and has no object: then the step is not due.
         moves_on: Whether it is a contact at which neither has slowed down yet.
+        passes: Whether it would begin by a contact, but one of the two only passes the other, as it is known now.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -47,6 +48,7 @@ class ActionObservation:
     pauses: PauseRecord = NO_PAUSES
     absent: bool = False
     moves_on: bool = False
+    passes: bool = False
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:
         """Seconds from one time to another in which the work on a step was not paused."""

@@ -69,6 +69,7 @@ class RelationLookup:
         self._beats: dict[str, tuple[Beats, Truth]] = {}
         self._evaluated: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._passes: dict[tuple[int, ...], bool] = {}
         self._sudden = SuddenTrends(mind)
         self._queried: set[str] = set()
         self._after: dict[str, float] = {}
@@ -90,8 +91,7 @@ class RelationLookup:
 
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
-        meets = name == "touching" and found is not None and found.truth is Truth.TRUE
-        if meets and found is not None and goes_past(self._mind, objects, self._rests):
+        if name == "touching" and found is not None and self.passes(objects):
             return replace(found, truth=Truth.UNKNOWN)
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
@@ -112,6 +112,13 @@ class RelationLookup:
             "rests", objects, Truth.UNKNOWN if math.isnan(speed) else truth_if(slow)
         )
         return rest.truth is Truth.TRUE and self.time - rest.since >= REST_S - 1e-9
+
+    def passes(self, objects: tuple[int, ...]) -> bool:
+        """Whether outlines meet only because one of two passes the other, or is carried past it."""
+        if objects not in self._passes:
+            meets = self._mind.truth("touching", *objects) is Truth.TRUE
+            self._passes[objects] = meets and goes_past(self._mind, objects, self._rests)
+        return self._passes[objects]
 
     def moves_on(self, objects: tuple[int, ...]) -> bool:
         """Whether neither of two whose outlines meet has slowed down at the other."""
@@ -263,6 +270,7 @@ def observe(
         sudden=sudden,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
+        passes=not set(CONTACTS).isdisjoint(meaning.begins) and relations.passes(ids),
     )
 
 

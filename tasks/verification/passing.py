@@ -31,7 +31,8 @@ def goes_past(
     if held := holds_on(mind, objects):
         contact = _contact(mind, objects)
         on = contact is not None and (contact.passing or not contact.known)
-        return on and not all(gapes(mind, *other) for other in held)
+        if not all(gapes(mind, *other) for other in held):
+            return on
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
