@@ -23,7 +23,7 @@ from visup.tasks.verification.observation import (
     ActionObservation,
     Kept,
 )
-from visup.tasks.verification.passing import gapes, goes_past, moves_on
+from visup.tasks.verification.passing import gapes, goes_past, moves_on, stopped_at
 from visup.tasks.verification.pauses import PauseRecord
 from visup.tasks.verification.sudden import SuddenTrends
 
@@ -93,6 +93,8 @@ class RelationLookup:
         found = self._mind.relation(name, *objects)
         if name == "touching" and found is not None and self.passes(objects):
             return replace(found, truth=Truth.UNKNOWN)
+        if name == "touching" and found is not None and found.truth is Truth.TRUE:
+            found = replace(found, since=max(found.since, stopped_at(self._mind, objects)))
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
             found is not None

@@ -6,6 +6,7 @@ everything in its way.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from visup.agent import Mind, Truth
@@ -47,6 +48,12 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
     contact = _contact(mind, objects)
     unsettled = contact is not None and contact.settled_since is None
     return unsettled and not holds_on(mind, objects)
+
+
+def stopped_at(mind: Mind, objects: tuple[int, ...]) -> float:
+    """When one of two whose outlines meet ceased to pass the other, seconds; minus infinity if it did not."""
+    contact = _contact(mind, objects)
+    return -math.inf if contact is None or contact.passing else contact.changed_at
 
 
 def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
