@@ -109,6 +109,10 @@ class Advance:
     def _all_over(self, transition: OpenTransition) -> bool:
         return all(self.steps.over(x) for x in transition.left)
 
+    def _missed(self, transition: OpenTransition) -> bool:
+        """Whether all steps that a transition completes are over as one has gone past the other."""
+        return all(x.payload.held and self.observe(x.step).past for x in transition.left)
+
     def _goes_on(self, transition: OpenTransition) -> bool:
         """Whether the steps that a transition completes have lasted as long as required and still hold."""
         return any(
@@ -124,7 +128,7 @@ class Advance:
         self, hypothesis: TaskHypothesis, transition: OpenTransition, ways: int
     ) -> Support:
         """How strongly an observation supports a transition, given the number of alternatives."""
-        finished = self._all_over(transition)
+        finished = self._all_over(transition) or self._missed(transition)
         if self._goes_round(transition):
             return Support.NONE
         goes_on = all(_goes_on(s, transition.left) for s in transition.entered)
@@ -213,11 +217,11 @@ class Advance:
         return self.steps.hmm.pass_over ** (2 if missed else 1)
 
     def _moved(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> TaskHypothesis:
-        opened = self._opens(hypothesis, transition)
+        opened, missed = self._opens(hypothesis, transition), self._missed(transition)
         state = transition.taken(leaves(hypothesis.state), entered(self.now))
         begun = set(transition.transition.begun)
         under_way = [
-            self._begun(self._after(self._in_turn(x, transition), transition), opened)
+            self._begun(self._after(self._in_turn(x, transition), transition), opened, missed)
             if i in begun
             else x
             for i, x in enumerate(leaves(state))
@@ -238,7 +242,7 @@ class Advance:
             self._past(hypothesis, transition, {x.step.stage for x in under_way}),
             backpointer=extended(hypothesis.backpointer, left, self.now, begun_at),
             gone_on=True,
-            lasting="" if opened else self._lasting(transition, {x.step.stage for x in under_way}),
+            lasting="" if opened or missed else self._lasting(transition, {x.step.stage for x in under_way}),
         )
 
     def _lasting(self, transition: OpenTransition, under_way: Collection[str]) -> str:
@@ -324,10 +328,12 @@ class Advance:
         at = left.payload.fulfilled_at if by_itself else left.payload.helped_at
         return self.now if at is None else at
 
-    def _begun(self, leaf: Leaf[StepMonitor], opened: bool) -> Leaf[StepMonitor]:
+    def _begun(self, leaf: Leaf[StepMonitor], opened: bool, missed: bool) -> Leaf[StepMonitor]:
         """A step that begins now, with its first observation."""
         if opened:
             leaf = replace(leaf, payload=replace(leaf.payload, opened=True))
+        if missed:
+            leaf = replace(leaf, payload=replace(leaf.payload, begun=self.now))
         return self.steps.looked_at(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
 
     def _past(

@@ -23,7 +23,7 @@ from visup.tasks.verification.observation import (
     ActionObservation,
     Kept,
 )
-from visup.tasks.verification.passing import gapes, goes_past, moves_on, stopped_at
+from visup.tasks.verification.passing import gapes, goes_past, moves_on, put_down, stopped_at, went_past
 from visup.tasks.verification.pauses import PauseRecord
 from visup.tasks.verification.sudden import SuddenTrends
 
@@ -121,6 +121,18 @@ class RelationLookup:
             meets = self._mind.truth("touching", *objects) is Truth.TRUE
             self._passes[objects] = meets and goes_past(self._mind, objects, self._rests)
         return self._passes[objects]
+
+    def is_past(self, action: str, objects: tuple[int, ...], contrary: Relation | None) -> bool:
+        """Whether an approach or a carrying is over without what it was for.
+
+        One has gone past the other, or what was carried has been put down.
+        """
+        if action == "moving_together":
+            return any(put_down(self._mind, o) for o in (objects, objects[::-1]))
+        if action != "converging":
+            return False
+        recedes = contrary is not None and contrary.name == "diverging"
+        return put_down(self._mind, objects) or (recedes and went_past(self._mind, objects))
 
     def moves_on(self, objects: tuple[int, ...]) -> bool:
         """Whether neither of two whose outlines meet has slowed down at the other."""
@@ -260,6 +272,8 @@ def observe(
     contrary = relations.first_given(meaning.contrary, ids)
     if contrary is not None and relations.explains_away(contrary.name, meaning.name, ids):
         contrary = None
+    past = relations.is_past(meaning.name, ids, contrary)
+    contrary = None if past else contrary
     known = (*meaning.helps, *meaning.contrary)
     entry, sudden = relations.begun(meaning.begins, ids)
     return ActionObservation(
@@ -272,6 +286,7 @@ def observe(
         sudden=sudden,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
+        past=past,
         passes=not set(CONTACTS).isdisjoint(meaning.begins) and relations.passes(ids),
     )
 
