@@ -31,8 +31,8 @@ class ActionObservation:
         pauses: All pauses of the task so far.
         absent: Whether one of its actors is optional and has no object: then the step is not due.
         moves_on: Whether it is a contact at which neither has slowed down yet.
-        past: Whether it is an approach that is over as one has gone past the other.
-        passes: Whether it would begin by a contact, but one of the two only passes the other, as it is known now.
+        unreached: Since when it is an approach, or carrying, that is over without what it was for, or None.
+        passes_by: Whether it would begin by a contact, but one of the two is known now to pass by the other.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -49,8 +49,8 @@ class ActionObservation:
     pauses: PauseRecord = NO_PAUSES
     absent: bool = False
     moves_on: bool = False
-    passes: bool = False
-    past: bool = False
+    passes_by: bool = False
+    unreached: float | None = None
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:
         """Seconds from one time to another in which the work on a step was not paused."""

@@ -14,7 +14,7 @@ import numpy as np
 from visup.agent import Mind, Truth
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
-from visup.rules.geometry.regions import DIRECTIONS, image_diagonal
+from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
 from visup.rules.relations.reasoner import kinematics, sample_window
 
 LEAST_SAMPLES = 5
@@ -26,8 +26,14 @@ PAST = 0.05
 STRAIGHT = 0.85
 """Least distance of its ends as a share of its length: who turns back comes near where he was."""
 
-RESTING = 0.01
-"""Speed below which a body rests, image diagonals per second: what is dropped is faster."""
+ON = 0.5
+"""Least speed at the end of such a path, as a share of the mean one."""
+
+BEYOND = 0.2
+"""Least share of such a path that lies beyond the nearest point."""
+
+RESTED_S = 0.6
+"""How long what is put down has rested, seconds."""
 
 LET_GO_GAP = 0.01
 """Gap of two coupled bodies from which on one has let go of the other, image diagonals."""
@@ -65,35 +71,53 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
 
 
 def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether one of two has just gone past the other, rather than turned back before it.
+    """Whether one of two has just gone past the other and moves on, rather than turned back before it.
 
-    Then their relative path of the last second or so is straight, and its nearest point lies within it.
+    Then their relative path of the last second or so is straight, and its nearest point lies well within it.
+    What is carried past something may be on a detour.
     """
-    window = sample_window(mind)
-    if len(objects) != 2 or not set(objects) <= set(window.ids) or holds_on(mind, objects):
+    if len(objects) != 2 or holds_on(mind, objects):
         return False
-    i, j = (window.ids.index(o) for o in objects)
-    support = window.steady_support
-    # The mean support point of an outline (its Steiner point, but for a factor) moves as the body does.
-    path = 2.0 * (support[:, i] - support[:, j]) @ DIRECTIONS / len(DIRECTIONS)
+    diagonal = image_diagonal(mind.frame_size)
+    path = _centres(mind, objects[0]) - _centres(mind, objects[1])
     path = path[~np.isnan(path).any(axis=1)]
     if len(path) < LEAST_SAMPLES:
         return False
+    thirds = path[[0, len(path) // 3, 2 * len(path) // 3, -1]]
+    walked = np.hypot(*np.diff(thirds, axis=0).T)
     way = path[-1] - path[0]
     length = float(np.hypot(*way))
-    if length < PAST * image_diagonal(mind.frame_size):
+    if length < PAST * diagonal or length < STRAIGHT * float(walked.sum()):
         return False
-    third = path[:: max(1, (len(path) - 1) // 3)]
-    walked = float(np.hypot(*np.diff(third, axis=0).T).sum())
-    return length > STRAIGHT * walked and float(path[0] @ way) < 0.0 < float(path[-1] @ way)
+    along = path @ way / length
+    moves_on = float(walked[-1]) > ON * length / 3
+    return moves_on and float(along[0]) < 0.0 and float(along[-1]) > BEYOND * length
 
 
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether the first of some objects rests, and all that held it has let go of it."""
+    """Whether the first of some objects has rested for a while, and all that held it lets go of it now.
+
+    What is dropped falls first.
+    """
     first = objects[0]
     held = [c.objects for c in mind.couplings if first in c.objects]
-    rests = kinematics(mind).one("speed", first) < RESTING * image_diagonal(mind.frame_size)
-    return bool(held) and rests and all(gapes(mind, *pair) for pair in held)
+    if not held or not all(gapes(mind, *pair) for pair in held):
+        return False
+    path = _centres(mind, first)[sample_window(mind).times > mind.time - RESTED_S]
+    path = path[~np.isnan(path).any(axis=1)]
+    return len(path) > 1 and float(np.ptp(path, axis=0).max()) < LET_GO_GAP * image_diagonal(
+        mind.frame_size
+    )
+
+
+def _centres(mind: Mind, body: int) -> Floats:
+    """(T, 2) pixels: Steiner point of an outline relative to the static scene; NaN where unseen."""
+    window = sample_window(mind)
+    if body not in window.ids:
+        return np.full((len(window.times), 2), np.nan)
+    support = window.steady_support[:, window.ids.index(body)]
+    centres: Floats = 2.0 / len(DIRECTIONS) * support @ DIRECTIONS
+    return centres
 
 
 def stopped_at(mind: Mind, objects: tuple[int, ...]) -> float:
