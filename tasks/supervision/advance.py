@@ -188,7 +188,7 @@ class Advance:
             possible,
             self._entry,
             self.now,
-            refuted=lambda step: self.observe(step).passes_by,
+            refuted=lambda step: self.observe(step).carried_past,
         )
         return replace(hypothesis, entries=entries, met=met)
 

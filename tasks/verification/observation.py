@@ -32,7 +32,7 @@ class ActionObservation:
         absent: Whether one of its actors is optional and has no object: then the step is not due.
         moves_on: Whether it is a contact at which neither has slowed down yet.
         unreached: Since when it is an approach, or carrying, that is over without what it was for, or None.
-        passes_by: Whether it would begin by a contact, but one of the two is known now to pass by the other.
+        carried_past: Whether it would begin by a contact, but one of the two is known now to be carried past.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -49,7 +49,7 @@ class ActionObservation:
     pauses: PauseRecord = NO_PAUSES
     absent: bool = False
     moves_on: bool = False
-    passes_by: bool = False
+    carried_past: bool = False
     unreached: float | None = None
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:

@@ -26,6 +26,7 @@ from visup.tasks.verification.observation import (
 from visup.tasks.verification.passing import (
     gapes,
     goes_past,
+    holds_on,
     moves_on,
     put_down,
     stopped_at,
@@ -128,6 +129,10 @@ class RelationLookup:
             meets = self._mind.truth("touching", *objects) is Truth.TRUE
             self._passed_by[objects] = meets and goes_past(self._mind, objects, self._rests)
         return self._passed_by[objects]
+
+    def carried_past(self, objects: tuple[int, ...]) -> bool:
+        """Whether outlines meet only because one of two is carried past the other."""
+        return bool(holds_on(self._mind, objects)) and self.passes_by(objects)
 
     def unreached(
         self, action: str, objects: tuple[int, ...], contrary: Relation | None
@@ -296,7 +301,7 @@ def observe(
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
         unreached=unreached,
-        passes_by=not set(CONTACTS).isdisjoint(meaning.begins) and relations.passes_by(ids),
+        carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
     )
 
 

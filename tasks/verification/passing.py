@@ -10,12 +10,14 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import Mind, Truth
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
 from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
 from visup.rules.relations.reasoner import kinematics, sample_window
+from visup.rules.relations.samples import SampleWindow
 
 LEAST_SAMPLES = 5
 """Fewest samples of a relative path."""
@@ -54,6 +56,8 @@ def goes_past(
         on = contact is not None and (contact.passing or not contact.known)
         if not all(gapes(mind, *other) for other in held):
             return on
+        # What is let go of falls onto what it met, unless it has crossed that by more than its own size.
+        return on and contact is not None and contact.path > _size(mind, objects)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
@@ -95,19 +99,32 @@ def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
 
 
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether the first of some objects has rested for a while, and all that held it lets go of it now.
+    """Whether the first of some objects rests, and all that held it have let go of it just now.
 
     What is dropped falls first.
     """
-    first = objects[0]
+    first, window = objects[0], sample_window(mind)
     held = [c.objects for c in mind.couplings if first in c.objects]
-    if not held or not all(gapes(mind, *pair) for pair in held):
+    if not held or first not in window.ids:
         return False
-    path = _centres(mind, first)[sample_window(mind).times > mind.time - RESTED_S]
+    recent = window.times > mind.time - RESTED_S
+    least = LET_GO_GAP * image_diagonal(mind.frame_size)
+    path = _centres(mind, first)[recent]
     path = path[~np.isnan(path).any(axis=1)]
-    return len(path) > 1 and float(np.ptp(path, axis=0).max()) < LET_GO_GAP * image_diagonal(
-        mind.frame_size
-    )
+    rests = len(path) > 1 and float(np.ptp(path, axis=0).max()) < least
+    opened = all(_opened(window, pair, recent) > least for pair in held)
+    # An outline that leaps opens a gap, too, but nobody moves.
+    return rests and opened and all(mind.truth("coupled", *p) is not Truth.TRUE for p in held)
+
+
+def _opened(window: SampleWindow, pair: tuple[int, ...], recent: NDArray[np.bool_]) -> float:
+    """By how much the gap of two bodies has grown lately, pixels; 0 if unknown."""
+    if not set(pair) <= set(window.ids):
+        return 0.0
+    i, j = (window.ids.index(o) for o in pair)
+    distance = window.separation[recent, i, j]
+    distance = np.maximum(distance[~np.isnan(distance)], 0.0)
+    return float(distance[-1] - distance.min()) if len(distance) else 0.0
 
 
 def _centres(mind: Mind, body: int) -> Floats:
@@ -135,6 +152,11 @@ def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
 def gapes(mind: Mind, a: int, b: int) -> bool:
     """Whether there is a gap between the outlines of two bodies; False if unknown."""
     return kinematics(mind).pair("gap", a, b) > LET_GO_GAP * image_diagonal(mind.frame_size)
+
+
+def _size(mind: Mind, objects: tuple[int, ...]) -> float:
+    """Size of the smaller one of two bodies, pixels."""
+    return min(float(np.sqrt(mind.objects[i].region.area)) for i in objects)
 
 
 def _contact(mind: Mind, objects: tuple[int, ...]) -> OutlineContact | None:
