@@ -43,8 +43,9 @@ def test_steps_have_met_if_both_held_since_either_was_last_refuted(
     for now, (one, other, refuted) in enumerate(moments):
         true = {first: one and not refuted, second: other}
         entry = {s: Relation(s.action, (1,), Truth.TRUE, now) for s in true if true[s]}
+        none = {first} if refuted else set[TaskStep]()
         found = observed_entries(
-            found, [(first, second)], entry.get, now, refuted=lambda s, r=refuted: r and s == first
+            found, [(first, second)], entry.get, now, refuted=none.__contains__
         )
     anew = max((i for i, m in enumerate(moments) if m[2]), default=-1) + 1
     together = any(a and b for a, b, _ in moments[anew:])
