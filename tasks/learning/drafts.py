@@ -171,9 +171,14 @@ class Draft:
         """A stage after the last contact, which may be in passing; empty if no more is known than that."""
         final, facts = final_of(self.plan), self._settled()
         if self.release is not None:
-            lasting = map(action_text, (*self.release.kept, self.release.parted))
-            asked = " & ".join([*lasting, *facts])
-            return f"<{STAY}> ::= ({asked}) for {PLACED_S:g} s  # in {all_text(len(self.runs))}"
+            # What shares an outline touches, though it may be told to pass as long as a third one moves there.
+            placed = {p.contact for p in self.places}
+            lasting = [s for s in self.release.kept if s not in placed]
+            asked = " & ".join([*map(action_text, (*lasting, self.release.parted)), *facts])
+            # It holds already where the retreat was seen.
+            asked = f"({asked})" if " & " in asked else asked
+            lasts = f"already {asked} for {PLACED_S:g} s"
+            return f"<{STAY}> ::= {lasts}  # in {all_text(len(self.runs))}"
         if final is None or not facts:
             return ""
         held = self._held(final)
