@@ -171,7 +171,7 @@ class Draft:
         """A stage after the last contact, which may be in passing; empty if no more is known than that."""
         final, facts = final_of(self.plan), self._settled()
         if self.release is not None:
-            # What shares an outline touches, though it may be told to pass as long as a third one moves there.
+            # What shares an outline touches, though it may seem to pass while a third one moves there.
             placed = {p.contact for p in self.places}
             lasting = [s for s in self.release.kept if s not in placed]
             asked = " & ".join([*map(action_text, (*lasting, self.release.parted)), *facts])
