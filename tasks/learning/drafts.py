@@ -157,6 +157,9 @@ class Draft:
             word = "already " if already else ""
             return " | ".join(f"{word}{action_text(part)}{clause}" for part in item.parts)
         action = action_text(item)
+        if self.release is not None and item == self.release.parted:
+            # Who has let go is apart, too, which may be seen before or after.
+            return f"{action}{clause} | {action_text(('apart', item[1]))}{clause}"
         if isinstance(item, Joint) and (clause or already):
             action = f"({action})"
         return f"{'already ' if already else ''}{action}{clause}"
@@ -174,7 +177,7 @@ class Draft:
             # What shares an outline touches, though it may seem to pass while a third one moves there.
             placed = {p.contact for p in self.places}
             lasting = [s for s in self.release.kept if s not in placed]
-            asked = " & ".join([*map(action_text, (*lasting, self.release.parted)), *facts])
+            asked = " & ".join([*map(action_text, lasting), *facts])
             # It holds already where the retreat was seen.
             asked = f"({asked})" if " & " in asked else asked
             lasts = f"already {asked} for {PLACED_S:g} s"

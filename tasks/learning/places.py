@@ -40,16 +40,16 @@ from visup.tasks.learning.traces import Happening, RunTrace, Span, Symbol, names
 FAR_LESS = 0.7
 """A pair is elsewhere when it shares less than this part of the least shared outline in a good run.
 
-Of rendered boats, by the median at the end of a run (five seeds), those that come alongside share 0.83 of the
-least of three and more, as they bob down to 0.69; those that stop short or leave 0.62 and less, and once 0.75."""
+Of rendered boats, by the median at the end of a run (five seeds), those that come alongside share 0.83 of
+the least of three and more, bobbing down to 0.69; those that stop short or leave 0.62 and less, once 0.75."""
 MOST_SHARED = 0.6
 """More shared outline in a good run counts as this much: 0.42 of an outline is asked for at most. What
 lies in front of its place shares 0.45 of its outline or all of it, as the camera stands (*pick*)."""
 LEAST_SHARED = 0.25
 """Less shared outline in a good run than a side of a square tells nothing: a corner or an end meets."""
 PLACED_S = 0.2
-"""How long two must be elsewhere, or after a release where they belong, seconds: outlines jump while one is half
-hidden."""
+"""How long two must be elsewhere, or after a release where they belong, seconds: outlines jump while one is
+half hidden."""
 SETTLED_S = 2.0
 """What meets in the last stage lies where it belongs this long before the end of a run, seconds."""
 
@@ -131,7 +131,7 @@ class Release:
     """A plan that ends with a release: who has been let go, and who is in contact ever after.
 
     Drawing back is a motion in passing. It may be over before the release is believed, or lead past the
-    other again in the image, while the state after it lasts.
+    other again in the image, while what others have come to by then lasts.
 
     Attributes:
         parted: The release.
