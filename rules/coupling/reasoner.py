@@ -272,14 +272,15 @@ class CouplingReasoner(ExplainableReasoner):
         mind: Mind,
     ) -> bool:
         """Whether one of two moves on, while the other all but rests, though they are still near."""
-        s, diagonal = self.settings, image_diagonal(mind.frame_size)
+        s, diagonal, now = self.settings, image_diagonal(mind.frame_size), kinematics(mind)
         speed = 0.0 if found is None else float(np.hypot(*found.velocity))
+        if seen.gap > s.near * diagonal:  # no longer followed, though they may still seem to touch
+            speed = float(np.nan_to_num(now.pair("relative_speed", *seen.pair)))
         passing = contact is not None and contact.passing
         known = contact is not None or seen.touching == NO
         if not known or not (passing or speed > s.contact.passing * diagonal):
             return False
         least = max(s.relations.still_speed * diagonal, s.still_share * speed)
-        now = kinematics(mind)
         return any(now.one("speed", i) < least for i in seen.pair)
 
     def _coupling(

@@ -19,16 +19,20 @@ def observed_entries(
     possible: Iterable[tuple[TaskStep, ...]],
     entry: Callable[[TaskStep], Relation | None],
     now: float,
+    *,
+    refuted: Callable[[TaskStep], bool] = lambda step: False,
 ) -> tuple[StepEntries, Meetings]:
-    """Add the entries that are observed now.
+    """Add the entries that are observed now, and drop those that have turned out to be none.
 
     Args:
         before: Those so far.
         possible: The steps that may begin next, those that begin together in one tuple.
         entry: The relation by which the beginning of a step is observed now, or None.
         now: Seconds.
+        refuted: Whether it is known now that a step has not begun, whatever was observed before.
     """
-    entries, met = dict(before[0]), dict(before[1])
+    entries = {s: span for s, span in before[0] if not refuted(s)}
+    met = {steps: at for steps, at in before[1] if all(s in entries for s in steps)}
     for steps in possible:
         found = ((s, entry(s)) for s in steps)
         entries |= {s: (r.since, now) for s, r in found if r is not None}

@@ -27,7 +27,7 @@ from visup.tasks.learning.order import (
     symbols_of,
 )
 from visup.tasks.learning.periods import Period, course_of
-from visup.tasks.learning.places import FinalPlace
+from visup.tasks.learning.places import PLACED_S, FinalPlace, Release
 from visup.tasks.learning.precedence import Precedence, invariants
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.rests import Halt, Rest
@@ -78,6 +78,7 @@ class Draft:
         order: Contacts that must not come too early.
         places: How those that were brought together lie in the end.
         halt: Who comes to rest in the last stage.
+        release: The release with which it ends.
     """
 
     name: str
@@ -94,13 +95,16 @@ class Draft:
     order: tuple[Precedence, ...] = ()
     places: tuple[FinalPlace, ...] = ()
     halt: Halt | None = None
+    release: Release | None = None
 
     def text(self) -> str:
         """The task file."""
         names = stage_names(self.plan)
         lines = [f"# {self.name}: learned from {runs_text(len(self.runs))}"]
         staying = self._staying()
-        course = _course(self.plan, names) + (f" <{STAY}>" if staying else "")
+        # A motion in passing may be left out where what lasts after it is asked for.
+        last = ("?" if self.release is not None else "") + (f" <{STAY}>" if staying else "")
+        course = _course(self.plan, names) + last
         lines.append(f"<{self.name}> ::= {course}")
         lines += [self._stage(o, name) for o, name in names.items()]
         lines += [staying] if staying else []
@@ -110,7 +114,7 @@ class Draft:
         ]
         seen = f"  # in {all_text(len(self.runs))}"
         lines += [line + seen for line in invariants(self.order, names)]
-        early = [p for p in self.places if not p.of_last]
+        early = [p for p in self.places if not (p.of_last or self.release)]
         lines += [p.invariant(names[p.stage], all_text(len(self.runs))) for p in early]
         lines += [rest.invariant(all_text(len(self.runs))) for rest in self.rests]
         return "\n".join(lines) + "\n"
@@ -138,6 +142,8 @@ class Draft:
             course = self._asked(occurrence, f" for {held:g} s" if held else "")
             return f"<{name}> ::= {course}  # {seen}"
         took = f"{min(spans):.1f} to {max(spans):.1f} s"
+        if self.release is not None and self._last(occurrence):
+            return f"<{name}> ::= {action_text(item)}  # {seen}"
         course = self._asked(occurrence, f" within {deadline(spans)} s")
         return f"<{name}> ::= {course}  # {seen}, {took}"
 
@@ -151,18 +157,31 @@ class Draft:
             word = "already " if already else ""
             return " | ".join(f"{word}{action_text(part)}{clause}" for part in item.parts)
         action = action_text(item)
+        if self.release is not None and item == self.release.parted:
+            # Who has let go is apart, too, which may be seen before or after.
+            return f"{action}{clause} | {action_text(('apart', item[1]))}{clause}"
         if isinstance(item, Joint) and (clause or already):
             action = f"({action})"
         return f"{'already ' if already else ''}{action}{clause}"
 
     def _settled(self) -> list[str]:
         """What holds in the end besides the last contact: how the two lie, and that one rests."""
-        found = [f"{p.quantity} > {p.least} %" for p in self.places if p.of_last]
+        asked = (p for p in self.places if p.of_last or self.release is not None)
+        found = [f"{p.quantity} > {p.least} %" for p in asked]
         return found + ([self.halt.fact] if self.halt is not None else [])
 
     def _staying(self) -> str:
         """A stage after the last contact, which may be in passing; empty if no more is known than that."""
         final, facts = final_of(self.plan), self._settled()
+        if self.release is not None:
+            # What shares an outline touches, though it may seem to pass while a third one moves there.
+            placed = {p.contact for p in self.places}
+            lasting = [s for s in self.release.kept if s not in placed]
+            asked = " & ".join([*map(action_text, lasting), *facts])
+            # It holds already where the retreat was seen.
+            asked = f"({asked})" if " & " in asked else asked
+            lasts = f"already {asked} for {PLACED_S:g} s"
+            return f"<{STAY}> ::= {lasts}  # in {all_text(len(self.runs))}"
         if final is None or not facts:
             return ""
         held = self._held(final)

@@ -37,7 +37,7 @@ from visup.tasks.learning.order import (
     without,
 )
 from visup.tasks.learning.periods import periods_of
-from visup.tasks.learning.places import places_of, with_keeping
+from visup.tasks.learning.places import places_of, release_of, with_keeping
 from visup.tasks.learning.precedence import precedences
 from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
 from visup.tasks.learning.rests import halt_of, rests_of
@@ -106,6 +106,7 @@ def learn_task(
     plan = plan_of(folded, core, partial(_at_once, rows))
     periods = periods_of(times, rows)
     draft = Draft(name, plan, times, good, rows, declared or {}, periods=periods)
+    draft.release = release_of(plan, rows)
     results = _validated(draft, dropped)
     _require(draft, results)
     bad_verdicts = {r.name: _judge(draft, r) for r in bad}
@@ -124,6 +125,10 @@ def _validated(draft: Draft, dropped: list[str]) -> dict[str, Verdict]:
         task = parse_task(draft.text())
         found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
         refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
+        blamed = _blamed(draft, refused[0]) if refused else None
+        if refused and draft.release is not None and blamed in (None, final_of(draft.plan)):
+            draft.release = None
+            continue
         if refused and draft.periods:
             draft.periods = {}
             continue
@@ -133,7 +138,6 @@ def _validated(draft: Draft, dropped: list[str]) -> dict[str, Verdict]:
         if refused and draft.holding:
             draft.holding = False
             continue
-        blamed = _blamed(draft, refused[0]) if refused else None
         if blamed is None:
             return {name: j.verdict for name, j in found.items()}
         plan = without(draft.plan, blamed)
@@ -159,8 +163,14 @@ def _require(draft: Draft, results: Mapping[str, Verdict]) -> None:
 
 def _settle(draft: Draft, results: Mapping[str, Verdict]) -> None:
     """Require where things lie in the end, and that they rest there, unless that changes a verdict."""
-    last = _last_spans(draft)
-    draft.places = tuple(places_of(draft.plan, draft.rows, draft.runs, last)) if last else ()
+    last = (
+        draft.release.spans(draft.rows, draft.runs)
+        if draft.release is not None
+        else _last_spans(draft)
+    )
+    if last:
+        found = places_of(draft.plan, draft.rows, draft.runs, last, draft.release)
+        draft.places = tuple(found)
     if draft.places and _verdicts(draft) != dict(results):
         draft.places = ()
     final = final_of(draft.plan)

@@ -12,9 +12,10 @@ near and for how long is read from the gap over time, by the largest rectangle o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, isfinite, nan
+from statistics import median
 
 import numpy as np
 
@@ -39,18 +40,20 @@ from visup.tasks.learning.traces import Happening, RunTrace, Span, Symbol, names
 FAR_LESS = 0.7
 """A pair is elsewhere when it shares less than this part of the least shared outline in a good run.
 
-Of rendered boats (six seeds, three good runs each) those that come alongside share 0.84 of the least and
-more, those that stop short or leave 0.39 and less on four, up to 0.65 and 0.77 on two. Boxes, where a mast
-counts, overlap by 0.59 and more, and by up to 1.37."""
+Of rendered boats, by the median at the end of a run (five seeds), those that come alongside share 0.83 of
+the least of three and more, bobbing down to 0.69; those that stop short or leave 0.62 and less, once 0.75."""
 MOST_SHARED = 0.6
 """More shared outline in a good run counts as this much: 0.42 of an outline is asked for at most. What
 lies in front of its place shares 0.45 of its outline or all of it, as the camera stands (*pick*)."""
 LEAST_SHARED = 0.25
 """Less shared outline in a good run than a side of a square tells nothing: a corner or an end meets."""
 PLACED_S = 0.2
-"""How long two must be elsewhere, seconds: outlines jump while one is half hidden."""
+"""How long two must be elsewhere, or after a release where they belong, seconds: outlines jump while one is
+half hidden."""
 SETTLED_S = 2.0
 """What meets in the last stage lies where it belongs this long before the end of a run, seconds."""
+
+Row = Sequence[CourseEvent]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +98,10 @@ class FinalPlace:
 
 def places_of(
     plan: Plan,
-    rows: Sequence[Sequence[CourseEvent]],
+    rows: Sequence[Row],
     runs: Sequence[RunTrace],
     last: Sequence[Span],
+    release: Release | None = None,
 ) -> Iterator[FinalPlace]:
     """The places of those that meet and stay in contact in all runs.
 
@@ -106,37 +110,91 @@ def places_of(
         rows: The events of each run.
         runs: The runs, in the same order.
         last: When the last stage began and ended in each run, seconds.
+        release: The release with which it ends.
     """
     final = final_of(plan)
     if final is None:
         return
     ends = [(run.end - SETTLED_S, run.end) for run in runs]
-    kept = [(o, s) for o in leaves_of(plan) for s in symbols_of(o[0]) if s[0] == "touching"]
-    kept = [(o, s) for o, s in kept if all(_stays(row, s) for row in rows)]
+    kept = _kept_contacts(plan, rows)
     for occurrence, symbol in kept:
         at_last = occurrence == final
         if not any(s != symbol and set(s[1]) & set(symbol[1]) for _, s in kept):
-            seen = _least_seen(runs, symbol[1], ends if at_last else last)
+            of_run = median if at_last or release is not None else min
+            seen = _seen(runs, symbol[1], ends if at_last else last, of_run)
             if seen >= LEAST_SHARED and (symbol == occurrence[0] or not at_last):
                 yield FinalPlace(symbol, final, seen)
 
 
-def _least_seen(runs: Sequence[RunTrace], pair: Sequence[str], within: Sequence[Span]) -> float:
-    """Least shared outline of a pair in any run, 0 to 1; 0 if some run does not show it."""
-    least = [_least_shared(r.minds, pair, span) for r, span in zip(runs, within, strict=True)]
-    return min(x or 0.0 for x in least)
+@dataclass(frozen=True, slots=True)
+class Release:
+    """A plan that ends with a release: who has been let go, and who is in contact ever after.
+
+    Drawing back is a motion in passing. It may be over before the release is believed, or lead past the
+    other again in the image, while what others have come to by then lasts.
+
+    Attributes:
+        parted: The release.
+        kept: The contacts that last.
+    """
+
+    parted: Symbol
+    kept: tuple[Symbol, ...]
+
+    def spans(self, rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[Span]:
+        """From the last release, if it was not long before, to the end of each run, seconds."""
+        told = [[e.at for e in row if e.symbol == self.parted] for row in rows]
+        return [
+            (max([run.end - SETTLED_S, *times]), run.end)
+            for times, run in zip(told, runs, strict=True)
+        ]
 
 
-def _stays(row: Sequence[CourseEvent], contact: Symbol) -> bool:
+def release_of(plan: Plan, rows: Sequence[Row]) -> Release | None:
+    """The release with which a plan ends if two draw apart after it, and others stay in contact."""
+    final = final_of(plan)
+    if final is None or not isinstance(final[0], tuple) or final[0][0] != "diverging":
+        return None
+    parted = "decoupled", final[0][1]
+    kept = tuple(s for _, s in _kept_contacts(plan, rows) if s[1] != parted[1])
+    asked = any(parted in symbols_of(o[0]) for o in leaves_of(plan))
+    return Release(parted, kept) if kept and asked else None
+
+
+def _kept_contacts(plan: Plan, rows: Sequence[Row]) -> list[tuple[Occurrence, Symbol]]:
+    """The contacts of a plan that last to the end of all runs, each with its stage."""
+    met = [(o, s) for o in leaves_of(plan) for s in symbols_of(o[0]) if s[0] == "touching"]
+    return [(o, s) for o, s in met if all(_stays(row, s) for row in rows)]
+
+
+def _seen(
+    runs: Sequence[RunTrace],
+    pair: Sequence[str],
+    within: Sequence[Span],
+    of_run: Callable[[Sequence[float]], float],
+) -> float:
+    """Least shared outline of a pair in any run, 0 to 1; 0 if some run does not show it.
+
+    Args:
+        runs: The runs.
+        pair: The pair.
+        within: When to look in each run, seconds.
+        of_run: Of several values the one that counts: what floats bobs, and shares now more, now less.
+    """
+    found = [_shares(r.minds, pair, span) for r, span in zip(runs, within, strict=True)]
+    return min(of_run(shares) if shares else 0.0 for shares in found)
+
+
+def _stays(row: Row, contact: Symbol) -> bool:
     """Whether a contact lasts to the end of a run."""
     mine = [e for e in row if contact in symbols_of(e.item)]
     return bool(mine) and mine[-1].lasts
 
 
-def _least_shared(minds: Sequence[Mind], pair: Sequence[str], within: Span) -> float | None:
-    """Least shared outline of a pair in an interval, 0 to 1; None if one of them was never in view."""
+def _shares(minds: Sequence[Mind], pair: Sequence[str], within: Span) -> list[float]:
+    """The shared outlines of a pair in an interval, 0 to 1, where both are in view."""
     found = (_shared(m, pair) for m in minds if within[0] <= m.time <= within[1])
-    return min((x for x in found if x is not None), default=None)
+    return [x for x in found if x is not None]
 
 
 def _shared(mind: Mind, pair: Sequence[str]) -> float | None:

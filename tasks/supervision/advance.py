@@ -12,7 +12,12 @@ from visup.tasks.automaton.backpointers import Backpointer, behind, extended
 from visup.tasks.automaton.entries import observed_entries
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
-from visup.tasks.supervision.open_transitions import OpenTransition
+from visup.tasks.supervision.open_transitions import (
+    OpenTransition,
+    earliest_end,
+    goes_on,
+    missed,
+)
 from visup.tasks.supervision.sentences import lasted, outcome
 from visup.tasks.verification.reported import ReportedRelations, joined, with_reported
 from visup.tasks.verification.step_model import Observe, StepModel
@@ -56,17 +61,17 @@ class Advance:
         barred = tuple(t.entered for t in transitions if self._is_paused(t))
         transitions = [t for t in transitions if not self._is_paused(t)]
         hypothesis = self._met(hypothesis, transitions)
-        ends = any(t.ends and _may_end(t) for t in transitions)
+        ends = any(t.ends and t.may_end for t in transitions)
         if ends and hypothesis.finished is None:
             hypothesis = replace(hypothesis, finished=self.now)
         ways = len({t.entered for t in transitions if not t.ends})
         # A course that may end needs no further round of its last step.
-        onward = [t for t in transitions if not t.ends and not (ends and _again(t))]
+        onward = [t for t in transitions if not t.ends and not (ends and t.again)]
         found = ((t, self._support(hypothesis, t, ways)) for t in onward)
         supported = [(t, support) for t, support in found if support]
         due = 0.0  # share of another round, which waits until the last one has ceased
         if all(s <= Support.OVER for _, s in supported):
-            due = sum(t.share for t in transitions if _waits(t) and self._all_over(t))
+            due = sum(t.share for t in transitions if t.waits and self._all_over(t))
         # If all steps are over by themselves, only the end of the course or another round justifies
         # staying.
         forced = not (ends or due) and any(
@@ -109,6 +114,14 @@ class Advance:
     def _all_over(self, transition: OpenTransition) -> bool:
         return all(self.steps.over(x) for x in transition.left)
 
+    def _unreached(self, transition: OpenTransition) -> float | None:
+        """Since when all steps that a transition completes are over without what they were for, or None."""
+        since = [
+            self.observe(x.step).unreached if x.payload.held else None for x in transition.left
+        ]
+        known = [s for s in since if s is not None]
+        return max(known, default=None) if len(known) == len(since) else None
+
     def _goes_on(self, transition: OpenTransition) -> bool:
         """Whether the steps that a transition completes have lasted as long as required and still hold."""
         return any(
@@ -124,11 +137,11 @@ class Advance:
         self, hypothesis: TaskHypothesis, transition: OpenTransition, ways: int
     ) -> Support:
         """How strongly an observation supports a transition, given the number of alternatives."""
-        finished = self._all_over(transition)
+        finished = self._all_over(transition) or self._unreached(transition) is not None
         if self._goes_round(transition):
             return Support.NONE
-        goes_on = all(_goes_on(s, transition.left) for s in transition.entered)
-        if goes_on and (not finished or _waits(transition)):
+        same = all(goes_on(s, transition.left) for s in transition.entered)
+        if same and (not finished or transition.waits):
             return Support.NONE
         opens = transition.entered and self._opens(hypothesis, transition)
         # With several alternatives an entry supports none of them: touching may precede coupling or backing
@@ -168,10 +181,14 @@ class Advance:
     ) -> TaskHypothesis:
         """A hypothesis with the entries to next steps, and to transitions, that are observed now."""
         possible = [
-            t.entered for t in transitions if not (self._goes_round(t) or _waits(t)) and t.entered
+            t.entered for t in transitions if not (self._goes_round(t) or t.waits) and t.entered
         ]
         entries, met = observed_entries(
-            (hypothesis.entries, hypothesis.met), possible, self._entry, self.now
+            (hypothesis.entries, hypothesis.met),
+            possible,
+            self._entry,
+            self.now,
+            refuted=lambda step: self.observe(step).carried_past,
         )
         return replace(hypothesis, entries=entries, met=met)
 
@@ -205,15 +222,15 @@ class Advance:
         lasts, held = self.steps.actions[leaf.step.action].lasts, leaf.payload.held
         if leaf.payload.fulfilled or (held and not lasts and leaf.step.hold_s is None):
             return 1.0
-        missed = not lasts and not leaf.payload.held and leaf.payload.broken_since is not None
-        return self.steps.hmm.pass_over ** (2 if missed else 1)
+        denied = not lasts and not leaf.payload.held and leaf.payload.broken_since is not None
+        return self.steps.hmm.pass_over ** (2 if denied else 1)
 
     def _moved(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> TaskHypothesis:
-        opened = self._opens(hypothesis, transition)
+        opened, unreached = self._opens(hypothesis, transition), self._unreached(transition)
         state = transition.taken(leaves(hypothesis.state), entered(self.now))
         begun = set(transition.transition.begun)
         under_way = [
-            self._begun(self._after(self._in_turn(x, transition), transition), opened)
+            self._begun(self._after(self._in_turn(x, transition), transition), opened, unreached)
             if i in begun
             else x
             for i, x in enumerate(leaves(state))
@@ -234,7 +251,9 @@ class Advance:
             self._past(hypothesis, transition, {x.step.stage for x in under_way}),
             backpointer=extended(hypothesis.backpointer, left, self.now, begun_at),
             gone_on=True,
-            lasting="" if opened else self._lasting(transition, {x.step.stage for x in under_way}),
+            lasting=""
+            if opened or unreached is not None
+            else self._lasting(transition, {x.step.stage for x in under_way}),
         )
 
     def _lasting(self, transition: OpenTransition, under_way: Collection[str]) -> str:
@@ -254,7 +273,7 @@ class Advance:
         """
         if not transition.entered or any(s.already or s.is_told for s in transition.entered):
             return ()
-        turn = _turn(transition.left)
+        turn = transition.turn
         if turn is None:
             return ()  # not known if the completed steps were never observed
         now = {frozenset(x.step.actors) for x in transition.left}
@@ -294,7 +313,7 @@ class Advance:
         begun = (x.payload.begun for x in left)
         turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
         told = joined(self._told(x, transition) for x in left)
-        earliest = max((_earliest_end(x) for x in left), default=-math.inf)
+        earliest = max((earliest_end(x) for x in left), default=-math.inf)
         return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told, earliest=earliest))
 
     def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
@@ -320,10 +339,15 @@ class Advance:
         at = left.payload.fulfilled_at if by_itself else left.payload.helped_at
         return self.now if at is None else at
 
-    def _begun(self, leaf: Leaf[StepMonitor], opened: bool) -> Leaf[StepMonitor]:
+    def _begun(
+        self, leaf: Leaf[StepMonitor], opened: bool, unreached: float | None
+    ) -> Leaf[StepMonitor]:
         """A step that begins now, with its first observation."""
         if opened:
             leaf = replace(leaf, payload=replace(leaf.payload, opened=True))
+        if unreached is not None:
+            late = missed(leaf.payload, self.observe(leaf.step), unreached, self.now)
+            leaf = replace(leaf, payload=late)
         return self.steps.looked_at(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
 
     def _past(
@@ -359,41 +383,3 @@ class Advance:
         """Since when a step's action has been contradicted, or None."""
         contrary = self.observe(step).contrary
         return None if contrary is None else contrary.since
-
-
-def _turn(left: Sequence[Leaf[StepMonitor]]) -> float | None:
-    """When the last of the stages that a transition completes began, or None if that was not observed."""
-    begun: dict[str, float] = {}
-    for leaf in left:
-        stage, since = leaf.step.stage, leaf.payload.begun
-        if since is None:
-            return None
-        begun[stage] = min(since, begun.get(stage, since))
-    return max(begun.values(), default=None)
-
-
-def _earliest_end(left: Leaf[StepMonitor]) -> float:
-    """The earliest time at which a completed step can have ended."""
-    monitor = left.payload
-    if left.step.hold_s is not None and monitor.fulfilled_at is not None:
-        return monitor.fulfilled_at
-    return monitor.entered if monitor.begun is None else monitor.begun
-
-
-def _may_end(transition: OpenTransition) -> bool:
-    return all(x.payload.fulfilled and x.payload.status not in BAD for x in transition.left)
-
-
-def _goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
-    """Whether a step requires an action that already holds: it can begin only after that has ended."""
-    return any(step.same_as(x.step) and not x.payload.ceased for x in left)
-
-
-def _again(transition: OpenTransition) -> bool:
-    """Whether a transition begins another round of the steps that it completes."""
-    return bool(transition.entered) and {x.step for x in transition.left} == set(transition.entered)
-
-
-def _waits(transition: OpenTransition) -> bool:
-    """Whether a transition begins another round while all that the last one required may still hold."""
-    return _again(transition) and all(_goes_on(s, transition.left) for s in transition.entered)

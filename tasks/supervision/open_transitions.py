@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from visup.agent import Status
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition, with_payloads
 from visup.tasks.automaton.derivatives import begin, derivatives, enter
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
-from visup.tasks.verification.step_monitor import StepMonitor, entered
+from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.step_monitor import BAD, StepMonitor, entered
 
 FIRST_LOOK_S = 0.5
 """Delay after the first frame, seconds, until which relations present from the start are recognised."""
@@ -45,6 +47,32 @@ class OpenTransition:
         return self.state is None
 
     @property
+    def may_end(self) -> bool:
+        """Whether all steps that it completes have been fulfilled, and none fails."""
+        return all(x.payload.fulfilled and x.payload.status not in BAD for x in self.left)
+
+    @property
+    def again(self) -> bool:
+        """Whether it begins another round of the steps that it completes."""
+        return bool(self.entered) and {x.step for x in self.left} == set(self.entered)
+
+    @property
+    def waits(self) -> bool:
+        """Whether it begins another round while all that the last one required may still hold."""
+        return self.again and all(goes_on(s, self.left) for s in self.entered)
+
+    @property
+    def turn(self) -> float | None:
+        """When the last of the stages that it completes began, or None if that was not observed."""
+        begun: dict[str, float] = {}
+        for leaf in self.left:
+            stage, since = leaf.step.stage, leaf.payload.begun
+            if since is None:
+                return None
+            begun[stage] = min(since, begun.get(stage, since))
+        return max(begun.values(), default=None)
+
+    @property
     def share(self) -> float:
         """Its share among the transitions that complete the same steps."""
         return self.transition.share
@@ -60,6 +88,37 @@ class OpenTransition:
         pairs = zip(leaves(self.state), self.transition.carried, strict=True)
         new = [Leaf(x.step, fresh) if c == NEW else here[c] for x, c in pairs]
         return with_payloads(self.state, new)
+
+
+def goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
+    """Whether a step requires an action that already holds: it can begin only after that has ended."""
+    return any(step.same_as(x.step) and not x.payload.ceased for x in left)
+
+
+def earliest_end(left: Leaf[StepMonitor]) -> float:
+    """The earliest time at which a completed step can have ended."""
+    monitor = left.payload
+    if left.step.hold_s is not None and monitor.fulfilled_at is not None:
+        return monitor.fulfilled_at
+    return monitor.entered if monitor.begun is None else monitor.begun
+
+
+def missed(monitor: StepMonitor, seen: ActionObservation, since: float, now: float) -> StepMonitor:
+    """The monitor of a step whose turn comes since what leads to it is over, without success.
+
+    It fails at once if its contrary is observed.
+
+    Args:
+        monitor: The monitor of a step that begins now.
+        seen: Its observation.
+        since: Since when that is over, seconds.
+        now: Seconds.
+    """
+    monitor = replace(monitor, entered=since, begun=now)
+    if seen.contrary is None:
+        return monitor
+    fault = seen.contrary.name
+    return replace(monitor, status=Status.FAILING, since=since, fault=fault, fault_since=since)
 
 
 class OpenTransitions:

@@ -31,6 +31,8 @@ class ActionObservation:
         pauses: All pauses of the task so far.
         absent: Whether one of its actors is optional and has no object: then the step is not due.
         moves_on: Whether it is a contact at which neither has slowed down yet.
+        unreached: Since when it is an approach, or carrying, that is over without what it was for, or None.
+        carried_past: Whether it would begin by a contact, but one of the two is known now to be carried past.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -47,6 +49,8 @@ class ActionObservation:
     pauses: PauseRecord = NO_PAUSES
     absent: bool = False
     moves_on: bool = False
+    carried_past: bool = False
+    unreached: float | None = None
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:
         """Seconds from one time to another in which the work on a step was not paused."""

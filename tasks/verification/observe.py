@@ -23,7 +23,15 @@ from visup.tasks.verification.observation import (
     ActionObservation,
     Kept,
 )
-from visup.tasks.verification.passing import gapes, goes_past, moves_on
+from visup.tasks.verification.passing import (
+    gapes,
+    goes_past,
+    holds_on,
+    moves_on,
+    put_down,
+    stopped_at,
+    went_past,
+)
 from visup.tasks.verification.pauses import PauseRecord
 from visup.tasks.verification.sudden import SuddenTrends
 
@@ -69,6 +77,7 @@ class RelationLookup:
         self._beats: dict[str, tuple[Beats, Truth]] = {}
         self._evaluated: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._passed_by: dict[tuple[int, ...], bool] = {}
         self._sudden = SuddenTrends(mind)
         self._queried: set[str] = set()
         self._after: dict[str, float] = {}
@@ -90,9 +99,10 @@ class RelationLookup:
 
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
-        meets = name == "touching" and found is not None and found.truth is Truth.TRUE
-        if meets and found is not None and goes_past(self._mind, objects, self._rests):
+        if name == "touching" and found is not None and self.passes_by(objects):
             return replace(found, truth=Truth.UNKNOWN)
+        if name == "touching" and found is not None and found.truth is Truth.TRUE:
+            found = replace(found, since=max(found.since, stopped_at(self._mind, objects)))
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
             found is not None
@@ -112,6 +122,31 @@ class RelationLookup:
             "rests", objects, Truth.UNKNOWN if math.isnan(speed) else truth_if(slow)
         )
         return rest.truth is Truth.TRUE and self.time - rest.since >= REST_S - 1e-9
+
+    def passes_by(self, objects: tuple[int, ...]) -> bool:
+        """Whether outlines meet only because one of two passes the other, or is carried past it."""
+        if objects not in self._passed_by:
+            meets = self._mind.truth("touching", *objects) is Truth.TRUE
+            self._passed_by[objects] = meets and goes_past(self._mind, objects, self._rests)
+        return self._passed_by[objects]
+
+    def carried_past(self, objects: tuple[int, ...]) -> bool:
+        """Whether outlines meet only because one of two is carried past the other."""
+        return bool(holds_on(self._mind, objects)) and self.passes_by(objects)
+
+    def unreached(
+        self, action: str, objects: tuple[int, ...], contrary: Relation | None
+    ) -> float | None:
+        """Since when an approach or carrying is over without what it was for, or None.
+
+        One has gone past the other, or what was carried has been put down.
+        """
+        ways = {"moving_together": (objects, objects[::-1]), "converging": (objects,)}
+        if any(put_down(self._mind, way) for way in ways.get(action, ())):
+            return self.time
+        recedes = action == "converging" and contrary is not None and contrary.name == "diverging"
+        past = contrary if recedes and went_past(self._mind, objects) else None
+        return None if past is None else past.since
 
     def moves_on(self, objects: tuple[int, ...]) -> bool:
         """Whether neither of two whose outlines meet has slowed down at the other."""
@@ -251,6 +286,8 @@ def observe(
     contrary = relations.first_given(meaning.contrary, ids)
     if contrary is not None and relations.explains_away(contrary.name, meaning.name, ids):
         contrary = None
+    unreached = relations.unreached(meaning.name, ids, contrary)
+    contrary = contrary if unreached is None else None
     known = (*meaning.helps, *meaning.contrary)
     entry, sudden = relations.begun(meaning.begins, ids)
     return ActionObservation(
@@ -263,6 +300,8 @@ def observe(
         sudden=sudden,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
+        unreached=unreached,
+        carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
     )
 
 

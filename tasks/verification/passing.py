@@ -6,13 +6,36 @@ everything in its way.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import Mind, Truth
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
-from visup.rules.geometry.regions import image_diagonal
-from visup.rules.relations.reasoner import kinematics
+from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
+from visup.rules.relations.reasoner import kinematics, sample_window
+from visup.rules.relations.samples import SampleWindow
+
+LEAST_SAMPLES = 5
+"""Fewest samples of a relative path."""
+
+PAST = 0.05
+"""Least length of a path past another body, image diagonals."""
+
+STRAIGHT = 0.85
+"""Least distance of its ends as a share of its length: who turns back comes near where he was."""
+
+ON = 0.5
+"""Least speed at the end of such a path, as a share of the mean one."""
+
+BEYOND = 0.2
+"""Least share of such a path that lies beyond the nearest point."""
+
+RESTED_S = 0.6
+"""How long what is put down has rested, seconds."""
 
 LET_GO_GAP = 0.01
 """Gap of two coupled bodies from which on one has let go of the other, image diagonals."""
@@ -31,7 +54,10 @@ def goes_past(
     if held := holds_on(mind, objects):
         contact = _contact(mind, objects)
         on = contact is not None and (contact.passing or not contact.known)
-        return on and not all(gapes(mind, *other) for other in held)
+        if not all(gapes(mind, *other) for other in held):
+            return on
+        # What is let go of falls onto what it met, unless it has crossed that by more than its own size.
+        return on and contact is not None and contact.path > _size(mind, objects)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
@@ -48,6 +74,75 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
     return unsettled and not holds_on(mind, objects)
 
 
+def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
+    """Whether one of two has just gone past the other and moves on, rather than turned back before it.
+
+    Then their relative path of the last second or so is straight, and its nearest point lies well within it.
+    What is carried past something may be on a detour.
+    """
+    if len(objects) != 2 or holds_on(mind, objects):
+        return False
+    diagonal = image_diagonal(mind.frame_size)
+    path = _centres(mind, objects[0]) - _centres(mind, objects[1])
+    path = path[~np.isnan(path).any(axis=1)]
+    if len(path) < LEAST_SAMPLES:
+        return False
+    thirds = path[[0, len(path) // 3, 2 * len(path) // 3, -1]]
+    walked = np.hypot(*np.diff(thirds, axis=0).T)
+    way = path[-1] - path[0]
+    length = float(np.hypot(*way))
+    if length < PAST * diagonal or length < STRAIGHT * float(walked.sum()):
+        return False
+    along = path @ way / length
+    moves_on = float(walked[-1]) > ON * length / 3
+    return moves_on and float(along[0]) < 0.0 and float(along[-1]) > BEYOND * length
+
+
+def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
+    """Whether the first of some objects rests, and all that held it have let go of it just now.
+
+    What is dropped falls first.
+    """
+    first, window = objects[0], sample_window(mind)
+    held = [c.objects for c in mind.couplings if first in c.objects]
+    if not held or first not in window.ids:
+        return False
+    recent = window.times > mind.time - RESTED_S
+    least = LET_GO_GAP * image_diagonal(mind.frame_size)
+    path = _centres(mind, first)[recent]
+    path = path[~np.isnan(path).any(axis=1)]
+    rests = len(path) > 1 and float(np.ptp(path, axis=0).max()) < least
+    opened = all(_opened(window, pair, recent) > least for pair in held)
+    # An outline that leaps opens a gap, too, but nobody moves.
+    return rests and opened and all(mind.truth("coupled", *p) is not Truth.TRUE for p in held)
+
+
+def _opened(window: SampleWindow, pair: tuple[int, ...], recent: NDArray[np.bool_]) -> float:
+    """By how much the gap of two bodies has grown lately, pixels; 0 if unknown."""
+    if not set(pair) <= set(window.ids):
+        return 0.0
+    i, j = (window.ids.index(o) for o in pair)
+    distance = window.separation[recent, i, j]
+    distance = np.maximum(distance[~np.isnan(distance)], 0.0)
+    return float(distance[-1] - distance.min()) if len(distance) else 0.0
+
+
+def _centres(mind: Mind, body: int) -> Floats:
+    """(T, 2) pixels: Steiner point of an outline relative to the static scene; NaN where unseen."""
+    window = sample_window(mind)
+    if body not in window.ids:
+        return np.full((len(window.times), 2), np.nan)
+    support = window.steady_support[:, window.ids.index(body)]
+    centres: Floats = 2.0 / len(DIRECTIONS) * support @ DIRECTIONS
+    return centres
+
+
+def stopped_at(mind: Mind, objects: tuple[int, ...]) -> float:
+    """When one of two whose outlines meet ceased to pass the other, seconds; minus infinity if it did not."""
+    contact = _contact(mind, objects)
+    return -math.inf if contact is None or contact.passing else contact.changed_at
+
+
 def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
     """The couplings of one of two bodies to a third one."""
     pair = set(objects)
@@ -57,6 +152,11 @@ def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
 def gapes(mind: Mind, a: int, b: int) -> bool:
     """Whether there is a gap between the outlines of two bodies; False if unknown."""
     return kinematics(mind).pair("gap", a, b) > LET_GO_GAP * image_diagonal(mind.frame_size)
+
+
+def _size(mind: Mind, objects: tuple[int, ...]) -> float:
+    """Size of the smaller one of two bodies, pixels."""
+    return min(float(np.sqrt(mind.objects[i].region.area)) for i in objects)
 
 
 def _contact(mind: Mind, objects: tuple[int, ...]) -> OutlineContact | None:

@@ -44,7 +44,7 @@ class StepMonitor:
             or had not begun then.
         status: Current status.
         since: Since when it has that status.
-        begun: When it was first observed to hold or progress, or None.
+        begun: When it was first observed to hold or progress, or was missed, or None.
         first_since: Since when the relation of that first observation was true, or None.
         held: Whether it ever held.
         held_from: Since when it held when it last did, or None.
@@ -355,10 +355,10 @@ def _status(
     if monitor.status in BAD and not _recovered(monitor, now, settings, worked):
         long = _long_failing(monitor, now, settings, worked)
         return Status.FAILED if long else monitor.status
-    if monitor.begun is None:
-        return Status.ACTIVE
     helped = monitor.helped_at
-    stalled = helped is not None and worked(helped, now) >= settings.stalled_s
+    if monitor.begun is None or helped is None:
+        return Status.ACTIVE
+    stalled = worked(helped, now) >= settings.stalled_s
     return Status.STALLED if stalled else Status.PROGRESSING
 
 

@@ -93,6 +93,14 @@ def test_who_is_let_go_of_and_left_along_a_narrow_gap_is_decoupled() -> None:
     assert 7.0 < found[1][1] < 9.8
 
 
+@pytest.mark.parametrize("speed", [20.0, 30.0, 40.0])
+def test_who_draws_away_is_decoupled_though_touch_ends_later(speed: float) -> None:
+    """Outlines that have parted are followed no longer, and seem to touch until the gap is wider."""
+    found = told(scene(lambda t: closing(t) if t < 7 else 180 + speed * (t - 7)))
+    assert [k for k, _ in found] == ["coupled", "decoupled"]
+    assert 7.3 < found[1][1] < 7.6
+
+
 def test_who_is_decoupled_is_so_since_one_moment() -> None:
     """A stage that begins by it needs it to have lasted."""
     thoughts = scene(lambda t: closing(t) if t < 7 else 180 + 15 * (t - 7))

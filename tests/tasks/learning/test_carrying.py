@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.tasks.scripted import Script, Spell, play
-from visup.agent import Mind, Outcome, Verdict
+from visup.agent import Mind, Outcome, Region, Verdict
 from visup.tasks.analysis.judging import judged
 from visup.tasks.checks.load import parse_task
 from visup.tasks.learning.carrying import with_carrying
@@ -101,33 +101,95 @@ def test_what_the_carrier_touches_until_it_has_drawn_back_is_no_meeting(
     assert {m.pair for m in meetings} == {HELD, PLACED} | ({beyond} if counted else set())
 
 
-def lying(name: str, share: float, down: int = 0) -> RunTrace:
+def lying(name: str, share: float, down: int = 0, bobs: float = 0.0) -> RunTrace:
     """A part comes to the fixture, meets it after 6 s and lies with a share of its width over it.
 
-    `down` is how far below the fixture's upper edge its own one is, pixels."""
-    boxes = {FIXTURE: (100, 100, 60, 60), PART: (160 - round(40 * share), 100 + down, 40, 40)}
-    regions = {
-        n: region_of(np.ones((h, w), dtype=bool), n, at=(x, y), size=(640, 480))
-        for n, (x, y, w, h) in boxes.items()
-    }
+    `down` is how far below the fixture's upper edge its own one is, pixels, and `bobs` by how much the share
+    changes, up and down."""
     spells = [
         Spell("converging", 2.0, 6.2, (PART, FIXTURE)),
         Spell("touching", 6.0, 1e9, (PART, FIXTURE)),
     ]
-    script = Script(
-        tuple(spells), objects={PART: (0.0, 1e9), FIXTURE: (0.0, 1e9)}, identities=NAMES
-    )
+    share_at = lambda t: share + bobs * np.sin(2 * np.pi * t / 2.4)  # noqa: E731
+    return played(name, spells, share_at, down)
+
+
+def played(
+    name: str, spells: Sequence[Spell], share: Callable[[float], float], down: int = 0
+) -> RunTrace:
+    """A run of 12 s in which a part lies over a fixture with a share of its width."""
+
+    def regions(time: float) -> dict[int, Region]:
+        left = 160 - round(40 * share(time))
+        boxes = {
+            GRIPPER: (400, 100, 40, 40),
+            FIXTURE: (100, 100, 60, 60),
+            PART: (left, 100 + down, 40, 40),
+        }
+        return {
+            n: region_of(np.ones((h, w), dtype=bool), n, at=(x, y), size=(640, 480))
+            for n, (x, y, w, h) in boxes.items()
+        }
+
+    there = {n for s in spells for n in s.objects}
+    script = Script(tuple(spells), objects=dict.fromkeys(there, (0.0, 1e9)), identities=NAMES)
     minds: list[Mind] = []
 
     def keep(mind: Mind, observation: object) -> Outcome:
+        shapes = regions(mind.time)
         objects = {
-            n: replace(o, region=regions[n], last_seen=mind.time) for n, o in mind.objects.items()
+            n: replace(o, region=shapes[n], last_seen=mind.time) for n, o in mind.objects.items()
         }
         minds.append(replace(mind, objects=objects))
         return Outcome(mind)
 
     play(keep, script, 12.0, fps=5.0)
     return trace_of(name, minds)
+
+
+def put(
+    name: str,
+    share: float = 0.9,
+    leaves: Span = (9.4, 11.0),
+    free: float = 9.0,
+    apart: float = 9.2,
+) -> RunTrace:
+    """A gripper takes a part, puts it on the fixture and lets it go, which is told at `free`."""
+    spells = [
+        Spell("converging", 0.5, 2.8, (GRIPPER, PART)),
+        Spell("touching", 2.6, apart, (GRIPPER, PART)),
+        Spell("coupled", 3.0, free, (GRIPPER, PART)),
+        Spell("moving_together", 3.2, 6.2, (GRIPPER, PART)),
+        Spell("converging", 4.0, 6.2, (PART, FIXTURE)),
+        Spell("touching", 6.0, 1e9, (PART, FIXTURE)),
+        Spell("diverging", *leaves, (GRIPPER, PART)),
+    ]
+    carried = dict.fromkeys(HELD, ((3.2, 6.2),))
+    return replace(played(name, spells, lambda t: share), moves=carried)
+
+
+def test_who_has_let_go_need_not_be_seen_to_draw_back_if_all_lies_where_it_belongs() -> None:
+    learned = learn_task("put", [put(f"good{k}", share) for k, share in enumerate((0.8, 0.9, 1.0))])
+    assert set(learned.good.values()) == {Verdict.SUCCEEDED}
+    assert "<retreat>? <stay>" in learned.text
+    assert "<stay> ::= already shared_outline(fixture, part) > " in learned.text
+    task = parse_task(learned.text)
+    late = put("late", leaves=(8.0, 9.0), free=11.0, apart=1e9)
+    back = put("back", leaves=(9.0, 9.6))
+    never_told = put("never told", free=1e9)
+    for run in (put("seen"), late, back, never_told):
+        assert judged(task, run.minds).verdict is Verdict.SUCCEEDED, run.name
+    for run in (put("beside", 0.05), put("held", free=1e9, apart=1e9)):
+        assert judged(task, run.minds).verdict is not Verdict.SUCCEEDED, run.name
+
+
+def test_what_bobs_shares_as_much_as_most_of_the_time() -> None:
+    contact = ("touching", PLACED)
+    rows = [[event("touching", PLACED, 6.0)]]
+    still, bobbing = (
+        next(places_of((contact, 0), rows, [lying("a", 0.5, bobs=b)], [])) for b in (0.0, 0.4)
+    )
+    assert bobbing.seen == pytest.approx(still.seen, abs=0.06)
 
 
 def test_what_lies_beside_its_place_is_refused_though_it_touches_it() -> None:

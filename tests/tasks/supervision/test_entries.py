@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tasks.scripted import Script, Spell, play
-from visup.agent import Status
+from visup.agent import Relation, Status, Truth
 from visup.tasks import parse_task
-from visup.tasks.automaton.entries import coincidence
+from visup.tasks.automaton.entries import Meetings, StepEntries, coincidence, observed_entries
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.supervision.supervise import task_reasoner
 
 CARRY = """<t> ::= <carry> <place>
@@ -31,6 +32,27 @@ spans = st.lists(
 def test_a_coincidence_is_the_last_time_that_lies_in_all(found: list[tuple[int, int]]) -> None:
     everywhere = [t for t in range(10) if all(a <= t <= b for a, b in found)]
     assert coincidence(found) == max(everywhere, default=None)
+
+
+@given(st.lists(st.tuples(st.booleans(), st.booleans(), st.booleans()), min_size=1))
+def test_steps_have_met_if_both_held_since_either_was_last_refuted(
+    moments: list[tuple[bool, bool, bool]],
+) -> None:
+    first, second = (TaskStep(name, (), "s") for name in ("a", "b"))
+    found: tuple[StepEntries, Meetings] = ((), ())
+    for now, (one, other, refuted) in enumerate(moments):
+        true = {first: one and not refuted, second: other}
+        entry = {s: Relation(s.action, (1,), Truth.TRUE, now) for s in true if true[s]}
+        none = {first} if refuted else set[TaskStep]()
+        found = observed_entries(
+            found, [(first, second)], entry.get, now, refuted=none.__contains__
+        )
+    anew = max((i for i, m in enumerate(moments) if m[2]), default=-1) + 1
+    together = any(a and b for a, b, _ in moments[anew:])
+    assert dict(found[1]).get((first, second), -1) == max(
+        (i for i, (a, b, _) in enumerate(moments) if i >= anew and a and b), default=-1
+    )
+    assert bool(found[1]) == together
 
 
 def test_nothing_coincides_with_nothing() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +13,7 @@ from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
 from visup.tasks.verification.observation import ActionObservation
-from visup.tasks.verification.passing import goes_past, moves_on
+from visup.tasks.verification.passing import goes_past, moves_on, stopped_at
 
 GRIPPER, PART, TARGET = 1, 2, 3
 
@@ -23,6 +24,7 @@ def scene(held: bool, gap: float, contact: OutlineContact, passing_by: Truth) ->
     return SimpleNamespace(
         couplings=(Coupling((GRIPPER, PART), 0.0),) if held else (),
         frame_size=(640, 480),
+        objects={i: SimpleNamespace(region=SimpleNamespace(area=1600.0)) for i in (PART, TARGET)},
         truth=lambda name, *objects: passing_by,
         recall=lambda key: (
             {(PART, TARGET): SimpleNamespace(contact=contact)}
@@ -33,6 +35,7 @@ def scene(held: bool, gap: float, contact: OutlineContact, passing_by: Truth) ->
 
 
 ON = OutlineContact(0.0, passing=True, known=True)
+FAR = OutlineContact(0.0, passing=True, known=True, path=50.0)
 SLOW = OutlineContact(0.0, passing=False, known=True)
 UNKNOWN = OutlineContact(0.0)
 
@@ -43,7 +46,8 @@ UNKNOWN = OutlineContact(0.0)
         (True, 0.0, ON, Truth.FALSE, True),  # carried on
         (True, 0.0, UNKNOWN, Truth.FALSE, True),  # just met
         (True, 0.0, SLOW, Truth.FALSE, False),  # slowed down
-        (True, 20.0, ON, Truth.TRUE, False),  # let go of
+        (True, 20.0, ON, Truth.TRUE, False),  # let go of, and falling onto it
+        (True, 20.0, FAR, Truth.TRUE, True),  # let go of, and falling past it
         (True, float("nan"), ON, Truth.FALSE, True),  # a gap that is not known is none
         (False, 0.0, ON, Truth.FALSE, False),  # nobody holds it: by how far it has passed alone
         (False, 0.0, ON, Truth.TRUE, True),
@@ -75,6 +79,20 @@ def test_a_stage_of_contact_waits_until_one_has_slowed_down(
 ) -> None:
     assert moves_on(scene(False, 0.0, contact, Truth.FALSE), (PART, TARGET)) is on
     assert not moves_on(scene(True, 0.0, contact, Truth.FALSE), (PART, TARGET))
+
+
+@pytest.mark.parametrize(
+    ("contact", "since"),
+    [
+        (OutlineContact(1.0, changed_at=2.5, known=True), 2.5),
+        (OutlineContact(1.0, changed_at=2.5, passing=True, known=True), -math.inf),
+    ],
+)
+def test_a_contact_counts_from_when_one_ceased_to_pass(
+    contact: OutlineContact, since: float
+) -> None:
+    assert stopped_at(scene(False, 0.0, contact, Truth.FALSE), (PART, TARGET)) == since
+    assert stopped_at(scene(False, 0.0, contact, Truth.FALSE), (GRIPPER, TARGET)) == -math.inf
 
 
 def test_where_nothing_is_known_of_a_contact_nobody_moves_on() -> None:

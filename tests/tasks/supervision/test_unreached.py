@@ -1,0 +1,92 @@
+"""Which stage fails when one goes past its goal, turns back before it, or puts a part down elsewhere."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tests.tasks.supervision.drawn import Mask, drawn, first, watched
+
+VEHICLE, CHARGER = 1, 2
+GRIPPER, PART, FIXTURE = 1, 2, 3
+
+CHARGE = """
+<charge>   ::= <approach> <docked>
+<approach> ::= converging(vehicle, charger)
+<docked>   ::= touching(vehicle, charger) for 1 s
+"""
+
+PUT = """
+<put>   ::= <reach> <grasp> <carry> <place>
+<reach> ::= converging(gripper, part)
+<grasp> ::= coupled(gripper, part)
+<carry> ::= moving_together(gripper, part) & converging(part, fixture)
+<place> ::= touching(part, fixture) & coupled(gripper, part)
+"""
+
+
+def eased(now: float, *keys: tuple[float, float]) -> float:
+    """A value between (seconds, value) keys; constant outside."""
+    for (a, x), (b, y) in pairwise(keys):
+        if now < b:
+            return x + (y - x) * max(0.0, now - a) / (b - a)
+    return keys[-1][1]
+
+
+def driving(now: float, *, turns_back: bool) -> Mask:
+    """A vehicle that drives past a charger below it, or back again before it."""
+    there = 170.0 if turns_back else 400.0
+    x = eased(now, (0.5, 20.0), (3.5, there), (3.6, there), (6.0, 40.0 if turns_back else there))
+    return drawn({CHARGER: (240, 140, 50, 70), VEHICLE: (x, 80, 60, 45)})
+
+
+@pytest.mark.parametrize(
+    ("turns_back", "fails", "not_fails"),
+    [(False, "docked", "approach"), (True, "approach", "docked")],
+)
+def test_who_goes_past_fails_to_dock_and_who_turns_back_to_approach(
+    tmp_path: Path, turns_back: bool, fails: str, not_fails: str
+) -> None:
+    events = watched(
+        tmp_path,
+        CHARGE,
+        lambda now: driving(now, turns_back=turns_back),
+        {"vehicle": VEHICLE, "charger": CHARGER},
+        7.0,
+    )
+    assert first(events, "stage_failing", fails) is not None
+    assert first(events, "stage_failing", not_fails) is None
+
+
+def carrying(now: float, *, drops: bool) -> Mask:
+    """A gripper that takes a part along, and stops with it before the fixture, or drops it on the way."""
+    x = eased(now, (0.5, 60.0), (2.0, 120.0), (3.0, 120.0), (5.5, 240.0))
+    y = eased(now, (2.9, 100.0), (3.0, 100.0), (7.0, 100.0), (8.0, 20.0))
+    part = 120.0 if now < 3.0 else min(x, 190.0) if drops else x
+    fall = eased(now, (4.5, 0.0), (4.8, 60.0)) if drops else 0.0
+    return drawn(
+        {
+            FIXTURE: (400, 130, 60, 60),
+            PART: (part + 5, 140 + fall, 30, 30),
+            GRIPPER: (x, y, 40, 45),
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("drops", "fails", "not_fails"), [(False, "place", "carry"), (True, "carry", "place")]
+)
+def test_what_is_put_down_elsewhere_is_not_placed_and_what_is_dropped_not_carried(
+    tmp_path: Path, drops: bool, fails: str, not_fails: str
+) -> None:
+    events = watched(
+        tmp_path,
+        PUT,
+        lambda now: carrying(now, drops=drops),
+        {"gripper": GRIPPER, "part": PART, "fixture": FIXTURE},
+        10.0,
+    )
+    assert first(events, "stage_failing", fails) is not None
+    assert first(events, "stage_failing", not_fails) is None
