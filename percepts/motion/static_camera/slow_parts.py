@@ -46,7 +46,7 @@ REACH = 0.5  # gaps that are closed, as a share of the square root of the region
 MOST_REACH = 0.04  # the same as a share of the image's longer side
 BACK_S = 0.3  # how long ground is seen after it was hidden until it is certainly bare, seconds
 ALWAYS_S = (
-    2.4  # the same for ground that never was hidden: a body may have rested there from the start
+    2.4  # the same for ground that never was hidden: a body may have been there from the start
 )
 
 
@@ -132,6 +132,19 @@ class GroundBelief:
         """Note where bodies are reported, (h, w) bool."""
         if self.share is not None:
             self.share[reported] = 0
+
+
+def hardly_moves(velocity: tuple[float, float], scale: float) -> bool:
+    """Whether a region moves by less than the thickness of a part within the longest span.
+
+    What moves faster shows itself by its motion, and uncovers ground, which changes as well.
+
+    Args:
+        velocity: Of the region, frame pixels per second.
+        scale: Working pixels per frame pixel.
+    """
+    speed = float(np.hypot(*velocity)) * scale
+    return speed * max(SPANS_S) < THICK
 
 
 def with_slow_parts(

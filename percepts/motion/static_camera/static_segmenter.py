@@ -42,7 +42,12 @@ from visup.percepts.motion.static_camera.blob_track import (
 )
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
 from visup.percepts.motion.static_camera.camera_static import is_camera_static
-from visup.percepts.motion.static_camera.slow_parts import GroundBelief, SlowChange, with_slow_parts
+from visup.percepts.motion.static_camera.slow_parts import (
+    GroundBelief,
+    SlowChange,
+    hardly_moves,
+    with_slow_parts,
+)
 from visup.percepts.motion.static_camera.track_fusion import (
     FusionFrame,
     MotionEvidence,
@@ -126,7 +131,12 @@ class StaticCameraSegmenter:
         self, scene: FrameMeasurements, regions: Sequence[Region], size: tuple[int, int]
     ) -> tuple[Region, ...]:
         """The regions, those older than the background with the parts of them that hardly move."""
-        old = [r for r in regions if not self.active or self._fusion.is_old(r.id)]
+        scale = scene.image.scale
+        old = [
+            r
+            for r in regions
+            if (not self.active or self._fusion.is_old(r.id)) and hardly_moves(r.velocity, scale)
+        ]
         if self._static_s <= 0 or (self.active and not old):
             self._slow.forget()
             return tuple(regions)
