@@ -116,9 +116,9 @@ class Advance:
 
     def _unreached(self, transition: OpenTransition) -> float | None:
         """Since when all steps that a transition completes are over without what they were for, or None."""
-        since = [
-            self.observe(x.step).unreached if x.payload.held else None for x in transition.left
-        ]
+        held = [x.payload.held and x.step.hold_s is None for x in transition.left]
+        pairs = zip(transition.left, held, strict=True)
+        since = [self.observe(x.step).unreached if h else None for x, h in pairs]
         known = [s for s in since if s is not None]
         return max(known, default=None) if len(known) == len(since) else None
 

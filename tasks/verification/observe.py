@@ -287,7 +287,6 @@ def observe(
     if contrary is not None and relations.explains_away(contrary.name, meaning.name, ids):
         contrary = None
     unreached = relations.unreached(meaning.name, ids, contrary)
-    contrary = contrary if unreached is None else None
     known = (*meaning.helps, *meaning.contrary)
     entry, sudden = relations.begun(meaning.begins, ids)
     return ActionObservation(

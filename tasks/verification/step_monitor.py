@@ -23,12 +23,7 @@ Worked = Callable[[float, float], float]
 
 
 class Moment(NamedTuple):
-    """The time of an observation.
-
-    Attributes:
-        now: Seconds.
-        dt: Seconds since the last one.
-    """
+    """The time of an observation, and since the last one, seconds."""
 
     now: float
     dt: float
@@ -322,10 +317,11 @@ def _note_progress(
 
 
 def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
-    """Record a contrary, from its onset within this step; holding outweighs it."""
+    """Record a contrary, from its onset within this step, unless it holds, or held and is over."""
     if not seen.observed:
         return monitor
-    if seen.contrary is None or (seen.holds is Truth.TRUE and not seen.decisive):
+    holds = seen.holds is Truth.TRUE and not seen.decisive
+    if seen.contrary is None or holds or (monitor.held and seen.unreached is not None):
         return replace(monitor, contrary=None, contrary_since=None)
     since = max(monitor.entered, seen.contrary.since)
     if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:

@@ -60,6 +60,19 @@ def test_who_goes_past_fails_to_dock_and_who_turns_back_to_approach(
     assert first(events, "stage_failing", not_fails) is None
 
 
+def test_an_approach_that_must_last_fails_where_one_goes_past_too_soon(tmp_path: Path) -> None:
+    text = CHARGE.replace("converging(vehicle, charger)", "converging(vehicle, charger) for 4 s")
+    events = watched(
+        tmp_path,
+        text,
+        lambda now: driving(now, turns_back=False),
+        {"vehicle": VEHICLE, "charger": CHARGER},
+        7.0,
+    )
+    assert first(events, "stage_started", "docked") is None
+    assert first(events, "stage_failing", "approach") is not None
+
+
 def carrying(now: float, *, drops: bool) -> Mask:
     """A gripper that takes a part along, and stops with it before the fixture, or drops it on the way."""
     x = eased(now, (0.5, 60.0), (2.0, 120.0), (3.0, 120.0), (5.5, 240.0))
