@@ -178,8 +178,14 @@ def coupling_cells(
 
 def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
     """Whether one of two has passed so far across the other that they cannot be in contact."""
-    size = min(float(np.sqrt(mind.objects[i].region.area)) for i in pair)
-    return contact.passing and contact.path > ContactSettings().doubt_share * size
+    return contact.passing and contact.path > ContactSettings().doubt_share * smaller_size(
+        pair, mind
+    )
+
+
+def smaller_size(pair: tuple[int, ...], mind: Mind) -> float:
+    """Size of the smaller one of two bodies: the square root of its area, pixels."""
+    return min(float(np.sqrt(mind.objects[i].region.area)) for i in pair)
 
 
 def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:

@@ -48,6 +48,7 @@ from visup.rules.coupling.evidence import (
     pair_regions,
     regions_apart,
     relation_table,
+    smaller_size,
     touching_bodies,
 )
 from visup.rules.coupling.relative_motion import (
@@ -260,8 +261,8 @@ class CouplingReasoner(ExplainableReasoner):
         speed = None if found is None else float(np.hypot(*found.velocity))
         dt = mind.time - track.path_end if track is not None else 0.0
         moment, crossed = (mind.time, dt), before.contact.path if before.contact else 0.0
-        size = min(float(np.sqrt(mind.objects[i].region.area)) for i in seen.pair)
-        back = seen.diverging == YES and crossed < s.doubt_share * size
+        least = s.doubt_share * smaller_size(seen.pair, mind)
+        back = seen.diverging == YES and crossed < least
         return updated_contact(before.contact, speed, limit, moment, s, thrown_back=back)
 
     def _leaves(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, Truth
 from visup.rules.coupling.contact import OutlineContact
-from visup.rules.coupling.evidence import COUPLING
+from visup.rules.coupling.evidence import COUPLING, smaller_size
 from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
 from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.relations.samples import SampleWindow
@@ -22,13 +22,13 @@ from visup.rules.relations.samples import SampleWindow
 LEAST_SAMPLES = 5
 """Fewest samples of a relative path."""
 
-PAST = 0.05
+LEAST_PATH = 0.05
 """Least length of a path past another body, image diagonals."""
 
 STRAIGHT = 0.85
 """Least distance of its ends as a share of its length: who turns back comes near where he was."""
 
-ON = 0.5
+STILL_MOVING = 0.5
 """Least speed at the end of such a path, as a share of the mean one."""
 
 BEYOND = 0.2
@@ -57,7 +57,7 @@ def goes_past(
         if not all(gapes(mind, *other) for other in held):
             return on
         # What is let go of falls onto what it met, unless it has crossed that by more than its own size.
-        return on and contact is not None and contact.path > _size(mind, objects)
+        return on and contact is not None and contact.path > smaller_size(objects, mind)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
@@ -91,11 +91,11 @@ def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
     walked = np.hypot(*np.diff(thirds, axis=0).T)
     way = path[-1] - path[0]
     length = float(np.hypot(*way))
-    if length < PAST * diagonal or length < STRAIGHT * float(walked.sum()):
+    if length < LEAST_PATH * diagonal or length < STRAIGHT * float(walked.sum()):
         return False
     along = path @ way / length
-    moves_on = float(walked[-1]) > ON * length / 3
-    return moves_on and float(along[0]) < 0.0 and float(along[-1]) > BEYOND * length
+    still = float(walked[-1]) > STILL_MOVING * length / 3
+    return still and float(along[0]) < 0.0 and float(along[-1]) > BEYOND * length
 
 
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
@@ -152,11 +152,6 @@ def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
 def gapes(mind: Mind, a: int, b: int) -> bool:
     """Whether there is a gap between the outlines of two bodies; False if unknown."""
     return kinematics(mind).pair("gap", a, b) > LET_GO_GAP * image_diagonal(mind.frame_size)
-
-
-def _size(mind: Mind, objects: tuple[int, ...]) -> float:
-    """Size of the smaller one of two bodies, pixels."""
-    return min(float(np.sqrt(mind.objects[i].region.area)) for i in objects)
 
 
 def _contact(mind: Mind, objects: tuple[int, ...]) -> OutlineContact | None:

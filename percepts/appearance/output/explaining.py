@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Region
-from visup.agent.model.fast_replace import replace
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.scene import Scene
@@ -120,16 +119,7 @@ def _rest_of(
     mask = clean_mask(left, LEAST * size[0] * size[1])
     if mask is None or np.count_nonzero(mask) < LEFT * region.area:
         return None
-    o = describe_mask(mask, region.bbox[:2], size)
-    return replace(
-        region,
-        bbox=o.bbox,
-        mask=o.mask,
-        contour=o.contour,
-        centroid=o.centroid,
-        area=o.area,
-        cut=o.cut,
-    )
+    return describe_mask(mask, region.bbox[:2], size).applied_to(region)
 
 
 def _take(left: Mask, bbox: tuple[int, int, int, int], thing: Region) -> None:

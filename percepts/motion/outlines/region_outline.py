@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Region
+from visup.agent.model.fast_replace import replace
 from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
@@ -63,6 +64,18 @@ class RegionOutline:
             velocity_sigma=sigma,
             cut=self.cut,
             confidence=confidence,
+        )
+
+    def applied_to(self, region: Region) -> Region:
+        """A region with this outline in place of its own."""
+        return replace(
+            region,
+            bbox=self.bbox,
+            mask=self.mask,
+            contour=self.contour,
+            centroid=self.centroid,
+            area=self.area,
+            cut=self.cut,
         )
 
 

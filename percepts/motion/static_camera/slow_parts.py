@@ -22,7 +22,6 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from visup.agent import Region
-from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.outlines.region_outline import describe_mask
@@ -250,13 +249,4 @@ def _reduced(r: Region, shape: tuple[int, ...], size: tuple[int, int]) -> Mask:
 
 def _joined(r: Region, added: Mask, size: tuple[int, int]) -> Region:
     large = cv2.resize(added.view(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
-    new = describe_mask(large | r.full_mask(size), (0, 0), size)
-    return replace(
-        r,
-        bbox=new.bbox,
-        mask=new.mask,
-        contour=new.contour,
-        centroid=new.centroid,
-        area=new.area,
-        cut=new.cut,
-    )
+    return describe_mask(large | r.full_mask(size), (0, 0), size).applied_to(r)

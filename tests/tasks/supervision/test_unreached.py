@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.tasks.supervision.drawn import Mask, drawn, first, watched
+from visup.agent import Event
 
 VEHICLE, CHARGER = 1, 2
 GRIPPER, PART, FIXTURE = 1, 2, 3
@@ -35,6 +36,12 @@ def eased(now: float, *keys: tuple[float, float]) -> float:
     return keys[-1][1]
 
 
+def charged(folder: Path, text: str, *, turns_back: bool) -> list[Event]:
+    """The events of a task of charging."""
+    roles = {"vehicle": VEHICLE, "charger": CHARGER}
+    return watched(folder, text, lambda now: driving(now, turns_back=turns_back), roles, 7.0)
+
+
 def driving(now: float, *, turns_back: bool) -> Mask:
     """A vehicle that drives past a charger below it, or back again before it."""
     there = 170.0 if turns_back else 400.0
@@ -49,26 +56,14 @@ def driving(now: float, *, turns_back: bool) -> Mask:
 def test_who_goes_past_fails_to_dock_and_who_turns_back_to_approach(
     tmp_path: Path, turns_back: bool, fails: str, not_fails: str
 ) -> None:
-    events = watched(
-        tmp_path,
-        CHARGE,
-        lambda now: driving(now, turns_back=turns_back),
-        {"vehicle": VEHICLE, "charger": CHARGER},
-        7.0,
-    )
+    events = charged(tmp_path, CHARGE, turns_back=turns_back)
     assert first(events, "stage_failing", fails) is not None
     assert first(events, "stage_failing", not_fails) is None
 
 
 def test_an_approach_that_must_last_fails_where_one_goes_past_too_soon(tmp_path: Path) -> None:
     text = CHARGE.replace("converging(vehicle, charger)", "converging(vehicle, charger) for 4 s")
-    events = watched(
-        tmp_path,
-        text,
-        lambda now: driving(now, turns_back=False),
-        {"vehicle": VEHICLE, "charger": CHARGER},
-        7.0,
-    )
+    events = charged(tmp_path, text, turns_back=False)
     assert first(events, "stage_started", "docked") is None
     assert first(events, "stage_failing", "approach") is not None
 
