@@ -60,7 +60,7 @@ from visup.rules.coupling.relative_motion import (
 )
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.relations.kinematics import RelationSettings
-from visup.rules.relations.reasoner import kinematics
+from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.wording.conditions import (
     Condition,
     DecisionLog,
@@ -90,7 +90,8 @@ class CouplingSettings:
         carried_share: The same as a share, where both are on the move.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
-        part_s: How long they must be apart before they are decoupled.
+        part_s: How long they must be apart before they are decoupled; or
+        part_path: how far they must have moved apart, image diagonals.
         contact: When outlines that meet are in contact.
         carriers: When a body that sets out counts as carried.
     """
@@ -108,6 +109,7 @@ class CouplingSettings:
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.35
+    part_path: float = 0.012
     contact: ContactSettings = field(default_factory=ContactSettings)
     carriers: CarrierSettings = field(default_factory=CarrierSettings)
 
@@ -199,10 +201,18 @@ class CouplingReasoner(ExplainableReasoner):
             odds,
             _since(before.rest_since, odds > 0.0, mind.time),
             _since(before.apart_since, apart, mind.time),
+            self._parted(before, seen.pair, mind) if apart else 0.0,
             track,
             contact,
             before.decoupled_at,
         )
+
+    def _parted(self, before: CouplingEvidence, pair: Pair, mind: Mind) -> float:
+        """How far two that are apart have moved relative to each other since, pixels."""
+        times = sample_window(mind).times
+        lasted = float(times[-1] - times[-2]) if len(times) > 1 else 0.0
+        speed = float(np.nan_to_num(kinematics(mind).pair("relative_speed", *pair)))
+        return before.apart_path + speed * lasted
 
     def _follow(
         self, before: RelativeTrack | None, seen: PairObservation, mind: Mind
@@ -324,6 +334,9 @@ class CouplingReasoner(ExplainableReasoner):
         """Conditions of two no longer being one body."""
         yield Condition("they are apart", evidence.apart_since is not None)
         if evidence.apart_since is not None:
+            least = self.settings.part_path * image_diagonal(mind.frame_size)
+            if evidence.apart_path >= least:
+                return
             lasted = mind.time - evidence.apart_since
             yield at_least("apart for", lasted, self.settings.part_s, " s", slack=1e-6)
 

@@ -104,7 +104,7 @@ def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
     What is dropped falls first.
     """
     first, window = objects[0], sample_window(mind)
-    held = [c.objects for c in mind.couplings if first in c.objects]
+    held = [pair for pair in _held(mind) if first in pair]
     if not held or first not in window.ids:
         return False
     recent = window.times > mind.time - RESTED_S
@@ -115,6 +115,13 @@ def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
     opened = all(_opened(window, pair, recent) > least for pair in held)
     # An outline that leaps opens a gap, too, but nobody moves.
     return rests and opened and all(mind.truth("coupled", *p) is not Truth.TRUE for p in held)
+
+
+def _held(mind: Mind) -> list[tuple[int, ...]]:
+    """The pairs that are coupled, or were until a moment ago."""
+    least, memory = mind.time - RESTED_S, mind.recall(COUPLING).items()
+    parted = [pair for pair, e in memory if e.decoupled_at is not None and e.decoupled_at > least]
+    return [*(c.objects for c in mind.couplings), *parted]
 
 
 def _opened(window: SampleWindow, pair: tuple[int, ...], recent: NDArray[np.bool_]) -> float:
