@@ -29,6 +29,7 @@ from visup.tasks.verification.passing import (
     holds_on,
     moves_on,
     put_down,
+    radial_share,
     stopped_at,
     went_past,
 )
@@ -170,16 +171,19 @@ class RelationLookup:
         rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
         return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
 
-    def explains_away(self, trend: str, action: str, objects: tuple[int, ...]) -> bool:
+    def explains_away(self, trend: Relation, action: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend contradicts an action only in appearance.
 
         A body that passes over or round another recedes from it a little; and after two have met, closing
         fingers or a rotating body move the outlines while the bodies stay in contact.
         """
-        if trend not in TRENDS:
+        if trend.name not in TRENDS:
             return False
         met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
-        return met or self.goes_round(trend, objects)
+        if met or self.goes_round(trend.name, objects):
+            return True
+        sign = 1.0 if trend.name == "diverging" else -1.0
+        return sign * radial_share(self._mind, objects, trend.since) < RADIAL_SHARE
 
     @property
     def time(self) -> float:
@@ -284,7 +288,7 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
-    if contrary is not None and relations.explains_away(contrary.name, meaning.name, ids):
+    if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
         contrary = None
     unreached = relations.unreached(meaning.name, ids, contrary)
     known = (*meaning.helps, *meaning.contrary)

@@ -98,16 +98,32 @@ def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
     return still and float(along[0]) < 0.0 and float(along[-1]) > BEYOND * length
 
 
+def radial_share(mind: Mind, objects: tuple[int, ...], since: float) -> float:
+    """How much the gap of two bodies has grown since then, as a share of how far one moved past the other.
+
+    1 if unknown. It still tells one that went round the other when he has come to rest.
+    """
+    window = sample_window(mind)
+    if not set(objects) <= set(window.ids):
+        return 1.0
+    i, j = (window.ids.index(o) for o in objects)
+    gap, path = window.separation[:, i, j], _centres(mind, objects[0]) - _centres(mind, objects[1])
+    known = (window.times >= since) & ~np.isnan(gap) & ~np.isnan(path).any(axis=1)
+    gap, path = gap[known], path[known]
+    moved = float(np.hypot(*(path[-1] - path[0]))) if len(path) > 1 else 0.0
+    return float(gap[-1] - gap[0]) / moved if moved > 0.0 else 1.0
+
+
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
     """Whether the first of some objects rests, and all that held it have let go of it just now.
 
     What is dropped falls first.
     """
     first, window = objects[0], sample_window(mind)
-    held = [pair for pair in _held(mind) if first in pair]
+    held = {pair: at for pair, at in _held(mind).items() if first in pair}
     if not held or first not in window.ids:
         return False
-    recent = window.times > mind.time - RESTED_S
+    recent = window.times > min(held.values()) - RESTED_S
     least = LET_GO_GAP * image_diagonal(mind.frame_size)
     path = _centres(mind, first)[recent]
     path = path[~np.isnan(path).any(axis=1)]
@@ -117,11 +133,11 @@ def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
     return rests and opened and all(mind.truth("coupled", *p) is not Truth.TRUE for p in held)
 
 
-def _held(mind: Mind) -> list[tuple[int, ...]]:
-    """The pairs that are coupled, or were until a moment ago."""
-    least, memory = mind.time - RESTED_S, mind.recall(COUPLING).items()
-    parted = [pair for pair, e in memory if e.decoupled_at is not None and e.decoupled_at > least]
-    return [*(c.objects for c in mind.couplings), *parted]
+def _held(mind: Mind) -> dict[tuple[int, ...], float]:
+    """The pairs that are coupled, or were until a moment ago, and until when, seconds."""
+    parted = {pair: e.decoupled_at for pair, e in mind.recall(COUPLING).items()}
+    lately = {p: at for p, at in parted.items() if at is not None and at > mind.time - RESTED_S}
+    return {**lately, **{c.objects: mind.time for c in mind.couplings}}
 
 
 def _opened(window: SampleWindow, pair: tuple[int, ...], recent: NDArray[np.bool_]) -> float:
