@@ -14,7 +14,7 @@ import numpy as np
 
 from visup.agent import ObjectBelief, Region
 from visup.rules.formula.truth import MAYBE, YES
-from visup.rules.geometry.regions import image_diagonal
+from visup.rules.geometry.regions import Box, image_diagonal
 from visup.rules.predicates._snapshot_jit import GAP
 from visup.rules.predicates.snapshot import Codes, Snapshot, code
 from visup.rules.presence.fragments import FragmentSettings
@@ -29,6 +29,8 @@ LEAST_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
 CAME_IN = 0.5
 """Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
+ADVANCED = 0.25
+"""How far its other side has moved away from that border since, in its sizes."""
 KEEP_OUT = "keep_out"
 """Prefix of the names of zones forbidden to all."""
 
@@ -72,21 +74,29 @@ def whole(facts: Snapshot) -> Codes:
 
 
 def came_in(facts: Snapshot) -> Codes:
-    """Whether an object came over the border of the image, by where it was first seen.
+    """Whether an object came over the border of the image, by where it was first seen and has gone since.
 
     An object that starts inside the picture was there before, is attached to something that was, or is its
-    shadow. A fast one is first seen a little inside.
+    shadow. A fast one is first seen a little inside. What is first seen at the border, but stays there, may be
+    attached to something outside, even if its region no longer reaches the border.
     """
-    memory, (width, height) = presence_memory(facts.mind), facts.mind.frame_size
+    memory, size = presence_memory(facts.mind), facts.mind.frame_size
 
     def look(b: ObjectBelief) -> int:
         if b.id not in memory.of:
             return MAYBE
-        x, y, w, h = memory.of[b.id].first_box
-        near = CAME_IN * max(w, h)
-        return code(min(x, y, width - x - w, height - y - h) <= near)
+        return code(_crossed_border(memory.of[b.id].first_box, b.region.bbox, size))
 
     return facts.each(look)
+
+
+def _crossed_border(first: Box, now: Box, size: tuple[int, int]) -> bool:
+    x, y, w, h = first
+    left, top, width, height = now
+    gaps = (x, y, size[0] - x - w, size[1] - y - h)
+    advances = (left + width - x - w, top + height - y - h, x - left, y - top)
+    near, least = CAME_IN * max(w, h), ADVANCED * max(width, height)
+    return any(g <= near and a >= least for g, a in zip(gaps, advances, strict=True))
 
 
 def identified(facts: Snapshot) -> Codes:

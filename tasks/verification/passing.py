@@ -101,17 +101,18 @@ def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
 def radial_share(mind: Mind, objects: tuple[int, ...], since: float) -> float:
     """How much the gap of two bodies has grown since then, as a share of how far one moved past the other.
 
-    1 if unknown. It still tells one that went round the other when he has come to rest.
+    NaN if that is unknown, or hardly a way. It still tells one that went round the other when he has come to rest.
     """
     window = sample_window(mind)
     if not set(objects) <= set(window.ids):
-        return 1.0
+        return math.nan
     i, j = (window.ids.index(o) for o in objects)
     gap, path = window.separation[:, i, j], _centres(mind, objects[0]) - _centres(mind, objects[1])
     known = (window.times >= since) & ~np.isnan(gap) & ~np.isnan(path).any(axis=1)
     gap, path = gap[known], path[known]
     moved = float(np.hypot(*(path[-1] - path[0]))) if len(path) > 1 else 0.0
-    return float(gap[-1] - gap[0]) / moved if moved > 0.0 else 1.0
+    least = LEAST_PATH * image_diagonal(mind.frame_size)
+    return float(gap[-1] - gap[0]) / moved if moved > least else math.nan
 
 
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
