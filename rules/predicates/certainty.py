@@ -31,6 +31,8 @@ CAME_IN = 0.5
 """Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
 ADVANCED = 0.25
 """How far its other side has moved away from that border since, in its sizes."""
+LEAST_VISIBLE = 0.5
+"""Least share of its area of what came in, as far as that was seen."""
 KEEP_OUT = "keep_out"
 """Prefix of the names of zones forbidden to all."""
 
@@ -78,14 +80,17 @@ def came_in(facts: Snapshot) -> Codes:
 
     An object that starts inside the picture was there before, is attached to something that was, or is its
     shadow. A fast one is first seen a little inside. What is first seen at the border, but stays there, may be
-    attached to something outside, even if its region no longer reaches the border.
+    attached to something outside, even if its region no longer reaches the border. And a region that leaps,
+    or shrinks to the rest of what it was, is hardly one thing.
     """
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
 
     def look(b: ObjectBelief) -> int:
         if b.id not in memory.of:
             return MAYBE
-        return code(_crossed_border(memory.of[b.id].first_box, b.region.bbox, size))
+        track = memory.of[b.id]
+        mostly = track.visible_share >= LEAST_VISIBLE
+        return code(mostly and _crossed_border(track.coherent_box, b.region.bbox, size))
 
     return facts.each(look)
 

@@ -31,6 +31,7 @@ class ObjectTrack:
         region: Its region as last seen.
         seen_at: Seconds of the last sighting.
         coherent_since: Seconds since when sightings followed each other without a jump.
+        coherent_box: Its box at that time.
         sightings: How many since then.
         centroids: Those of the last second in which it was unobstructed; at most 16.
         whole_box: Its box when last seen whole.
@@ -52,6 +53,7 @@ class ObjectTrack:
     region: Region
     seen_at: float
     coherent_since: float
+    coherent_box: Box = (0, 0, 0, 0)
     sightings: int = 1
     centroids: tuple[TimedCentroid, ...] = ()
     whole_box: Box = (0, 0, 0, 0)
@@ -115,6 +117,7 @@ def new_track(region: Region, now: float) -> ObjectTrack:
         region,
         now,
         now,
+        region.bbox,
         centroids=(centroid,),
         whole_box=region.bbox,
         whole_at=now,
@@ -160,6 +163,7 @@ def update_track(
         region=region,
         seen_at=now,
         coherent_since=track.coherent_since if smooth else now,
+        coherent_box=track.coherent_box if smooth else region.bbox,
         sightings=track.sightings + 1 if smooth else 1,
         centroids=centroids,
         whole_box=region.bbox if clear else track.whole_box,
