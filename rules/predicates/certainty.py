@@ -79,9 +79,9 @@ def came_in(facts: Snapshot) -> Codes:
     """Whether an object came over the border of the image, by where it was first seen and has gone since.
 
     An object that starts inside the picture was there before, is attached to something that was, or is its
-    shadow. A fast one is first seen a little inside. What is first seen at the border, but stays there, may be
-    attached to something outside, even if its region no longer reaches the border. And a region that leaps,
-    or shrinks to the rest of what it was, is hardly one thing.
+    shadow. A fast one is first seen a little inside. What is first seen at the border, but stays there, may
+    be attached to something outside, even if its region no longer reaches the border. And a region that
+    leaps, or shrinks to the rest of what it was, is hardly one thing.
     """
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
 

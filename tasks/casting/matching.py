@@ -161,13 +161,16 @@ def unexplained(
 
     With all actors bound that is any further object. While an actor is unbound, it may be an unidentified
     object, one that could be any actor, or one identified for only a few seconds; only an object that is
-    clearly something else is unexplained.
+    clearly something else is unexplained. Nor is an unknown one that holds an actor, as parts do not move
+    by themselves, and a task need not name whoever handles them.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
+    held = {i for c in mind.couplings if bound.intersection(c.objects) for i in c.objects}
     bindings = [replace(b, object_id=None) if b.guessed else b for b in bindings]
     if task is not None:
         bound.update(bystanders(task, mind, bindings, settings))
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
+    others = [o for o in others if o.id not in held or o.strength >= settings.familiar]
     if task is not None and task.bystanders:
         # Identification takes a while, and until then it may be one of them.
         others = [o for o in others if mind.time - o.first_seen >= settings.acquainted_s]

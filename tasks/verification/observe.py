@@ -26,12 +26,13 @@ from visup.tasks.verification.observation import (
 from visup.tasks.verification.passing import (
     gapes,
     goes_past,
+    goes_round,
     holds_on,
     moves_on,
     put_down,
-    radial_share,
     stopped_at,
     went_past,
+    went_round,
 )
 from visup.tasks.verification.pauses import PauseRecord
 from visup.tasks.verification.sudden import SuddenTrends
@@ -46,10 +47,6 @@ CARRIED_SPEED = 0.005
 
 REST_S = 0.3
 """How long a relative speed must be low before one body that passed the other rests there."""
-
-RADIAL_SHARE = 0.45
-"""Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
-flies round another it reaches 0.4."""
 
 
 class RelationLookup:
@@ -167,23 +164,21 @@ class RelationLookup:
 
     def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend is rather one going round the other; False if unknown."""
-        now, pair = kinematics(self._mind), (objects[0], objects[1])
-        rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
-        return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
+        return goes_round(self._mind, trend, objects)
 
     def explains_away(self, trend: Relation, action: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend contradicts an action only in appearance.
 
         A body that passes over or round another recedes from it a little; and after two have met, closing
-        fingers or a rotating body move the outlines while the bodies stay in contact.
+        fingers or a rotating body move the outlines while the bodies stay in contact. What is coupled
+        moves together, however its outlines drift.
         """
         if trend.name not in TRENDS:
             return False
-        met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
-        if met or self.goes_round(trend.name, objects):
+        if action == "moving_together" and self.find("coupled", objects).truth is Truth.TRUE:
             return True
-        sign = 1.0 if trend.name == "diverging" else -1.0
-        return sign * radial_share(self._mind, objects, trend.since) < RADIAL_SHARE
+        met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
+        return met or self.goes_round(trend.name, objects) or went_round(self._mind, trend)
 
     @property
     def time(self) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent import Mind, Truth
+from visup.agent import Mind, Relation, Truth
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING, smaller_size
 from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
@@ -33,6 +33,10 @@ STILL_MOVING = 0.5
 
 BEYOND = 0.2
 """Least share of such a path that lies beyond the nearest point."""
+
+RADIAL_SHARE = 0.45
+"""Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
+flies round another it reaches 0.4."""
 
 RESTED_S = 0.6
 """How long what is put down has rested, seconds."""
@@ -98,21 +102,30 @@ def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
     return still and float(along[0]) < 0.0 and float(along[-1]) > BEYOND * length
 
 
-def radial_share(mind: Mind, objects: tuple[int, ...], since: float) -> float:
-    """How much the gap of two bodies has grown since then, as a share of how far one moved past the other.
+def goes_round(mind: Mind, trend: str, objects: tuple[int, ...]) -> bool:
+    """Whether a trend is rather one of two going round the other now; False if unknown."""
+    now, pair = kinematics(mind), (objects[0], objects[1])
+    rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
+    return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
 
-    NaN if that is unknown, or hardly a way. It still tells one that went round the other when he has come to rest.
+
+def went_round(mind: Mind, trend: Relation) -> bool:
+    """Whether a trend was one of two going round the other, who may have come to rest since.
+
+    Then the gap has changed by little of the way that one went past the other since it began.
     """
-    window = sample_window(mind)
+    window, objects = sample_window(mind), trend.objects
     if not set(objects) <= set(window.ids):
-        return math.nan
+        return False
     i, j = (window.ids.index(o) for o in objects)
     gap, path = window.separation[:, i, j], _centres(mind, objects[0]) - _centres(mind, objects[1])
-    known = (window.times >= since) & ~np.isnan(gap) & ~np.isnan(path).any(axis=1)
+    known = (window.times >= trend.since) & ~np.isnan(gap) & ~np.isnan(path).any(axis=1)
     gap, path = gap[known], path[known]
-    moved = float(np.hypot(*(path[-1] - path[0]))) if len(path) > 1 else 0.0
-    least = LEAST_PATH * image_diagonal(mind.frame_size)
-    return float(gap[-1] - gap[0]) / moved if moved > least else math.nan
+    way = float(np.hypot(*(path[-1] - path[0]))) if len(path) > 1 else 0.0
+    if way < LEAST_PATH * image_diagonal(mind.frame_size):
+        return False
+    change = float(gap[-1] - gap[0])
+    return (change if trend.name == "diverging" else -change) < RADIAL_SHARE * way
 
 
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:

@@ -101,6 +101,16 @@ def test_who_draws_away_is_decoupled_though_touch_ends_later(speed: float) -> No
     assert 7.3 < found[1][1] < 7.6
 
 
+@pytest.mark.parametrize(("speed", "soon"), [(240.0, True), (15.0, False)])
+def test_who_clearly_leaves_is_decoupled_at_once_and_others_after_a_while(
+    speed: float, soon: bool
+) -> None:
+    thoughts = scene(lambda t: closing(t) if t < 8 else 180 + speed * (t - 8))
+    (_, (kind, at)) = told(thoughts)
+    assert kind == "decoupled"
+    assert (at - 8.0 < 0.3) is soon
+
+
 def test_who_is_decoupled_is_so_since_one_moment() -> None:
     """A stage that begins by it needs it to have lasted."""
     thoughts = scene(lambda t: closing(t) if t < 7 else 180 + 15 * (t - 7))

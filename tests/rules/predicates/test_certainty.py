@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +15,7 @@ from tests.rules.scenes import box_region, seen
 from visup.agent import Candidate, Mind
 from visup.agent.model.mind import Zone
 from visup.rules.formula.truth import YES
-from visup.rules.predicates.certainty import at_home, identified, standalone
+from visup.rules.predicates.certainty import at_home, came_in, identified, standalone
 from visup.rules.predicates.snapshot import Codes, Snapshot
 
 Rect = tuple[float, float, float, float]
@@ -76,3 +78,25 @@ def test_a_machine_is_at_home_where_it_was_from_the_start(
     polygon = ((corner, 150), (corner + 200, 150), (corner + 200, 350), (corner, 350))
     mind = replace(mind, zones=(Zone(name, polygon),))
     assert yes(mind, at_home(Snapshot(mind))) == home
+
+
+@pytest.mark.parametrize(
+    ("box", "comes"),
+    [
+        (lambda t: (100 * t - 90, 200, 100, 80), True),  # over the border
+        (
+            lambda t: (np.maximum(90 - 100 * t, 20), 200, 100, 80),
+            False,
+        ),  # to the border, from inside
+        (lambda t: (3 * np.sin(t), 200, 100, 80), False),  # wobbles at the border
+        (lambda t: (200 + 50 * t, 200, 100, 80), False),  # from inside
+        (lambda t: (5, 200, 100 - 25 * t, 80), False),  # at the border, cut to its rest
+        (lambda t: (100 * t - 90 if t < 1 else 300, 200, 100, 80), False),  # leaps
+        (lambda t: (100 * t - 90, 200, 100, 80 if t < 1.5 else 20), False),  # the rest of something
+    ],
+)
+def test_what_came_in_has_come_over_the_border_in_one_piece(
+    box: Callable[[float], Rect], comes: bool
+) -> None:
+    mind = reason(seen(i, [box_region(1, box(i / 25))]) for i in range(60))[-1].mind
+    assert yes(mind, came_in(Snapshot(mind))) == ({1} if comes else set())

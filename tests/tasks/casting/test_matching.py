@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from tests.tasks.scripted import belief
-from visup.agent import Binding, Mind, Presence
+from visup.agent import Binding, Coupling, Mind, Presence
 from visup.tasks import load_task, parse_task
 from visup.tasks.casting.matching import (
     best_matching,
@@ -127,6 +127,17 @@ def test_a_new_identity_does_not_make_an_object_unexplained_while_an_actor_is_lo
     assert unexplained(early, match(DOCK, early)) == ()
     known = replace(mind_of({"arm": 0.9}, {"satellite": 0.9}, {"dish": 0.8}), time=2.0)
     assert unexplained(known, match(DOCK, known)) == (3,)
+
+
+@pytest.mark.parametrize(("third", "expected"), [({}, ()), ({"dish": 0.8}, (3,))])
+def test_an_unknown_that_holds_an_actor_is_not_one_too_many(
+    third: dict[str, float], expected: tuple[int, ...]
+) -> None:
+    """Somebody must carry a part, whether the task names him or not; a known thing is another matter."""
+    mind = replace(mind_of({"arm": 0.9}, {"satellite": 0.9}, third), time=10.0)
+    assert unexplained(mind, match(DOCK, mind)) == (3,)
+    holding = replace(mind, couplings=(Coupling((2, 3), 9.0),))
+    assert unexplained(holding, match(DOCK, holding)) == expected
 
 
 def test_what_is_hidden_is_not_one_too_many_in_view() -> None:

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from visup.agent import Coupling, Relation, Truth
+from tests.rules.runs import reason
+from tests.rules.scenes import box_region, seen
+from visup.agent import Coupling, Mind, Observation, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
 from visup.tasks.verification.observation import ActionObservation
-from visup.tasks.verification.passing import goes_past, moves_on, stopped_at
+from visup.tasks.verification.passing import (
+    goes_past,
+    moves_on,
+    put_down,
+    stopped_at,
+    went_round,
+)
 
 GRIPPER, PART, TARGET = 1, 2, 3
 
@@ -59,6 +68,49 @@ def test_outlines_that_meet(
     mind = scene(held, gap, contact, passing_by)
     assert goes_past(mind, (PART, TARGET), lambda _: False) is past
     assert goes_past(mind, (TARGET, PART), lambda _: False) is past
+
+
+def gone(place: Callable[[float], tuple[float, float]], until: float) -> Mind:
+    """The mind after a small body has moved beside a large one at rest."""
+    large = box_region(TARGET, (300, 200, 120, 90))
+    return reason(
+        seen(i, [large, box_region(PART, (*place(i / 25), 40, 40))])
+        for i in range(round(25 * until))
+    )[-1].mind
+
+
+@pytest.mark.parametrize(
+    ("place", "round_it"),
+    [
+        (lambda t: (240 - 4 * min(t, 3), 120 + 50 * min(t, 3)), True),  # along it, and stops
+        (lambda t: (255 - 50 * min(t, 3), 220 + 4 * min(t, 3)), False),  # away from it
+        (lambda t: (255, 220), False),  # it has gone nowhere: nothing is known
+    ],
+)
+def test_who_went_round_another_did_so_also_after_he_has_stopped(
+    place: Callable[[float], tuple[float, float]], round_it: bool
+) -> None:
+    mind = gone(place, 3.2)
+    for objects in ((PART, TARGET), (TARGET, PART)):
+        trend = Relation("diverging", objects, Truth.TRUE, 2.0)
+        assert went_round(mind, trend) is round_it
+
+
+@pytest.mark.parametrize(("falls", "put"), [(False, True), (True, False)])
+def test_what_rested_when_its_carrier_left_was_put_down_and_what_fell_was_not(
+    falls: bool, put: bool
+) -> None:
+    def at(i: int) -> Observation:
+        t = i / 25
+        carried = 100 + 60 * min(t, 2.0)
+        leaves = 150 * max(0.0, t - 4.0)
+        falling = 200 * min(max(0.0, t - 4.0), 0.5) if falls else 0.0
+        part = box_region(PART, (carried, 240 + falling, 60, 50))
+        return seen(i, [box_region(GRIPPER, (carried, 180 - leaves, 60, 60)), part])
+
+    thoughts = reason(at(i) for i in range(125))
+    assert any(t.mind.couplings for t in thoughts)
+    assert any(put_down(t.mind, (PART, TARGET)) for t in thoughts) is put
 
 
 def test_what_rests_does_not_go_past() -> None:
