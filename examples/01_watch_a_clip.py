@@ -8,7 +8,7 @@ import visup
 from visup.runs.demo import demo_settings
 
 if __name__ == "__main__":
-    run = visup.watch(demo_settings(every=4))
+    run = visup.watch(demo_settings())
     for step in run:
         for event in step.events:
             print(f"{event.time:5.1f} s  {event.text}")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import BehaviourError
 from visup.agent.plugins.factory import BehaviourFactory, Constructor
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "visup.behaviours"
 
@@ -102,6 +104,8 @@ class Registry:
 
 def discover_behaviours() -> Registry:
     """A registry of all behaviours that installed packages offer under `visup.behaviours`."""
+    from importlib.metadata import entry_points
+
     registry = Registry()
     for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
         if point.name not in registry.names():

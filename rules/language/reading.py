@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.resources import files
@@ -12,6 +13,7 @@ from math import inf
 from typing import Any
 
 from lark import Lark, UnexpectedInput
+from lark.parsers.lalr_parser_state import ParseConf
 
 from visup.agent.model.errors import SourceLocation
 from visup.rules.correction.edits import Repair, edits, hint_of, offset_before
@@ -181,11 +183,21 @@ def _checked(checker: TypeChecker, found: Any) -> Iterator[Diagnostic]:
 
 
 def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
+    reading = _parser().parse_interactive(text, start=start)
+    state = reading.parser_state
+    state.parse_conf = _without_tree(state.parse_conf)
     try:
-        _parser().parse(text, start=start)
+        reading.parser.parse_from_state(state)
     except UnexpectedInput as fault:
         return fault
     return None
+
+
+def _without_tree(conf: ParseConf[Any]) -> ParseConf[Any]:
+    """A parser that only checks: building trees is most of the work, and repairs try many texts."""
+    found = copy(conf)
+    found.callbacks = {}
+    return found
 
 
 def _line_of(text: str, at: int) -> tuple[int, int]:

@@ -267,7 +267,8 @@ def extended_tree(
     t = tree
     paths = Paths(t.cost, t.view, t.chosen, t.since, t.orientation, t.rolled, t.path)
     choices = Choices(level.views, level.orientation, level.rolled, level.cost)
-    found, increase = extend_paths(costs, paths, choices, np.array(spin.rate))
+    rate = np.array(spin.rate, dtype=float)  # for whole numbers the loop would be compiled anew
+    found, increase = extend_paths(costs, paths, choices, rate)
     return InterpretationTree(time, *found, tree.total + increase)
 
 

@@ -125,13 +125,12 @@ State: TypeAlias = Leaf[W] | SequenceState[W] | ParallelState[W]
 
 def leaves(state: State[W]) -> tuple[Leaf[W], ...]:
     """The active steps of a state, in the order of the text."""
-    match state:
-        case Leaf():
-            return (state,)
-        case SequenceState(head=head):
-            return leaves(head)
-        case ParallelState(parts=parts):
-            return tuple(leaf for p in parts for leaf in leaves(p))
+    # A loop, as courses nest deeply, and this is asked of each hypothesis several times a step.
+    while isinstance(state, SequenceState):
+        state = state.head
+    if isinstance(state, Leaf):
+        return (state,)
+    return tuple(leaf for p in state.parts for leaf in leaves(p))
 
 
 def depth(state: State[W]) -> int:

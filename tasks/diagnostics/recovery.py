@@ -6,6 +6,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
@@ -85,7 +86,7 @@ def _parse_in_parts(text: str, source: Source) -> ParsedFile:
     used: set[str] = set()
     for chunk in split(text):
         try:
-            statements += read_statements(_in_place(chunk))
+            statements += _read_again(_in_place(chunk))
         except UnexpectedInput as e:
             faults.append(recognise_error(_near(chunk, e), source) or _unexpected(e, chunk, source))
             first = DECLARES.match(chunk.text)
@@ -97,6 +98,12 @@ def _parse_in_parts(text: str, source: Source) -> ParsedFile:
         faults = [_whole(text, source)]
     task = collect(statements, source.file)
     return ParsedFile(task, tuple(faults), frozenset(defined), frozenset(used))
+
+
+@lru_cache(maxsize=256)
+def _read_again(text: str) -> tuple[object, ...]:
+    """The statements of a text; the tries to mend one statement leave the others as they are."""
+    return tuple(read_statements(text))
 
 
 def _in_place(chunk: StatementText) -> str:

@@ -41,21 +41,21 @@ def true_times(name: str, noise: Noise, relation: str) -> list[float]:
     return [time for time, r in found if r is not None and r.truth is Truth.TRUE]
 
 
-FULL, HALF = Noise(seed=11), Noise(seed=12, every=2)
-ROUGH = Noise(seed=13, every=2, contour_px=2.0, missing=0.15, wrong=0.3)
+FULL, THIRD = Noise(seed=11), Noise(seed=12, every=3)
+ROUGH = Noise(seed=13, every=3, contour_px=2.0, missing=0.15, wrong=0.3)
 
 
 def test_a_capture_that_fails_is_converging_touching_diverging_and_never_coupled() -> None:
-    converging = true_times("capture_fails", HALF, "converging")
+    converging = true_times("capture_fails", THIRD, "converging")
     assert converging[0] < 4.5
     assert 10.0 < converging[-1] < 13.0
-    touching = true_times("capture_fails", HALF, "touching")
+    touching = true_times("capture_fails", THIRD, "touching")
     assert 10.0 < touching[0] < 12.0
     assert 13.0 < touching[-1] < 14.5
-    diverging = true_times("capture_fails", HALF, "diverging")
+    diverging = true_times("capture_fails", THIRD, "diverging")
     assert 12.0 < diverging[0] < 14.0
     assert diverging[-1] > 29.0
-    assert [k for k, _, _ in events("capture_fails", HALF)] == ["entry", "entry"]
+    assert [k for k, _, _ in events("capture_fails", THIRD)] == ["entry", "entry"]
 
 
 def test_a_capture_that_succeeds_is_coupled() -> None:
@@ -67,14 +67,14 @@ def test_a_capture_that_succeeds_is_coupled() -> None:
 
 
 def test_an_approach_that_is_aborted_never_touches() -> None:
-    assert true_times("approach_aborted", HALF, "converging")[0] < 5.0
-    assert not true_times("approach_aborted", HALF, "touching")
-    diverging = true_times("approach_aborted", HALF, "diverging")
+    assert true_times("approach_aborted", THIRD, "converging")[0] < 5.0
+    assert not true_times("approach_aborted", THIRD, "touching")
+    diverging = true_times("approach_aborted", THIRD, "diverging")
     assert 12.0 < diverging[0] < 14.5
-    assert [k for k, _, _ in events("approach_aborted", HALF)] == ["entry", "entry"]
+    assert [k for k, _, _ in events("approach_aborted", THIRD)] == ["entry", "entry"]
 
 
-@pytest.mark.parametrize("noise", [HALF, ROUGH], ids=["half", "rough"])
+@pytest.mark.parametrize("noise", [THIRD, ROUGH], ids=["third", "rough"])
 def test_what_an_intruder_hides_reappears_as_itself(noise: Noise) -> None:
     told = [e for e in events("occlusion_by_intruder", noise) if e[2] > 2.0]
     expected = [
@@ -97,7 +97,7 @@ def test_what_an_intruder_hides_reappears_as_itself(noise: Noise) -> None:
 
 
 def test_an_intruder_that_comes_near_is_unexpected_and_on_a_collision_course() -> None:
-    thoughts, who = run("intruder_on_collision_course", HALF)
+    thoughts, who = run("intruder_on_collision_course", THIRD)
     first: dict[tuple[str, tuple[str, ...]], float] = {}
     for t in thoughts:
         for c in t.conditions:
@@ -109,7 +109,7 @@ def test_an_intruder_that_comes_near_is_unexpected_and_on_a_collision_course() -
     }
     assert first["unexpected_object", ("intruder",)] < 10.0
     assert first["collision_course", ("intruder", "satellite")] < 12.0
-    told = [e for e in events("intruder_on_collision_course", HALF) if e[2] > 2.0]
+    told = [e for e in events("intruder_on_collision_course", THIRD) if e[2] > 2.0]
     assert [(k, o) for k, o, _ in told] == [
         ("entry", ("intruder",)),
         ("coupled", ("arm", "satellite")),

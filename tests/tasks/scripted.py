@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -24,6 +25,7 @@ from visup.agent import (
     TaskBelief,
     Truth,
 )
+from visup.agent.model.relation_table import RelationTable
 from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.reasoner import RELATIONS, RelationMemory
 from visup.rules.relations.rows import PairQuantity
@@ -86,6 +88,14 @@ class Script:
         "moving_together",
     )
 
+    @cached_property
+    def told(self) -> Mapping[tuple[str, frozenset[int]], Sequence[Spell]]:
+        """The spells of each relation between the same objects."""
+        found: dict[tuple[str, frozenset[int]], list[Spell]] = {}
+        for spell in self.spells:
+            found.setdefault((spell.name, frozenset(spell.objects)), []).append(spell)
+        return found
+
 
 def belief(
     number: int,
@@ -125,7 +135,8 @@ def mind_at(script: Script, time: float, index: int, before: Mind) -> Mind:
         time=time,
         frame_index=index,
         objects=MappingProxyType(objects),
-        relations=_relations(script, time, objects),
+        # As a table, which is made once for all that is asked of one mind.
+        relations=RelationTable(extra=_relations(script, time, objects)),
         alerts=alerts,
         actors=script.actors,
     )
@@ -153,7 +164,7 @@ def _relations(
 
 
 def _relation(script: Script, name: str, pair: tuple[int, int], time: float) -> Relation:
-    mine = [s for s in script.spells if s.name == name and set(s.objects) == set(pair)]
+    mine = script.told.get((name, frozenset(pair)), ())
     for spell in mine:
         if spell.from_s <= time < spell.to_s:
             return Relation(name, pair, spell.truth, spell.from_s, spell.confidence)

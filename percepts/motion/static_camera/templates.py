@@ -86,8 +86,9 @@ def best_template_shift(s: BlobTrack, blob: Floats, view: Foreground) -> tuple[f
     step = max(1, int(np.sqrt(np.count_nonzero(s.shape) / ENOUGH)))
     reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
     corner = round(s.corner[0]), round(s.corner[1])
-    tone = np.ascontiguousarray(s.tone)
-    return best_shift(view.image, blob, s.shape, tone, corner, reach, step)
+    # Of one layout, as the loop is compiled anew for another one, in the middle of a run.
+    shape, tone = np.ascontiguousarray(s.shape), np.ascontiguousarray(s.tone)
+    return best_shift(view.image, blob, shape, tone, corner, reach, step)
 
 
 def _pixel_costs(
