@@ -149,9 +149,12 @@ def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
 
 def _held(mind: Mind) -> dict[tuple[int, ...], float]:
     """The pairs that are coupled, or were until a moment ago, and until when, seconds."""
-    parted = {pair: e.decoupled_at for pair, e in mind.recall(COUPLING).items()}
-    lately = {p: at for p, at in parted.items() if at is not None and at > mind.time - RESTED_S}
-    return {**lately, **{c.objects: mind.time for c in mind.couplings}}
+    held: dict[tuple[int, ...], float] = {c.objects: mind.time for c in mind.couplings}
+    for pair, evidence in mind.recall(COUPLING).items():
+        parted = evidence.decoupled_at
+        if parted is not None and parted > mind.time - RESTED_S:
+            held.setdefault(pair, parted)
+    return held
 
 
 def _opened(window: SampleWindow, pair: tuple[int, ...], recent: NDArray[np.bool_]) -> float:
