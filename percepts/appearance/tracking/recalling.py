@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
@@ -69,14 +71,17 @@ def _strayed(track: ThingTrack, best: Match) -> bool:
 def _elsewhere(
     track: ThingTrack, number: int, here: Match, views: Sequence[ViewModel], scene: Scene
 ) -> tuple[int, Match]:
-    """A nearby position that clearly matches a taught view better."""
+    """A position that clearly matches a taught view better: nearby, or anywhere if the track was never proven.
+
+    By its colours alone a body may have passed for the object while that is elsewhere.
+    """
     assert track.pose is not None
     it = views[number].appearance
     size = _as_large(track.pose, track, views[number], views).scale
     taught = views[number].pose.scale * max(scene.size) / max(views[number].size)
     poses = [PatchPose(0, 0, size * s, track.pose.angle) for s in SIZES]
     poses += [PatchPose(0, 0, taught * s) for s in SIZES]
-    far = REACH * it.radius * size
+    far = REACH * it.radius * size if track.proven else np.inf
     found = [m for m in search(scene, it, poses) if m.pose.apart(track.pose, 0) < far]
     best = max(found, key=lambda m: m.score, default=here)
     return number, best if best.score > here.score + BETTER else here
