@@ -1,13 +1,11 @@
-"""Helpers of all evaluations: progress, means over items, parallel processing, memory."""
+"""Helpers of all evaluations: progress, means over items, memory."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 Progress = Callable[[str], None]
 """Shows, as a line of text, what is being done."""
@@ -26,37 +24,6 @@ def mean_of(items: Sequence[Mapping[str, Any]], key: str) -> float | None:
 def sums_of(items: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> dict[str, Any]:
     """Sums of figures over all items, by key."""
     return {key: sum(item[key] for item in items) for key in keys}
-
-
-Item = TypeVar("Item")
-Found = TypeVar("Found")
-
-
-def each_in_processes(
-    work: Callable[[Item], Found], items: Sequence[Item], workers: int
-) -> Iterator[tuple[Item, Found]]:
-    """Each item with its result, in order of completion; in this process with a single worker.
-
-    Args:
-        work: A module-level function, which is pickled.
-        items: Its arguments.
-        workers: Worker processes.
-    """
-    if min(workers, len(items)) <= 1:
-        yield from ((item, work(item)) for item in items)
-        return
-    # Fresh processes: a fork would share the state of OpenCV's threads.
-    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
-        todo = {pool.submit(work, item): item for item in items}
-        for done in as_completed(todo):
-            yield todo[done], done.result()
-
-
-def _alone() -> None:
-    """Limit each process to one thread: the processes share the cores already."""
-    import cv2
-
-    cv2.setNumThreads(1)
 
 
 def resident_mb() -> float:

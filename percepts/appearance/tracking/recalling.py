@@ -71,7 +71,7 @@ def _strayed(track: ThingTrack, best: Match) -> bool:
 def _elsewhere(
     track: ThingTrack, number: int, here: Match, views: Sequence[ViewModel], scene: Scene
 ) -> tuple[int, Match]:
-    """A position that clearly matches a taught view better: nearby, or anywhere if the track was never proven.
+    """A position that clearly matches a taught view better: nearby, or anywhere for a track never proven.
 
     By its colours alone a body may have passed for the object while that is elsewhere.
     """

@@ -10,9 +10,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +28,7 @@ from visup.evaluation.training.runner import (
     gathered,
     known_or_error,
 )
+from visup.evaluation.workers import each_in_processes
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.foreground.perceptron import write_model
 
@@ -239,21 +238,12 @@ def _measured(
 
 
 def _scored(trials: Mapping[Any, Trial], workers: int) -> Iterator[tuple[Any, dict[str, Any]]]:
-    if min(workers, len(trials)) <= 1:
-        yield from ((key, _score(trial)) for key, trial in trials.items())
-        return
-    # Fresh processes: a fork would share the state of OpenCV's threads.
-    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
-        waiting = {pool.submit(_score, trial): key for key, trial in trials.items()}
-        for done in as_completed(waiting):
-            yield waiting[done], done.result()
+    for (key, _), figures in each_in_processes(_score_of, tuple(trials.items()), workers):
+        yield key, figures
 
 
-def _alone() -> None:
-    """Limit each process to one thread: the processes share the cores already."""
-    import cv2
-
-    cv2.setNumThreads(1)
+def _score_of(trial: tuple[Any, Trial]) -> dict[str, Any]:
+    return _score(trial[1])
 
 
 def _score(trial: Trial) -> dict[str, Any]:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from visup.agent import Verdict
 from visup.agent.model.errors import TaskError
-from visup.evaluation.figures import Progress, each_in_processes, silent, sums_of
+from visup.evaluation.figures import Progress, silent, sums_of
 from visup.evaluation.learning.worlds import world_minds
+from visup.evaluation.workers import each_in_processes
 from visup.render.worlds.kinds.catalogue import KINDS, known_kinds, random_world
 from visup.rules.predicates.vocabulary import IMPLIED
 from visup.tasks import parse_task

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from visup.evaluation.figures import Progress, each_in_processes, silent
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.machines.runner import evaluate_machines
 from visup.evaluation.machines.scores import machine_total
+from visup.evaluation.workers import each_in_processes
 
 SEEDS_APART = 10_000
 """Distance between the world seeds of two evaluation seeds."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.runner import evaluate_missions, mission_total
+from visup.evaluation.workers import each_in_processes
 
 SEEDS_APART = 10_000
 """Distance between the mission seeds of two evaluation seeds."""
@@ -102,22 +102,9 @@ def _scored(
     seeds: Sequence[int], models: Path, how: tuple[int, int | None], workers: int | None
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Names and figures of missions in order of completion."""
-    many = min(workers or os.cpu_count() or 1, len(seeds))
-    if many <= 1:
-        yield from (score(seed, models, *how) for seed in seeds)
-        return
-    # Fresh processes: a fork would share the state of OpenCV's threads.
-    with ProcessPoolExecutor(many, get_context("spawn"), _alone) as pool:
-        waiting = [pool.submit(score, seed, models, *how) for seed in seeds]
-        for done in as_completed(waiting):
-            yield done.result()
-
-
-def _alone() -> None:
-    """Limit each process to one thread: the processes share the cores already."""
-    import cv2
-
-    cv2.setNumThreads(1)
+    work = partial(score, models=models, width=how[0], limit=how[1])
+    for _, found in each_in_processes(work, seeds, workers or os.cpu_count() or 1):
+        yield found
 
 
 def score(

@@ -9,16 +9,16 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib import resources
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.evaluation.figures import Progress, silent
+from visup.evaluation.workers import each_in_processes
 from visup.render.scenario.library import bench_names, shipped_scenario
 
 MARK = "made-of.txt"
@@ -70,7 +70,8 @@ def evaluate_clips(
     """
     wanted = _known(names)
     found: dict[str, dict[str, Any]] = {}
-    for name, figures in _scored(wanted, cache, workers or os.cpu_count() or 1):
+    score = partial(_score, cache=cache)
+    for name, figures in each_in_processes(score, wanted, workers or os.cpu_count() or 1):
         found[name] = figures
         progress(f"{len(found)} of {len(wanted)} clips")
     items = {name: judged(found[name], bar_of(name)) for name in wanted}
@@ -151,27 +152,6 @@ def _recipe(name: str) -> str:
     for file in (*code, package / "scenarios" / "bench" / f"{name}.toml"):
         digest.update(file.read_bytes())
     return digest.hexdigest() + "\n"
-
-
-def _scored(
-    names: Sequence[str], cache: Path, workers: int
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Clips and their figures in order of completion."""
-    if min(workers, len(names)) == 1:
-        yield from ((name, _score(name, cache)) for name in names)
-        return
-    # Fresh processes: a fork would share the state of OpenCV's threads.
-    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
-        waiting = {pool.submit(_score, name, cache): name for name in names}
-        for done in as_completed(waiting):
-            yield waiting[done], done.result()
-
-
-def _alone() -> None:
-    """Limit each process to one thread: the processes share the cores already."""
-    import cv2
-
-    cv2.setNumThreads(1)
 
 
 def _score(name: str, cache: Path) -> dict[str, Any]:

@@ -7,10 +7,8 @@ identities, events, and the state of the task.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +27,7 @@ from visup.evaluation.missions.runner import mission_total, report_scores
 from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth, parse_truth
 from visup.evaluation.simulation.percepts import PerceptNoise, behaviours_of, frames_of
 from visup.evaluation.simulation.truth_masks import Mission, TrueMask, load_mission
+from visup.evaluation.workers import worker_pool
 from visup.rules.reasoners import default_reasoners
 from visup.tasks import load_task
 from visup.tasks.supervision.supervise import task_reasoner
@@ -243,7 +242,7 @@ def evaluate_reasoning(
         for k in range(len(missions))
     ]
     runs: dict[str, list[dict[str, Any]]] = {}
-    with ProcessPoolExecutor(max_workers=jobs, mp_context=get_context("spawn")) as pool:
+    with worker_pool(jobs) as pool:
         for mission, found in zip(missions, pool.map(run, missions, chances), strict=True):
             runs[mission.name] = found
             progress(mission.name)

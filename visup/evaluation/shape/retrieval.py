@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
+from visup.evaluation.workers import worker_pool
 from visup.percepts.shape.building.database_builder import PICTURES, read_silhouette
 from visup.percepts.shape.database.model_database import candidates_wanted
 from visup.percepts.shape.index.view_index import ViewIndex
@@ -123,9 +122,7 @@ def _similarities(
     graphs, looks = np.eye(size), np.eye(size)
     begins = list(range(1, size, _ROWS))
     seconds = 0.0
-    with ProcessPoolExecutor(
-        _PROCESSES, get_context("spawn"), initializer=_set_shapes, initargs=(shapes,)
-    ) as pool:
+    with worker_pool(_PROCESSES, _set_shapes, shapes) as pool:
         for done in pool.map(_compare_rows, begins):
             seconds += done.seconds
             for i, g, o in zip(done.rows, done.graphs, done.looks, strict=True):
