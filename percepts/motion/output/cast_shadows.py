@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
-from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.features.work_image import Floats, reduced
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 Mask = NDArray[np.bool_]
@@ -182,17 +182,7 @@ def comparable_image(frame: Frame) -> Floats:
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-    scale = min(1.0, SIZE / max(frame.size))
-    size = (max(8, round(frame.size[0] * scale)), max(8, round(frame.size[1] * scale)))
-    # Means over whole pixels first: by a ratio that is no whole number they take eight times as long.
-    whole = max(int(1 / scale), 1)
-    if whole > 1:
-        height, width = (n // whole * whole for n in image.shape[:2])
-        fewer = (width // whole, height // whole)
-        image = np.asarray(
-            cv2.resize(image[:height, :width], fewer, interpolation=cv2.INTER_AREA), dtype=np.uint8
-        )
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+    return reduced(image, SIZE).astype(np.float32)
 
 
 def _aligned(ground: BareGround, scene: FrameMeasurements) -> BareGround:
