@@ -115,7 +115,9 @@ def find_blobs(
     keep = component_areas(filled, labels, count) >= least
     keep[0] = False
     number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
-    return Foreground(image, renumbered(labels, number), int(keep.sum()), time, seconds)
+    return Foreground(
+        image, renumbered(np.asarray(labels, np.int32), number), int(keep.sum()), time, seconds
+    )
 
 
 @compiled
