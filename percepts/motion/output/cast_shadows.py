@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
 from visup.percepts.motion.features.work_image import Floats, reduced
+from visup.percepts.motion.output._cast_shadows_jit import changed_tones, masked_greys
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 Mask = NDArray[np.bool_]
@@ -132,17 +133,11 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     Returns:
         The evidence; 0 when there is none.
     """
-    known = where & np.isfinite(ground[..., 0])
-    rest = np.where(known[..., None], ground, 0)
-    gap = now - rest
-    differs = known & (np.einsum("ijk,ijk->ij", gap, gap) > 3 * CHANGED**2)
-    if differs.sum() < max(LEAST, LEAST_SHARE * where.sum()):
+    now, ground = np.ascontiguousarray(now), np.ascontiguousarray(ground)
+    differs, bright, tint, power = changed_tones(now, ground, where, 3 * CHANGED**2)
+    if len(bright) < max(LEAST, LEAST_SHARE * np.count_nonzero(where)):
         return 0.0
-    a, b = now[differs], rest[differs]
-    power = np.einsum("ij,ij->i", b, b) + 1.0
-    bright = np.einsum("ij,ij->i", a, b) / power
-    off = a - bright[:, None] * b
-    hue = np.sqrt(np.einsum("ij,ij->i", off, off) / power)
+    hue = np.sqrt(tint)
     dim = (bright > DIMMED[0]) & (bright < DIMMED[1]) & (hue < HUE + 6.0 / np.sqrt(power))
     shaded = float(dim.mean())
     if shaded < OPAQUE:
@@ -150,7 +145,7 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     low, high = np.quantile(bright[dim], [0.1, 0.9]).tolist()
     if shaded < SHADED or high > EVEN * low:
         return 0.0
-    seen_through = _texture_agreement(now, rest, differs)
+    seen_through = _texture_agreement(now, ground, differs)
     if seen_through is None:
         even = high < BARE_EVEN * low and float(np.quantile(hue, 0.9)) < BARE_HUE
         return FOR / 2 if even else 0.0
@@ -172,7 +167,7 @@ def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None
 
 def _detail(image: Floats, where: Mask) -> Floats:
     """Difference from the local mean within a mask, (h, w)."""
-    grey = np.where(where, image.mean(axis=2), 0).astype(np.float32)
+    grey = masked_greys(image, where)
     count = cv2.blur(where.astype(np.float32), (7, 7))
     return np.asarray(grey - cv2.blur(grey, (7, 7)) / np.maximum(count, 1e-3), dtype=np.float32)
 
