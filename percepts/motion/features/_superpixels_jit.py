@@ -59,7 +59,7 @@ def cell_statistics(
 
 
 @compiled
-def cell_totals(labels: Labels, values: Floats, count: int) -> Floats:
+def cell_totals(labels: Labels, values: NDArray[Any], count: int) -> Floats:
     """Sum of a (h, w) map, most of it 0, in each cell, (count,) float32."""
     height, width = labels.shape
     out = np.zeros(count, np.float32)
@@ -225,13 +225,13 @@ def bounding_box(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int,
 
 
 @compiled
-def paint_cells(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floats:
-    """1 at the pixels of some cells and 0 elsewhere, (h, w) float32."""
-    out = np.zeros(labels.shape, np.float32)
+def paint_cells(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True at the pixels of some cells and False elsewhere, (h, w)."""
+    out = np.zeros(labels.shape, np.bool_)
     left, top, right, bottom = bounding_box(corners, members)
     for y in range(top, bottom):
         for x in range(left, right):
-            out[y, x] = np.float32(members[labels[y, x]])
+            out[y, x] = members[labels[y, x]]
     return out
 
 

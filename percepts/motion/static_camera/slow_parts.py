@@ -190,7 +190,7 @@ def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) 
         ground = ground + BARE * cells.mean(np.asarray(seen, np.float32))
     body = np.asarray(OWN * mine + CHANGED * change, np.float32)
     share = _random_walk(body, np.asarray(ground, np.float32), cells)
-    inside = (cells.paint(share > 0.5) > 0) | own
+    inside = cells.paint(share > 0.5) | own
     count, labels = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
     touched = np.zeros(count, dtype=bool)
     touched[labels[own]] = True
