@@ -236,3 +236,25 @@ def laplacian(
         at += 1
         columns[m + 1], beyond[m] = at, degree - within
     return data[:at], rows[:at], columns, beyond
+
+
+@compiled
+def may_be_foreground(
+    share: Floats, weight: Floats, prior: Floats, persistence: Floats, least: float
+) -> NDArray[np.bool_]:
+    """Which cells have more than a least weight of labels other than the first, (count,).
+
+    Args:
+        share: (count, K) label shares by evidence.
+        weight: (count,) their weight.
+        prior: (count, K) label shares before.
+        persistence: (count,) their weight.
+        least: The weight.
+    """
+    out = np.empty(len(share), np.bool_)
+    for c in range(len(share)):
+        now, before = np.float32(0), np.float32(0)
+        for k in range(1, share.shape[1]):
+            now, before = now + share[c, k], before + prior[c, k]
+        out[c] = now * weight[c] + before * persistence[c] > least
+    return out

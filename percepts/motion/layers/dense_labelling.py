@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from visup.percepts.motion.features._partition_jit import laplacian
+from visup.percepts.motion.features._partition_jit import laplacian, may_be_foreground
 from visup.percepts.motion.features._superpixels_jit import bayes_shares, sum_point_evidence
 from visup.percepts.motion.features.motion_constraints import Points
 from visup.percepts.motion.features.settings import MotionSettings
@@ -124,15 +124,14 @@ def random_walk(
     """
     # Far from any cell that may not be background the answer is background: only the rest is solved
     # for, with those cells as its boundary.
-    uncertain = (
-        share[:, 1:].sum(axis=1) * weight + prior[:, 1:].sum(axis=1) * persistence
-    ) > UNCERTAIN
+    uncertain = may_be_foreground(share, weight, prior, persistence, UNCERTAIN)
     inside = np.flatnonzero(cells.dilated(uncertain[:, None], UNCERTAIN_STEPS)[:, 0])
-    out = np.zeros(share.shape)
+    out = np.zeros(share.shape, np.float32)
     out[:, 0] = 1.0
     if not len(inside):
-        return out.astype(np.float32)
-    right = (share * weight[:, None] + prior * persistence[:, None])[inside].astype(np.float64)
+        return out
+    right = share[inside] * weight[inside, None] + prior[inside] * persistence[inside, None]
+    right = right.astype(np.float64)
     own = (weight + persistence + bias)[inside].astype(np.float64)
     system, beyond = _system(cells.link, inside, own)
     right[:, 0] += bias[inside] + beyond
@@ -146,7 +145,7 @@ def random_walk(
     ).solve(right)
     found = np.maximum(found, 0)
     out[inside] = found / found.sum(axis=1, keepdims=True)
-    return np.asarray(out, dtype=np.float32)
+    return out
 
 
 def _system(
