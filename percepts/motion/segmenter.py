@@ -327,16 +327,14 @@ class MotionSegmenter:
     def _long_lags(self, image: WorkImage) -> list[int]:
         """The longer baseline to measure in this frame: they take turns, one per frame.
 
-        Long baselines serve slow motion. When the camera has turned far, there is little to compare,
-        and that misleads.
+        They serve slow motion. When the camera has turned far, there is little to compare, which misleads;
+        while it moves, single frames decide what is reported, and every other frame is enough.
         """
-        far = FARTHEST * max(image.shape)
-        lags = [
-            lag
-            for lag in self._history.lags(self.settings.lags_s)
-            if lag > 1 and self._camera_shift(image, lag) < far
-        ]
-        return [lags[self._count % len(lags)]] if lags else []
+        every, far = 2 if self._foreground.moves else 1, FARTHEST * max(image.shape)
+        wanted = () if self._count % every else self.settings.lags_s
+        all_ = self._history.lags(wanted)
+        lags = [lag for lag in all_ if lag > 1 and self._camera_shift(image, lag) < far]
+        return [lags[self._count // every % len(lags)]] if lags else []
 
     def _camera_shift(self, image: WorkImage, lag: int) -> float:
         """Predicted displacement of the image centre by the camera, pixels."""
