@@ -266,3 +266,22 @@ def settled(
                     total += weights[at] * out[neighbours[at], k]
                 out[c, k] = total * share[c, k]
     return out
+
+
+@compiled
+def nearest_lengths(ground: Floats, flow: Floats) -> Floats:
+    """Length of the background motion nearest to the flow of each cell, (count,).
+
+    Args:
+        ground: (M, count, 2) displacements of each cell by the background's motions.
+        flow: (count, 2) flow back at each.
+    """
+    out = np.empty(len(flow), np.float32)
+    for c in range(len(flow)):
+        least = np.float32(np.inf)
+        for m in range(len(ground)):
+            x, y = ground[m, c, 0], ground[m, c, 1]
+            off = (x + flow[c, 0]) ** 2 + (y + flow[c, 1]) ** 2
+            if off < least:
+                least, out[c] = off, np.sqrt(x * x + y * y)
+    return out
