@@ -58,7 +58,7 @@ from visup.percepts.motion.layers.dense_labelling import (
     label_cells,
 )
 from visup.percepts.motion.layers.layer_discovery import affine_rate
-from visup.percepts.motion.output.cast_shadows import CastShadowFilter, comparable_image
+from visup.percepts.motion.output.cast_shadows import CastShadowFilter
 from visup.percepts.motion.output.region_report import (
     OutlinedFrame,
     apply_ignore,
@@ -180,7 +180,6 @@ class MotionSegmenter:
         self._cells = scene.cells
         tracks, prior = self._initiated(fit_tracks(predicted, scene), scene, prior)
         evidence, labelling, shown = self._labelled(scene, tracks, prior, directives)
-        small = self._executor.submit(comparable_image, frame)
         keys = tuple(t.key for t in tracks)
         tracks = self._updated(tracks, scene, evidence, labelling)
         ground = scene.measured[0].background.models[-1]
@@ -191,8 +190,7 @@ class MotionSegmenter:
         regions = self._reported(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
-        small_image, static = small.result(), self._static.active
-        regions = self._shadows.step(frame, small_image, scene, regions, static=static)
+        regions = self._shadows.step(frame, scene, regions, static=self._static.active)
         return select_regions(regions, directives)
 
     @property

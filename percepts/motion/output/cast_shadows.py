@@ -77,7 +77,6 @@ class CastShadowFilter:
     def step(
         self,
         frame: Frame,
-        image: Floats,
         scene: FrameMeasurements,
         regions: Sequence[Region],
         *,
@@ -87,7 +86,6 @@ class CastShadowFilter:
 
         Args:
             frame: The frame.
-            image: The same, from `comparable_image`.
             scene: Its measurements, for the camera's motion since the previous frame.
             regions: All that move, frame pixels.
             static: Whether the camera is known to be static.
@@ -96,23 +94,31 @@ class CastShadowFilter:
             The remaining regions, in the same order.
         """
         self._frames += 1
-        ground = self._ground
+        if self._ground is not None and not static:
+            self._ground = _aligned(self._ground, scene)
+        asked = [r for r in regions if self._is_asked(r)]
+        if asked or self._ground is None or frame.time - self._ground.since >= DELAY_S:
+            self._look(frame, regions, asked)
+        return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
+
+    def _is_asked(self, region: Region) -> bool:
+        """Whether a region is looked at; what has long been no shadow is in turn with others."""
+        settled = self._evidence.get(region.id, 0.0) <= BOUNDS[0]
+        return not settled or (self._frames + region.id) % TURNS == 0
+
+    def _look(self, frame: Frame, regions: Sequence[Region], asked: Sequence[Region]) -> None:
+        """Compare regions with the ground, and renew the ground when it is due."""
+        image, ground = comparable_image(frame), self._ground
         if ground is None or ground.bare.shape != image.shape:
             nowhere = np.full_like(image, np.nan)
             self._ground = BareGround(nowhere, nowhere, frame.time - DELAY_S)
-            return tuple(regions)
-        if not static:
-            ground = _aligned(ground, scene)
-        for r in regions:
-            # What has long been no shadow is looked at in turn with others.
-            settled = self._evidence.get(r.id, 0.0) <= BOUNDS[0]
-            if not settled or (self._frames + r.id) % TURNS == 0:
-                self._weigh(r, image, ground, frame)
+            return
+        for r in asked:
+            self._weigh(r, image, ground, frame)
         if frame.time - ground.since >= DELAY_S:
-            ground = _updated(ground, image, _covered(regions, frame, image), frame.time)
-        self._ground = ground
+            covered = _covered(regions, frame, image)
+            self._ground = _updated(ground, image, covered, frame.time)
         self._evidence = dict(list(self._evidence.items())[-MOST:])
-        return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
 
     def _weigh(self, region: Region, image: Floats, ground: BareGround, frame: Frame) -> None:
         before = self._evidence.pop(
