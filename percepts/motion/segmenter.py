@@ -58,7 +58,7 @@ from visup.percepts.motion.layers.dense_labelling import (
     label_cells,
 )
 from visup.percepts.motion.layers.layer_discovery import affine_rate
-from visup.percepts.motion.output.cast_shadows import CastShadowFilter, comparable_image
+from visup.percepts.motion.output.cast_shadows import CastShadowFilter
 from visup.percepts.motion.output.region_report import (
     OutlinedFrame,
     apply_ignore,
@@ -180,7 +180,6 @@ class MotionSegmenter:
         self._cells = scene.cells
         tracks, prior = self._initiated(fit_tracks(predicted, scene), scene, prior)
         evidence, labelling, shown = self._labelled(scene, tracks, prior, directives)
-        small = self._executor.submit(comparable_image, frame)
         keys = tuple(t.key for t in tracks)
         tracks = self._updated(tracks, scene, evidence, labelling)
         ground = scene.measured[0].background.models[-1]
@@ -191,8 +190,7 @@ class MotionSegmenter:
         regions = self._reported(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
-        small_image, static = small.result(), self._static.active
-        regions = self._shadows.step(frame, small_image, scene, regions, static=static)
+        regions = self._shadows.step(frame, scene, regions, static=self._static.active)
         return select_regions(regions, directives)
 
     @property
@@ -327,16 +325,14 @@ class MotionSegmenter:
     def _long_lags(self, image: WorkImage) -> list[int]:
         """The longer baseline to measure in this frame: they take turns, one per frame.
 
-        Long baselines serve slow motion. When the camera has turned far, there is little to compare,
-        and that misleads.
+        They serve slow motion. When the camera has turned far, there is little to compare, which misleads;
+        while it moves, single frames decide what is reported, and every other frame is enough.
         """
-        far = FARTHEST * max(image.shape)
-        lags = [
-            lag
-            for lag in self._history.lags(self.settings.lags_s)
-            if lag > 1 and self._camera_shift(image, lag) < far
-        ]
-        return [lags[self._count % len(lags)]] if lags else []
+        every, far = 2 if self._foreground.moves else 1, FARTHEST * max(image.shape)
+        wanted = () if self._count % every else self.settings.lags_s
+        all_ = self._history.lags(wanted)
+        lags = [lag for lag in all_ if lag > 1 and self._camera_shift(image, lag) < far]
+        return [lags[self._count // every % len(lags)]] if lags else []
 
     def _camera_shift(self, image: WorkImage, lag: int) -> float:
         """Predicted displacement of the image centre by the camera, pixels."""

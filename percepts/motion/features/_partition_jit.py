@@ -1,4 +1,4 @@
-"""Compiled loops of `superpixels`: the watershed, and adjacency of its cells."""
+"""Compiled loops of `superpixels`: the watershed, adjacency of its cells, and their Laplacian."""
 
 from __future__ import annotations
 
@@ -192,3 +192,69 @@ def csr_links(
         columns[at], data[at] = other[n], values[n]
         filled[one[n]] += 1
     return ends, columns, data
+
+
+@compiled
+def laplacian(
+    ends: Labels,
+    neighbours: Labels,
+    weights: Floats,
+    inside: NDArray[np.int64],
+    own: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], Labels, Labels, NDArray[np.float64]]:
+    """The weighted Laplacian of M cells, in columns (CSC), and their affinity to all others.
+
+    The diagonal comes last in each column.
+
+    Args:
+        ends: CSR row starts of the affinities.
+        neighbours: Their columns.
+        weights: Their values.
+        inside: (M,) numbers of the cells, ascending.
+        own: (M,) additional terms of the diagonal.
+
+    Returns:
+        Values, rows, (M + 1,) column starts; (M,) sums of affinities to other cells.
+    """
+    number = np.full(len(ends) - 1, np.int32(-1))
+    for m in range(len(inside)):
+        number[inside[m]] = m
+    room = len(neighbours) + len(inside)
+    data, rows = np.empty(room), np.empty(room, np.int32)
+    columns, beyond = np.zeros(len(inside) + 1, np.int32), np.zeros(len(inside))
+    at = 0
+    for m in range(len(inside)):
+        cell, degree, within = inside[m], 0.0, 0.0
+        for n in range(ends[cell], ends[cell + 1]):
+            weight = float(weights[n])
+            degree += weight
+            if number[neighbours[n]] >= 0:
+                within += weight
+                data[at], rows[at] = -weight, number[neighbours[n]]
+                at += 1
+        data[at], rows[at] = degree + own[m], m
+        at += 1
+        columns[m + 1], beyond[m] = at, degree - within
+    return data[:at], rows[:at], columns, beyond
+
+
+@compiled
+def may_be_foreground(
+    share: Floats, weight: Floats, prior: Floats, persistence: Floats, least: float
+) -> NDArray[np.bool_]:
+    """Which cells have more than a least weight of labels other than the first, (count,).
+
+    Args:
+        share: (count, K) label shares by evidence.
+        weight: (count,) their weight.
+        prior: (count, K) label shares before.
+        persistence: (count,) their weight.
+        least: The weight.
+    """
+    out = np.empty(len(share), np.bool_)
+    for c in range(len(share)):
+        now, before = np.float32(0), np.float32(0)
+        for k in range(1, share.shape[1]):
+            now, before = now + share[c, k], before + prior[c, k]
+        out[c] = now * weight[c] + before * persistence[c] > least
+    return out

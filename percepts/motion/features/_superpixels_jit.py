@@ -34,22 +34,32 @@ def cell_statistics(
     corners = np.zeros((count, 4), np.int32)
     corners[:, 0], corners[:, 1] = width, height
     for y in range(height):
-        for x in range(width):
-            k = labels[y, x]
-            number[k] += np.float32(1)
-            sums[k, 0] += np.float32(x)
-            sums[k, 1] += np.float32(y)
-            for i in range(3):
-                sums[k, 2 + i] += np.float32(tone[y, x, i])
-            sums[k, 5] += busy[y, x]
+        x = 0
+        # Run by run: to add to one place again and again is slow. Sums of whole numbers are exact either way.
+        while x < width:
+            k, begin = labels[y, x], x
+            busyness, first, second, third = sums[k, 5], 0, 0, 0
+            while x < width and labels[y, x] == k:
+                first, second = first + tone[y, x, 0], second + tone[y, x, 1]
+                third += tone[y, x, 2]
+                busyness += busy[y, x]
+                x += 1
+            run = x - begin
+            number[k] += np.float32(run)
+            sums[k, 0] += np.float32((begin + x - 1) * run // 2)
+            sums[k, 1] += np.float32(y * run)
+            sums[k, 2] += np.float32(first)
+            sums[k, 3] += np.float32(second)
+            sums[k, 4] += np.float32(third)
+            sums[k, 5] = busyness
             box = corners[k]
-            box[0], box[1] = min(box[0], x), min(box[1], y)
-            box[2], box[3] = max(box[2], x + 1), max(box[3], y + 1)
+            box[0], box[1] = min(box[0], begin), min(box[1], y)
+            box[2], box[3] = max(box[2], x), max(box[3], y + 1)
     return number, sums, corners
 
 
 @compiled
-def cell_totals(labels: Labels, values: Floats, count: int) -> Floats:
+def cell_totals(labels: Labels, values: NDArray[Any], count: int) -> Floats:
     """Sum of a (h, w) map, most of it 0, in each cell, (count,) float32."""
     height, width = labels.shape
     out = np.zeros(count, np.float32)
@@ -215,13 +225,13 @@ def bounding_box(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int,
 
 
 @compiled
-def paint_cells(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floats:
-    """1 at the pixels of some cells and 0 elsewhere, (h, w) float32."""
-    out = np.zeros(labels.shape, np.float32)
+def paint_cells(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True at the pixels of some cells and False elsewhere, (h, w)."""
+    out = np.zeros(labels.shape, np.bool_)
     left, top, right, bottom = bounding_box(corners, members)
     for y in range(top, bottom):
         for x in range(left, right):
-            out[y, x] = np.float32(members[labels[y, x]])
+            out[y, x] = members[labels[y, x]]
     return out
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.motion.features._motion_constraints_jit import (
+    inverse_covariances,
     strongest_gradients,
     structure_tensors,
 )
@@ -122,19 +123,9 @@ def information_of(tensor: Floats, sigma: Floats, floor: float) -> Floats:
     Returns:
         (N, 3) float32 (xx, xy, yy); nearly singular along an edge.
     """
-    xx, xy, yy = tensor.T.astype(np.float64)
-    mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-    variance = np.asarray(sigma, dtype=np.float64) ** 2
-    strong = 1 / (variance / np.maximum(mean + half, 1e-6) + floor**2)
-    weak = 1 / (variance / np.maximum(mean - half, 1e-6) + floor**2)
-    c, s = np.cos(angle), np.sin(angle)
-    parts = (
-        strong * c * c + weak * s * s,
-        (strong - weak) * c * s,
-        strong * s * s + weak * c * c,
+    return inverse_covariances(
+        np.ascontiguousarray(tensor), np.asarray(sigma, dtype=np.float32), floor
     )
-    return np.stack(parts, axis=1).astype(np.float32)
 
 
 def mahalanobis(error: Floats, information: Floats) -> Floats:

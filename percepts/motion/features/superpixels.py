@@ -7,6 +7,7 @@ silhouette made of cells is as sharp as the image.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
@@ -54,7 +55,7 @@ class Superpixels:
     tone: Floats
     link: sparse.csr_matrix
     corners: NDArray[np.int32]
-    _known: list[tuple[Floats, Floats]] = field(default_factory=list, repr=False)
+    _known: list[tuple[NDArray[Any], Floats]] = field(default_factory=list, repr=False)
 
     def dilated(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
@@ -62,8 +63,8 @@ class Superpixels:
             self.link.indptr, self.link.indices, np.ascontiguousarray(members), steps
         )
 
-    def mean(self, values: Floats) -> Floats:
-        """Mean of an (h, w) map in each cell, (count,) float32; cached per map.
+    def mean(self, values: NDArray[Any]) -> Floats:
+        """Mean of an (h, w) map, float32 or bool, in each cell, (count,) float32; cached per map.
 
         Several steps of a frame ask for the same few maps of hidden objects.
         """
@@ -75,8 +76,9 @@ class Superpixels:
         self._known.append((values, found))
         return found
 
-    def _mean(self, values: Floats) -> Floats:
-        values = np.ascontiguousarray(values, dtype=np.float32)
+    def _mean(self, values: NDArray[Any]) -> Floats:
+        mask = values.dtype == np.bool_
+        values = np.ascontiguousarray(values, dtype=np.uint8 if mask else np.float32)
         return np.asarray(cell_totals(self.labels, values, self.count) / self.area)
 
     def shifted(self, old: Superpixels, members: NDArray[np.bool_], by: tuple[int, int]) -> Floats:
@@ -94,8 +96,8 @@ class Superpixels:
         pixels = covered_pixels(self.labels, old.labels, old.corners, some, by, self.count)
         return np.asarray(pixels / self.area, dtype=np.float32)
 
-    def paint(self, members: NDArray[np.bool_]) -> Floats:
-        """A map that is 1 in some cells and 0 elsewhere, (h, w) float32."""
+    def paint(self, members: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """A map that is True in some cells and False elsewhere, (h, w)."""
         return paint_cells(self.labels, self.corners, np.ascontiguousarray(members))
 
     def box(self, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:

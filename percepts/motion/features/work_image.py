@@ -79,6 +79,26 @@ def prepare_image(frame: Frame, work_size: int) -> WorkImage:
     return WorkImage(frame.time, scale, grey, tone, gx, gy, half)
 
 
+def reduced(image: NDArray[np.uint8], most: int) -> NDArray[np.uint8]:
+    """An image of at most so many pixels a side.
+
+    Means over whole pixels come first: by a ratio that is no whole number they take eight times as long.
+
+    Args:
+        image: (H, W) or (H, W, C) uint8.
+        most: Longer side of the result, pixels; smaller images keep their size.
+    """
+    height, width = image.shape[:2]
+    scale = min(1.0, most / max(height, width))
+    size = (max(8, round(width * scale)), max(8, round(height * scale)))
+    whole = max(int(1 / scale), 1)
+    if whole > 1:
+        image = image[: height // whole * whole, : width // whole * whole]
+        fewer = (width // whole, height // whole)
+        image = np.asarray(cv2.resize(image, fewer, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
+
+
 class ImageHistory:
     """Past working images, as far back as the longest baseline, so that memory stays bounded.
 

@@ -137,29 +137,78 @@ def warp_errors(
 
 
 @compiled
-def inside_share(edges: NDArray[np.bool_]) -> Floats:
+def steepness(flow: Floats, every: int) -> Floats:
+    """How steep the flow is at every n-th pixel, (h, w) float32: its change to the next ones, per pixel."""
+    height, width = (flow.shape[0] - 1) // every + 1, (flow.shape[1] - 1) // every + 1
+    out = np.empty((height, width), np.float32)
+    for j in range(height):
+        below = min(j + 1, height - 1) * every
+        for i in range(width):
+            y, x, right = j * every, i * every, min(i + 1, width - 1) * every
+            total = np.float32(0)
+            for k in range(2):
+                along, down = flow[y, right, k] - flow[y, x, k], flow[below, x, k] - flow[y, x, k]
+                total += along * along + down * down
+            out[j, i] = np.sqrt(total) / np.float32(every)
+    return out
+
+
+@compiled
+def inside_share(steep: Floats, limits: Floats) -> Floats:
     """Share of eight rays from each pixel to the border that cross edges an odd number of times, (h, w).
 
     A pixel enclosed by edges is inside along any ray (Papazoglou and Ferrari, Fast object segmentation
     in unconstrained video, 2013). An edge several pixels wide is crossed once.
+
+    Args:
+        steep: (h, w) float32.
+        limits: (N,) float32, at most 8, from which it is an edge; the result is the mean over them.
     """
-    height, width = edges.shape
-    out = np.zeros((height, width), np.float32)
-    crossed = np.zeros((height, width), np.int32)
+    height, width = steep.shape
+    one = np.uint8(1)
+    # One bit for each limit. A border of no edges spares the test whether a neighbour lies in the image.
+    edges = np.zeros((height + 2, width + 2), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            for n in range(len(limits)):
+                if steep[y, x] > limits[n]:
+                    edges[y + 1, x + 1] |= one << np.uint8(n)
+    ones = np.zeros(1 << len(limits), np.int32)
+    for code in range(len(ones)):
+        for n in range(len(limits)):
+            ones[code] += (code >> n) & 1
+    odd = np.zeros((height + 2, width + 2), np.uint8)
+    total = np.zeros((height, width), np.int32)
     for ray in range(9):
         dx, dy = ray % 3 - 1, ray // 3 - 1
         if dx == 0 and dy == 0:
             continue
         for j in range(height):
-            y = j if dy >= 0 else height - 1 - j
+            y = j + 1 if dy >= 0 else height - j
             for i in range(width):
-                x = i if dx >= 0 else width - 1 - i
-                u, v = x - dx, y - dy
-                inside = 0 <= u < width and 0 <= v < height
-                begins = edges[y, x] and not (inside and edges[v, u])
-                crossed[y, x] = (crossed[v, u] if inside else 0) + (1 if begins else 0)
-                if crossed[y, x] % 2 == 1:
-                    out[y, x] += np.float32(0.125)
+                x = i + 1 if dx >= 0 else width - i
+                begins = edges[y, x] & ~edges[y - dy, x - dx]
+                odd[y, x] = odd[y - dy, x - dx] ^ begins
+                total[y - 1, x - 1] += ones[odd[y, x]]
+    return (total.astype(np.float32) * np.float32(0.125)) / np.float32(len(limits))
+
+
+@compiled
+def sampled_means(labels: Labels, coarse: Floats, looked: Floats) -> Floats:
+    """Mean over the sampled pixels of each cell, (count,) float32, of a map at a fourth of the size.
+
+    Args:
+        labels: (h, w) cells.
+        coarse: (h / 4, w / 4) float32.
+        looked: (count,) sampled pixels of each cell.
+    """
+    height, width = labels.shape
+    total, out = np.zeros(len(looked)), np.empty(len(looked), np.float32)
+    for y in range(0, height, EVERY):
+        for x in range(0, width, EVERY):
+            total[labels[y, x]] += coarse[y // 4, x // 4]
+    for c in range(len(looked)):
+        out[c] = total[c] / max(looked[c], np.float32(1))
     return out
 
 
@@ -201,14 +250,38 @@ def settled(
         sweeps: How many, in each direction.
     """
     count, kinds = values.shape
-    out = values.copy()
+    out, share = values.copy(), np.empty(values.shape, np.float32)
+    for c in range(count):
+        total = np.float32(1e-6)
+        for at in range(ends[c], ends[c + 1]):
+            total += weights[at]
+        for k in range(kinds):
+            share[c, k] = np.float32(1) / (trust[c, k] + total)
     for sweep in range(2 * sweeps):
         for n in range(count):
             c = n if sweep % 2 == 0 else count - 1 - n
             for k in range(kinds):
-                total, number = trust[c, k] * values[c, k], trust[c, k] + np.float32(1e-6)
+                total = trust[c, k] * values[c, k]
                 for at in range(ends[c], ends[c + 1]):
                     total += weights[at] * out[neighbours[at], k]
-                    number += weights[at]
-                out[c, k] = total / number
+                out[c, k] = total * share[c, k]
+    return out
+
+
+@compiled
+def nearest_lengths(ground: Floats, flow: Floats) -> Floats:
+    """Length of the background motion nearest to the flow of each cell, (count,).
+
+    Args:
+        ground: (M, count, 2) displacements of each cell by the background's motions.
+        flow: (count, 2) flow back at each.
+    """
+    out = np.empty(len(flow), np.float32)
+    for c in range(len(flow)):
+        least = np.float32(np.inf)
+        for m in range(len(ground)):
+            x, y = ground[m, c, 0], ground[m, c, 1]
+            off = (x + flow[c, 0]) ** 2 + (y + flow[c, 1]) ** 2
+            if off < least:
+                least, out[c] = off, np.sqrt(x * x + y * y)
     return out

@@ -22,6 +22,8 @@ from visup.percepts.motion.foreground._cues_jit import (
     flow_links,
     flow_statistics,
     inside_share,
+    sampled_means,
+    steepness,
     warp_errors,
 )
 from visup.percepts.motion.layers.background_motion import BackgroundMotion
@@ -151,17 +153,19 @@ def flow_cues(
     if memory is not None:
         step = step + LASTING * carried(here, there, memory.way, looked)
     way = np.ascontiguousarray(step, dtype=np.float32)
+    went = np.hypot(way[:, 0], way[:, 1])
     inside = _inside(flow, labels, median, looked)
+    speed, most = np.hypot(*ground.T), float(np.percentile(length, 98))
     columns = [
-        *_residual_cues(cells, length, np.hypot(*ground.T), median),
+        *_residual_cues(cells, length, speed, (median, most)),
         *np.log(0.2 + misfit.T),
         np.log1p(found[:, 3]),
         np.log(0.05 + found[:, 2] / median),
         inside,
-        np.log(0.5 + np.hypot(way[:, 0], way[:, 1])),
-        np.hypot(way[:, 0], way[:, 1]) / (way[:, 2] + 0.5),
+        np.log(0.5 + went),
+        went / (way[:, 2] + 0.5),
         _border_distance(cells),
-        *_frame_cues(length, np.hypot(*ground.T), median, background.scale),
+        *_frame_cues(length, speed, (median, most), background.scale),
         *np.zeros((2, cells.count), np.float32),
     ]
     values = np.column_stack(columns).astype(np.float32)
@@ -202,15 +206,18 @@ def _residuals(
 
 
 def _residual_cues(
-    cells: Superpixels, length: Floats, ground: Floats, median: float
+    cells: Superpixels, length: Floats, ground: Floats, frame: tuple[float, float]
 ) -> tuple[NDArray[Any], ...]:
-    """Residual lengths relative to the background's motion, the frame's residuals, and its border's."""
+    """Residual lengths relative to the background's motion, the frame's residuals, and its border's.
+
+    Of all residuals of the frame, the median and nearly the greatest are given.
+    """
+    median, most = frame
     height, width = cells.labels.shape
     wide = FRAME * height
     x, y = cells.centre.T
     at_border = (x < wide) | (y < wide) | (x > width - wide) | (y > height - wide)
     border = np.sort(length[at_border]) if at_border.any() else length[:1]
-    most = float(np.percentile(length, 98))
     return (
         np.log(0.1 + length),
         np.log(0.05 + length / (0.5 + ground)),
@@ -221,9 +228,11 @@ def _residual_cues(
     )
 
 
-def _frame_cues(length: Floats, ground: Floats, median: float, scale: float) -> tuple[Floats, ...]:
+def _frame_cues(
+    length: Floats, ground: Floats, frame: tuple[float, float], scale: float
+) -> tuple[Floats, ...]:
     """Cues of the whole frame, the same in each cell: how calm it is, how well explained."""
-    most = float(np.percentile(length, 98))
+    median, most = frame
     wide = float(np.mean(length > 0.5 * most))
     speed = float(np.median(ground))
     said = np.log(median), np.log(most / median + 0.1), np.log(0.1 + speed), scale, wide
@@ -240,15 +249,7 @@ def _border_distance(cells: Superpixels) -> Floats:
 
 def _inside(flow: Floats, labels: Labels, median: float, looked: Floats) -> Floats:
     """Degree to which flow edges enclose each cell, (count,) 0 to 1."""
-    coarse = flow[::4, ::4]
-    right, down = (
-        np.diff(coarse, axis=1, append=coarse[:, -1:]),
-        np.diff(coarse, axis=0, append=coarse[-1:]),
-    )
-    steep = np.sqrt((right**2 + down**2).sum(axis=-1)) / 4
-    strength = 1 - np.exp(-0.7 * steep / (0.5 * median + 0.02))
-    share = np.mean([inside_share(strength > least) for least in EDGES], axis=0)
-    some = labels[::2, ::2]
-    full = share.repeat(2, axis=0).repeat(2, axis=1)[: some.shape[0], : some.shape[1]]
-    total = np.bincount(some.ravel(), full.ravel(), len(looked))
-    return np.asarray(total / np.maximum(looked, 1), dtype=np.float32)
+    steep = steepness(flow, 4)
+    # A strength 1 - exp(-0.7 s / (median / 2 + 0.02)), of steepness s, exceeds those of edges from here on.
+    limits = -np.log(1 - np.array(EDGES)) / 0.7 * (0.5 * median + 0.02)
+    return sampled_means(labels, inside_share(steep, limits.astype(np.float32)), looked)

@@ -8,6 +8,7 @@ import numpy as np
 
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground._cues_jit import nearest_lengths
 from visup.percepts.motion.foreground.belief import Belief, unbiased, updated
 from visup.percepts.motion.foreground.cues import (
     CueMemory,
@@ -77,9 +78,7 @@ def _ground_px(state: ForegroundState, scene: FrameMeasurements) -> float:
     x, y = scene.cells.centre.astype(np.int64).T
     models = scene.measured[0].background.models
     ground = np.stack([model.at(scene.cells.centre) for model in models])
-    # Of several background motions, each cell takes the one nearest to its flow.
-    nearest = np.linalg.norm(ground + scene.flow[y, x], axis=-1).argmin(axis=0)
-    speed = float(np.median(np.linalg.norm(ground, axis=-1)[nearest, np.arange(len(nearest))]))
+    speed = float(np.median(nearest_lengths(ground, scene.flow[y, x])))
     return (
         speed if state.ground_px is None else state.ground_px + FOLLOW * (speed - state.ground_px)
     )

@@ -70,3 +70,17 @@ def explained_weights(
             off = (a * ex + b * ey) * ex + c * ey * ey
             out[m] += w * max(np.float32(0), one - off / far32)
     return out
+
+
+@compiled
+def grid_cells(xy: Floats, shape: tuple[int, int], grid: tuple[int, int]) -> NDArray[np.int64]:
+    """The cell of a (rows, columns) grid over an image that each of (N, 2) positions lies in, (N,)."""
+    rows, cols = grid
+    down, along = np.float32(rows), np.float32(cols)
+    height, width = np.float32(shape[0]), np.float32(shape[1])
+    out = np.empty(len(xy), np.int64)
+    for n in range(len(xy)):
+        row = min(max(int(xy[n, 1] * down / height), 0), rows - 1)
+        col = min(max(int(xy[n, 0] * along / width), 0), cols - 1)
+        out[n] = row * cols + col
+    return out

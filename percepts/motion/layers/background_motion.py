@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from visup.percepts.motion.features.motion_constraints import Constraints
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.layers._affine_jit import median
+from visup.percepts.motion.layers._dominant_motion_jit import grid_cells
 from visup.percepts.motion.layers.affine import STILL, Affine, distances, fit_bent, log_likelihood
 from visup.percepts.motion.layers.dominant_motion import (
     BALANCE_GRID,
@@ -223,7 +224,7 @@ def _spans(
 ) -> bool:
     """Whether the constraints that fit a motion reach across the image and fill a share of it."""
     fits = (distances(model, c, 0.15) < 9) & (weight > 0)
-    _, cell = balanced_weights(c.xy, shape, weight)
+    cell = grid_cells(c.xy, shape, BALANCE_GRID)
     rows, cols = BALANCE_GRID
     filled = np.bincount(cell[fits], minlength=rows * cols).reshape(rows, cols) >= 2
     across = filled.any(0).sum() >= 0.7 * cols or filled.any(1).sum() >= 0.8 * rows

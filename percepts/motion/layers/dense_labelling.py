@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from visup.percepts.motion.features._partition_jit import laplacian, may_be_foreground
 from visup.percepts.motion.features._superpixels_jit import bayes_shares, sum_point_evidence
 from visup.percepts.motion.features.motion_constraints import Points
 from visup.percepts.motion.features.settings import MotionSettings
@@ -123,15 +124,14 @@ def random_walk(
     """
     # Far from any cell that may not be background the answer is background: only the rest is solved
     # for, with those cells as its boundary.
-    uncertain = (
-        share[:, 1:].sum(axis=1) * weight + prior[:, 1:].sum(axis=1) * persistence
-    ) > UNCERTAIN
+    uncertain = may_be_foreground(share, weight, prior, persistence, UNCERTAIN)
     inside = np.flatnonzero(cells.dilated(uncertain[:, None], UNCERTAIN_STEPS)[:, 0])
-    out = np.zeros(share.shape)
+    out = np.zeros(share.shape, np.float32)
     out[:, 0] = 1.0
     if not len(inside):
-        return out.astype(np.float32)
-    right = (share * weight[:, None] + prior * persistence[:, None])[inside].astype(np.float64)
+        return out
+    right = share[inside] * weight[inside, None] + prior[inside] * persistence[inside, None]
+    right = right.astype(np.float64)
     own = (weight + persistence + bias)[inside].astype(np.float64)
     system, beyond = _system(cells.link, inside, own)
     right[:, 0] += bias[inside] + beyond
@@ -145,7 +145,7 @@ def random_walk(
     ).solve(right)
     found = np.maximum(found, 0)
     out[inside] = found / found.sum(axis=1, keepdims=True)
-    return np.asarray(out, dtype=np.float32)
+    return out
 
 
 def _system(
@@ -161,27 +161,9 @@ def _system(
     Returns:
         (M, M) float64, symmetric; and (M,) float64.
     """
-    m = len(inside)
-    number = np.full(link.shape[0], -1, dtype=np.int32)
-    number[inside] = np.arange(m, dtype=np.int32)
-    one, other = (
-        number[np.repeat(np.arange(link.shape[0]), np.diff(link.indptr))],
-        number[link.indices],
-    )
-    mine = one >= 0
-    one, other, value = one[mine], other[mine], link.data[mine].astype(np.float64)
-    degree = np.bincount(one, weights=value, minlength=m)
-    within = other >= 0
-    one, other, value = one[within], other[within], value[within]
-    ends = np.cumsum(np.bincount(one, minlength=m) + 1)
-    # The diagonal comes last in each column, which the solver accepts.
-    place = np.arange(len(one)) + one
-    data, rows = np.empty(len(one) + m), np.empty(len(one) + m, dtype=np.int32)
-    data[place], rows[place] = -value, other
-    data[ends - 1], rows[ends - 1] = degree + own, np.arange(m)
-    columns = np.concatenate([[0], ends]).astype(np.int32)
-    beyond = np.asarray(degree - np.bincount(one, weights=value, minlength=m))
-    return sparse.csc_matrix((data, rows, columns), shape=(m, m)), beyond
+    parts = laplacian(link.indptr, link.indices, link.data, inside, own)
+    data, rows, columns, beyond = parts
+    return sparse.csc_matrix((data, rows, columns), shape=(len(own), len(own))), beyond
 
 
 def appearance_prior(cells: Superpixels, prior: Floats) -> Floats:

@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.features.motion_constraints import Constraints, mahalanobis
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.layers._dominant_motion_jit import explained_weights, sample_fits
+from visup.percepts.motion.layers._dominant_motion_jit import (
+    explained_weights,
+    grid_cells,
+    sample_fits,
+)
 from visup.percepts.motion.layers.affine import Affine, Doubles, fit_affine, widened
 
 BALANCE_GRID = (6, 8)
@@ -30,11 +34,8 @@ def balanced_weights(
     Returns:
         (N,) float32 weights that sum to 1 in each occupied cell; (N,) int64 cell numbers.
     """
-    rows, cols = BALANCE_GRID
-    row = np.clip(xy[:, 1] * rows / shape[0], 0, rows - 1).astype(np.int64)
-    col = np.clip(xy[:, 0] * cols / shape[1], 0, cols - 1).astype(np.int64)
-    cell = row * cols + col
-    total = np.bincount(cell, weights=keep, minlength=rows * cols)
+    cell = grid_cells(xy, shape, BALANCE_GRID)
+    total = np.bincount(cell, weights=keep, minlength=BALANCE_GRID[0] * BALANCE_GRID[1])
     return (keep / np.maximum(total[cell], 1e-6)).astype(np.float32) * (keep > 0), cell
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, log
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,9 @@ def window_log_odds(
             log odds.
     """
     least, noise, most, both = limits
+    wide = full.shape[1]
+    # The sides of four pixels are the same, and divisions are dear: each side is described once.
+    known, sides = np.full(wide, -1, np.int64), np.empty((wide, 13))
     out = np.zeros(len(near), np.float32)
     for n in range(len(near)):
         y, x = near[n]
@@ -62,59 +65,107 @@ def window_log_odds(
         part = float(full[v, u])
         if part <= least or part >= 1 - least:
             continue
-        away, wide = 0.0, 1.0
+        side = sides[u]
+        if known[u] != v:
+            known[u] = v
+            _describe_sides(part, inside, every, (v, u), (noise, both), side)
+        away = side[12]
         for i in range(3):
-            mean, square = every[0][v, u, i], every[1][v, u, i]
-            one = (inside[0][v, u, i] + both * mean) / (part + both)
-            two = (inside[1][v, u, i] + both * square) / (part + both)
-            within = max(two - one * one, 0.0) + noise**2
-            gap = tone[y, x, i] - one
-            one = (mean - inside[0][v, u, i] + both * mean) / (1 - part + both)
-            two = (square - inside[1][v, u, i] + both * square) / (1 - part + both)
-            beyond = max(two - one * one, 0.0) + noise**2
-            far = tone[y, x, i] - one
-            away += far * far / beyond - gap * gap / within
-            wide *= beyond / within
+            value = float(tone[y, x, i])
+            gap, far = value - side[i], value - side[6 + i]
+            away += far * far * side[9 + i] - gap * gap * side[3 + i]
         # The channels are strongly correlated: their mean, not their sum.
-        out[n] = max(-most, min(most, 0.5 * (away + log(wide)) / 3))
+        out[n] = max(-most, min(most, 0.5 * away / 3))
     return out
 
 
 @compiled
-def histogram_log_odds(
+def _describe_sides(
+    part: float,
+    inside: tuple[Floats, Floats],
+    every: tuple[Floats, Floats],
+    place: tuple[int, int],
+    limits: tuple[float, float],
+    side: NDArray[np.float64],
+) -> None:
+    """Describe the tones of both sides in a window.
+
+    Means and inverse variances inside, the same outside, and the logarithm of the variances' ratio.
+
+    Args:
+        part: Share of the window that is inside.
+        inside: As in `window_log_odds`, as is the next.
+        every: The same of all tones.
+        place: Row and column of the window.
+        limits: Least standard deviation of tones, and share of the window that describes both sides.
+        side: (13,), written to.
+    """
+    noise, both = limits
+    v, u = place
+    ours, others = 1 / (part + both), 1 / (1 - part + both)
+    ratio = 1.0
+    for i in range(3):
+        mean, square = every[0][v, u, i], every[1][v, u, i]
+        one = (inside[0][v, u, i] + both * mean) * ours
+        two = (inside[1][v, u, i] + both * square) * ours
+        within = max(two - one * one, 0.0) + noise**2
+        side[i], side[3 + i] = one, 1 / within
+        one = (mean - inside[0][v, u, i] + both * mean) * others
+        two = (square - inside[1][v, u, i] + both * square) * others
+        beyond = max(two - one * one, 0.0) + noise**2
+        side[6 + i], side[9 + i] = one, 1 / beyond
+        ratio *= beyond * side[3 + i]
+    side[12] = log(ratio)
+
+
+@compiled
+def histogram_odds(
     near: Places,
     inside: NDArray[np.uint8],
     ring: NDArray[np.uint8],
     tone: NDArray[np.uint8],
-    limits: tuple[float, float],
+    neither: float,
 ) -> Floats:
-    """Log odds, by histograms of the object and of what surrounds it, that pixels are inside, (N,) float32.
+    """Odds, by histograms of the object and of what surrounds it, that pixels are inside, (N,) float32.
 
     Args:
         near: The pixels; none speaks for itself.
         inside: (h, w), not 0 inside.
         ring: (h, w), not 0 inside and in the surroundings.
         tone: (h, w, 3).
-        limits: Pixels that speak for neither side, added to each bin; most log odds.
+        neither: Pixels that speak for neither side, added to each bin.
     """
-    neither, most = limits
     mine, others = np.zeros(BINS**3, np.float32), np.zeros(BINS**3, np.float32)
+    ours, theirs = 0, 0
     for y in range(inside.shape[0]):
         for x in range(inside.shape[1]):
             if inside[y, x]:
                 mine[bin_of(tone[y, x])] += 1
+                ours += 1
             elif ring[y, x]:
                 others[bin_of(tone[y, x])] += 1
-    within, beyond = max(mine.sum(), np.float32(1)), max(others.sum(), np.float32(1))
-    part, rest = within / (within + beyond), beyond / (within + beyond)
+                theirs += 1
+    part = max(ours, 1) / (max(ours, 1) + max(theirs, 1))
+    within, beyond = np.float32(1 / part), np.float32(1 / (1 - part))
+    spread = np.float32(neither)
     out = np.empty(len(near), np.float32)
     for n in range(len(near)):
         y, x = near[n]
         at = bin_of(tone[y, x])
-        own = 1 if inside[y, x] else 0
-        other = 1 if ring[y, x] and not own else 0
-        odds = log(((mine[at] - own) / part + neither) / ((others[at] - other) / rest + neither))
-        out[n] = max(-most, min(most, odds))
+        own = np.float32(1 if inside[y, x] else 0)
+        other = np.float32(1 if ring[y, x] and not inside[y, x] else 0)
+        own, other = (mine[at] - own) * within, (others[at] - other) * beyond
+        out[n] = (own + spread) / (other + spread)
+    return out
+
+
+@compiled
+def share_odds(share: Floats, near: Places, least: float) -> Floats:
+    """Odds of shares (h, w) at some pixels, (N,) float32; each share is `least` or more from 0 and 1."""
+    out, low, high = np.empty(len(near), np.float32), np.float32(least), np.float32(1 - least)
+    for n in range(len(near)):
+        known = min(max(share[near[n, 0], near[n, 1]], low), high)
+        out[n] = known / (np.float32(1) - known)
     return out
 
 
@@ -126,30 +177,48 @@ def bin_of(tone: NDArray[np.uint8]) -> int:
 
 
 @compiled
-def likeness_of_neighbours(near: Places, tone: NDArray[np.uint8]) -> Floats:
-    """How alike each pixel and its four neighbours are, (N, 4) float32: 0 to 1, 0 beyond the image.
+def gaps_to_neighbours(near: Places, tone: NDArray[np.uint8]) -> tuple[Floats, np.float32]:
+    """Squared differences of each pixel and its four neighbours, (N, 4) float32, and their sharpness.
 
-    The scale is the mean difference of the pixels given, so that it adapts to contrast and noise.
+    Beyond the image they are infinite. The sharpness, which times a difference gives the exponent of a
+    likeness, adapts to contrast and noise: half of one over the mean difference of the pixels given.
+
+    Args:
+        near: The pixels, row by row.
+        tone: (h, w, 3).
     """
     height, width = tone.shape[0], tone.shape[1]
     out = np.full((len(near), len(ABOUT)), np.float32(np.inf))
+    above = np.full(width, -1, np.int64)  # which pixel was the last one in each column
     total, count = np.float32(0), 0
     for n in range(len(near)):
         y, x = near[n]
+        left, up = n - 1, above[x]
+        if n and x and near[left, 0] == y and near[left, 1] == x - 1:
+            out[n, 0] = out[left, 1]
+        elif x:
+            out[n, 0] = _gap(tone[y, x], tone[y, x - 1])
+        if x + 1 < width:
+            out[n, 1] = _gap(tone[y, x], tone[y, x + 1])
+        if y and up >= 0 and near[up, 0] == y - 1:
+            out[n, 2] = out[up, 3]
+        elif y:
+            out[n, 2] = _gap(tone[y, x], tone[y - 1, x])
+        if y + 1 < height:
+            out[n, 3] = _gap(tone[y, x], tone[y + 1, x])
+        above[x] = n
         for k in range(len(ABOUT)):
-            v, u = y + ABOUT[k, 0], x + ABOUT[k, 1]
-            if 0 <= v < height and 0 <= u < width:
-                apart = np.float32(0)
-                for i in range(3):
-                    gap = np.float32(tone[y, x, i]) - np.float32(tone[v, u, i])
-                    apart += gap * gap
-                out[n, k] = apart
-                total, count = total + apart, count + 1
-    sharp = np.float32(0.5) * count / max(total, np.float32(1e-3 * count + 1e-9))
-    for n in range(len(near)):
-        for k in range(len(ABOUT)):
-            out[n, k] = exp(-sharp * out[n, k])
-    return out
+            if out[n, k] < np.inf:
+                total, count = total + out[n, k], count + 1
+    sharp = np.float32(0.5 * count / max(total, np.float32(1e-3 * count + 1e-9)))
+    return out, sharp
+
+
+@compiled
+def _gap(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> np.float32:
+    """Squared difference of two tones."""
+    first, second, third = int(a[0]) - int(b[0]), int(a[1]) - int(b[1]), int(a[2]) - int(b[2])
+    return np.float32(first * first + second * second + third * third)
 
 
 @compiled
@@ -167,20 +236,27 @@ def mean_field(
         sweeps: Number of passes; in each, all pixels look at the sides of the pass before, so that no
             direction in the image is favoured.
     """
-    # A border of 0 takes no side, and spares the test whether a neighbour lies in the image.
-    side = np.zeros((share.shape[0] + 2, share.shape[1] + 2), np.float32)
-    side[1:-1, 1:-1] = 2 * share - 1
-    taken = np.empty(len(near), np.float32)
+    # A border of 0 takes no side, and spares the test whether a neighbour lies in the image. Places are
+    # unsigned: negative ones would be counted from the end, and tested for.
+    height, width = share.shape[0] + 2, share.shape[1] + 2
+    side = np.zeros(height * width, np.float32)
+    side.reshape(height, width)[1:-1, 1:-1] = np.float32(2) * share - np.float32(1)
+    at = np.empty(len(near), np.uint64)
+    for n in range(len(near)):
+        at[n] = (near[n, 0] + 1) * width + near[n, 1] + 1
+    one, row = np.uint64(1), np.uint64(width)
+    taken, pull = np.empty(len(near), np.float32), np.zeros(len(near), np.float32)
+    strength = np.float32(weight)
     for sweep in range(sweeps + 1):
+        if sweep:
+            for n in range(len(near)):
+                p = at[n]
+                beside = alike[n, 0] * side[p - one] + alike[n, 1] * side[p + one]
+                pull[n] = beside + (alike[n, 2] * side[p - row] + alike[n, 3] * side[p + row])
         for n in range(len(near)):
-            y, x = near[n, 0] + 1, near[n, 1] + 1
-            pull = np.float32(0)
-            if sweep:
-                pull += alike[n, 0] * side[y, x - 1] + alike[n, 1] * side[y, x + 1]
-                pull += alike[n, 2] * side[y - 1, x] + alike[n, 3] * side[y + 1, x]
-            taken[n] = taken_side(odds[n] + weight * pull)
+            taken[n] = taken_side(odds[n] + strength * pull[n])
         for n in range(len(near)):
-            side[near[n, 0] + 1, near[n, 1] + 1] = taken[n]
+            side[at[n]] = taken[n]
     out = share.copy()
     for n in range(len(near)):
         out[near[n, 0], near[n, 1]] = np.float32(0.5) * (taken[n] + 1)
@@ -188,7 +264,9 @@ def mean_field(
 
 
 @compiled
-def taken_side(odds: float) -> float:
+def taken_side(odds: np.float32) -> np.float32:
     """-1 to 1 for log odds: tanh of their half, by a quotient of polynomials within 0.024 of it."""
-    half = max(-3.0, min(3.0, 0.5 * odds))
-    return half * (27 + half * half) / (27 + 9 * half * half)
+    most, three_cubed = np.float32(3), np.float32(27)
+    half = max(-most, min(most, np.float32(0.5) * odds))
+    square = half * half
+    return half * (three_cubed + square) / (three_cubed + np.float32(9) * square)

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.motion.features.work_image import Floats, WorkImage
-from visup.percepts.motion.outlines._outline_motion_jit import Places, moved_log_odds
+from visup.percepts.motion.outlines._outline_motion_jit import Places, carried_flow, moved_log_odds
 
 SURE = 3  # pixels from the outline beyond which flow is that of one side
-WINDOW = (21, 21)  # half-size pixels: over which flow is carried to the outline
+REACH = 10  # half-size pixels: how far flow is carried to the outline
 LEAST = 4.0  # half-size pixels of a side that must lie in the window
 NOISE = 4.0  # standard deviation of grey levels
 OFF = 0.35  # standard deviation of displacements, pixels
@@ -60,7 +60,11 @@ class CropMotion:
         flow = np.ascontiguousarray(self.flow[::2, ::2])
         within = np.asarray(cv2.erode(inside, square), np.uint8)
         beyond = 1 - np.asarray(cv2.dilate(inside, square), np.uint8)
-        return _carried(flow, within[::2, ::2]), _carried(flow, beyond[::2, ::2])
+        ours, others = (
+            np.ascontiguousarray(within[::2, ::2]),
+            np.ascontiguousarray(beyond[::2, ::2]),
+        )
+        return carried_flow(flow, ours, REACH, LEAST), carried_flow(flow, others, REACH, LEAST)
 
     def log_odds(self, near: Places, flows: Flows) -> Floats:
         """Log odds of pixels to be inside, by the motion of either side.
@@ -94,16 +98,3 @@ def part_motion(
     gradients = (np.ascontiguousarray(image.gx[part]), np.ascontiguousarray(image.gy[part]))
     corner = (int(part[1].start), int(part[0].start))
     return CropMotion(grey, gradients, flow[part], old.grey, corner)
-
-
-def _carried(flow: Floats, where: NDArray[np.uint8]) -> Floats:
-    """The mean flow of some pixels in the window around each, and whether there are any."""
-    known = np.dstack([flow * where[..., None], where.astype(np.float32)])
-    total = cv2.boxFilter(
-        known, cv2.CV_32F, WINDOW, normalize=False, borderType=cv2.BORDER_CONSTANT
-    )
-    count = total[..., 2]
-    out = np.empty_like(total)
-    out[..., :2] = total[..., :2] / np.maximum(count, 1e-6)[..., None]
-    out[..., 2] = count >= LEAST
-    return np.asarray(out, np.float32)

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.outlines._outline_refinement_jit import (
     Places,
-    histogram_log_odds,
-    likeness_of_neighbours,
+    gaps_to_neighbours,
+    histogram_odds,
     mean_field,
     places_of,
+    share_odds,
     window_log_odds,
 )
 from visup.percepts.motion.outlines.outline_motion import CropMotion
@@ -42,6 +43,7 @@ NEITHER = 20.0  # pixels that speak for neither side, added to each bin of the h
 LOCAL = 1.5  # weight of the log odds by tones in the window
 COLOURS = 1.1  # weight of the log odds by colours
 MOTION = 1.0  # weight of the log odds by motion
+UNSURE = 0.02  # a prior share is at least as far from 0 and 1
 STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
 ALIKE = 32.0  # log odds that a neighbour just alike and sure of its side adds
 SWEEPS = 3  # passes of mean field in a round
@@ -65,18 +67,19 @@ def refine_outline(
     Returns:
         (h, w) float32; above one half inside.
     """
-    every = window_means(_halved(tone))
+    half = _halved(tone)
+    every = window_means(half)
     flows = None if motion is None else motion.side_flows((share > 0.5).view(np.uint8))
     for _ in range(ROUNDS):
         inside = (share > 0.5).view(np.uint8)
         near = places_of(_grown(inside, BAND) != _shrunk(inside, BAND))
         if not len(near):
             return share
-        local = local_log_odds(inside, near, tone, every)
-        colours = histogram_log_odds(near, inside, _grown(inside, RING), tone, (NEITHER, MOST))
-        known = np.clip(share[near[:, 0], near[:, 1]], 0.02, 0.98)
-        prior = np.log(known / (1 - known))
-        odds = LOCAL * local + COLOURS * colours + STEEP * prior
+        local = local_log_odds(inside, near, tone, half, every)
+        colours = histogram_log_odds(inside, near, tone)
+        prior = np.log(share_odds(share, near, UNSURE))
+        sum_of_odds = LOCAL * local + COLOURS * colours + STEEP * prior
+        odds = np.asarray(sum_of_odds, dtype=np.float32)
         if motion is not None and flows is not None:
             odds += MOTION * motion.log_odds(near, flows)
         alike = likeness_of_neighbours(near, tone)
@@ -85,7 +88,11 @@ def refine_outline(
 
 
 def local_log_odds(
-    inside: NDArray[np.uint8], near: Places, tone: NDArray[np.uint8], every: Means
+    inside: NDArray[np.uint8],
+    near: Places,
+    tone: NDArray[np.uint8],
+    half: NDArray[np.uint8],
+    every: Means,
 ) -> Floats:
     """Log odds of pixels to be inside, by the tones on either side in a window around them.
 
@@ -93,6 +100,7 @@ def local_log_odds(
         inside: (h, w) 1 inside, 0 elsewhere.
         near: (N, 2) rows and columns of the pixels.
         tone: (h, w, 3) uint8.
+        half: The same at half the size.
         every: From `window_means` of all tones.
 
     Returns:
@@ -100,8 +108,33 @@ def local_log_odds(
     """
     some = _halved(inside)
     full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
-    mine = np.asarray(cv2.bitwise_and(_halved(tone), _halved(tone), mask=some), dtype=np.uint8)
+    mine = np.asarray(cv2.bitwise_and(half, half, mask=some), dtype=np.uint8)
     return window_log_odds(near, full, tone, window_means(mine), every, (LEAST, NOISE, MOST, BOTH))
+
+
+def histogram_log_odds(inside: NDArray[np.uint8], near: Places, tone: NDArray[np.uint8]) -> Floats:
+    """Log odds of pixels to be inside, by histograms of the object and of what surrounds it.
+
+    Args:
+        inside: (h, w) 1 inside, 0 elsewhere.
+        near: (N, 2) rows and columns of the pixels.
+        tone: (h, w, 3) uint8.
+
+    Returns:
+        (N,) float32.
+    """
+    odds = histogram_odds(near, inside, _grown(inside, RING), tone, NEITHER)
+    # NumPy takes logarithms of many numbers at once, compiled loops one by one.
+    return np.asarray(np.clip(np.log(odds), -MOST, MOST))
+
+
+def likeness_of_neighbours(near: Places, tone: NDArray[np.uint8]) -> Floats:
+    """How alike each pixel and its four neighbours are, (N, 4) float32: 0 to 1, 0 beyond the image.
+
+    The scale is the mean difference of the pixels given, so that it adapts to contrast and noise.
+    """
+    gaps, sharp = gaps_to_neighbours(near, tone)
+    return np.asarray(np.exp(gaps * np.float32(-sharp)))
 
 
 def window_means(tones: NDArray[np.uint8]) -> Means:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.work_image import Floats, WorkImage, prepare_image
+from visup.percepts.motion.features.work_image import Floats, reduced
 
 SIZE = 400  # longer side of the images in the history, pixels
 EVERY_S = 0.16  # spacing of images of the last second
@@ -54,33 +54,33 @@ class BackwardTracker:
         due = not self._past or frame.time - self._past[-1][0] >= EVERY_S - 1e-6
         fresh = [r for r in regions if r.id not in self._since]
         if due or fresh:
-            image = prepare_image(frame, SIZE)
+            image = _small(frame)
             self._see(image)
             for r in fresh:
-                self._since[r.id] = self._found_since(image, r, frame.size)
+                self._since[r.id] = self._found_since(image, frame.time, r, frame.size)
             if due:
-                self._keep(image)
+                self._keep(image, frame.time)
         return tuple(replace(r, visible_since=self._since.get(r.id)) for r in regions)
 
-    def _see(self, image: WorkImage) -> None:
+    def _see(self, image: Grey) -> None:
         if image.shape != self._shape:
             self._past, self._since, self._shape = [], {}, image.shape
 
-    def _keep(self, image: WorkImage) -> None:
-        self._past.append((image.time, image.grey))
+    def _keep(self, image: Grey, now: float) -> None:
+        self._past.append((now, image))
         times = [t for t, _ in self._past]
         # For each new image, drop the first that is closer to its neighbours than its age allows.
         for k in range(1, len(times) - 1):
-            if times[k + 1] - times[k - 1] < (image.time - times[k]) / THINNING:
+            if times[k + 1] - times[k - 1] < (now - times[k]) / THINNING:
                 del self._past[k]
                 break
-        if image.time - self._past[0][0] > HORIZON_S:
+        if now - self._past[0][0] > HORIZON_S:
             del self._past[0]
 
-    def _found_since(self, image: WorkImage, region: Region, size: tuple[int, int]) -> float:
+    def _found_since(self, image: Grey, now: float, region: Region, size: tuple[int, int]) -> float:
         """The time of the oldest image to which a region can be tracked."""
-        points = _points(image.grey, region, size)
-        since, newer = image.time, image.grey
+        points = _points(image, region, size)
+        since, newer = now, image
         needed = max(LEAST_POINTS, FOUND * len(points))
         for time, older in reversed(self._past):
             points, found = _followed(newer, older, points)
@@ -88,6 +88,14 @@ class BackwardTracker:
                 break
             since, newer = time, older
         return since
+
+
+def _small(frame: Frame) -> Grey:
+    """A frame in grey, SIZE pixels long if it is longer, (h, w)."""
+    image = frame.image
+    if image.ndim == 3 and image.shape[2] == 3:
+        image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    return np.asarray(cv2.GaussianBlur(reduced(image, SIZE), (3, 3), 0.7), dtype=np.uint8)
 
 
 def _points(grey: Grey, region: Region, size: tuple[int, int]) -> Floats:

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
-from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.features.work_image import Floats, reduced
+from visup.percepts.motion.output._cast_shadows_jit import changed_tones, masked_greys
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 Mask = NDArray[np.bool_]
@@ -76,7 +77,6 @@ class CastShadowFilter:
     def step(
         self,
         frame: Frame,
-        image: Floats,
         scene: FrameMeasurements,
         regions: Sequence[Region],
         *,
@@ -86,7 +86,6 @@ class CastShadowFilter:
 
         Args:
             frame: The frame.
-            image: The same, from `comparable_image`.
             scene: Its measurements, for the camera's motion since the previous frame.
             regions: All that move, frame pixels.
             static: Whether the camera is known to be static.
@@ -95,23 +94,31 @@ class CastShadowFilter:
             The remaining regions, in the same order.
         """
         self._frames += 1
-        ground = self._ground
+        if self._ground is not None and not static:
+            self._ground = _aligned(self._ground, scene)
+        asked = [r for r in regions if self._is_asked(r)]
+        if asked or self._ground is None or frame.time - self._ground.since >= DELAY_S:
+            self._look(frame, regions, asked)
+        return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
+
+    def _is_asked(self, region: Region) -> bool:
+        """Whether a region is looked at; what has long been no shadow is in turn with others."""
+        settled = self._evidence.get(region.id, 0.0) <= BOUNDS[0]
+        return not settled or (self._frames + region.id) % TURNS == 0
+
+    def _look(self, frame: Frame, regions: Sequence[Region], asked: Sequence[Region]) -> None:
+        """Compare regions with the ground, and renew the ground when it is due."""
+        image, ground = comparable_image(frame), self._ground
         if ground is None or ground.bare.shape != image.shape:
             nowhere = np.full_like(image, np.nan)
             self._ground = BareGround(nowhere, nowhere, frame.time - DELAY_S)
-            return tuple(regions)
-        if not static:
-            ground = _aligned(ground, scene)
-        for r in regions:
-            # What has long been no shadow is looked at in turn with others.
-            settled = self._evidence.get(r.id, 0.0) <= BOUNDS[0]
-            if not settled or (self._frames + r.id) % TURNS == 0:
-                self._weigh(r, image, ground, frame)
+            return
+        for r in asked:
+            self._weigh(r, image, ground, frame)
         if frame.time - ground.since >= DELAY_S:
-            ground = _updated(ground, image, _covered(regions, frame, image), frame.time)
-        self._ground = ground
+            covered = _covered(regions, frame, image)
+            self._ground = _updated(ground, image, covered, frame.time)
         self._evidence = dict(list(self._evidence.items())[-MOST:])
-        return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
 
     def _weigh(self, region: Region, image: Floats, ground: BareGround, frame: Frame) -> None:
         before = self._evidence.pop(
@@ -132,17 +139,11 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     Returns:
         The evidence; 0 when there is none.
     """
-    known = where & np.isfinite(ground[..., 0])
-    rest = np.where(known[..., None], ground, 0)
-    gap = now - rest
-    differs = known & (np.einsum("ijk,ijk->ij", gap, gap) > 3 * CHANGED**2)
-    if differs.sum() < max(LEAST, LEAST_SHARE * where.sum()):
+    now, ground = np.ascontiguousarray(now), np.ascontiguousarray(ground)
+    differs, bright, tint, power = changed_tones(now, ground, where, 3 * CHANGED**2)
+    if len(bright) < max(LEAST, LEAST_SHARE * np.count_nonzero(where)):
         return 0.0
-    a, b = now[differs], rest[differs]
-    power = np.einsum("ij,ij->i", b, b) + 1.0
-    bright = np.einsum("ij,ij->i", a, b) / power
-    off = a - bright[:, None] * b
-    hue = np.sqrt(np.einsum("ij,ij->i", off, off) / power)
+    hue = np.sqrt(tint)
     dim = (bright > DIMMED[0]) & (bright < DIMMED[1]) & (hue < HUE + 6.0 / np.sqrt(power))
     shaded = float(dim.mean())
     if shaded < OPAQUE:
@@ -150,7 +151,7 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     low, high = np.quantile(bright[dim], [0.1, 0.9]).tolist()
     if shaded < SHADED or high > EVEN * low:
         return 0.0
-    seen_through = _texture_agreement(now, rest, differs)
+    seen_through = _texture_agreement(now, ground, differs)
     if seen_through is None:
         even = high < BARE_EVEN * low and float(np.quantile(hue, 0.9)) < BARE_HUE
         return FOR / 2 if even else 0.0
@@ -172,7 +173,7 @@ def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None
 
 def _detail(image: Floats, where: Mask) -> Floats:
     """Difference from the local mean within a mask, (h, w)."""
-    grey = np.where(where, image.mean(axis=2), 0).astype(np.float32)
+    grey = masked_greys(image, where)
     count = cv2.blur(where.astype(np.float32), (7, 7))
     return np.asarray(grey - cv2.blur(grey, (7, 7)) / np.maximum(count, 1e-3), dtype=np.float32)
 
@@ -182,17 +183,7 @@ def comparable_image(frame: Frame) -> Floats:
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-    scale = min(1.0, SIZE / max(frame.size))
-    size = (max(8, round(frame.size[0] * scale)), max(8, round(frame.size[1] * scale)))
-    # Means over whole pixels first: by a ratio that is no whole number they take eight times as long.
-    whole = max(int(1 / scale), 1)
-    if whole > 1:
-        height, width = (n // whole * whole for n in image.shape[:2])
-        fewer = (width // whole, height // whole)
-        image = np.asarray(
-            cv2.resize(image[:height, :width], fewer, interpolation=cv2.INTER_AREA), dtype=np.uint8
-        )
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+    return reduced(image, SIZE).astype(np.float32)
 
 
 def _aligned(ground: BareGround, scene: FrameMeasurements) -> BareGround:

@@ -257,3 +257,23 @@ def _squared_distance(image: Floats, tones: Floats, y: int, x: int) -> float:
     b = image[y, x, 1] - tones[y, x, 1]
     c = image[y, x, 2] - tones[y, x, 2]
     return float(a * a + b * b + c * c)
+
+
+@compiled
+def believe_bare(
+    share: Floats, was_hidden: Mask, hidden: Mask, pace: tuple[np.float32, np.float32]
+) -> None:
+    """Update the belief that ground is bare, in place.
+
+    Args:
+        share: (h, w) the belief, 0 to 1.
+        was_hidden: (h, w) which ground was ever hidden.
+        hidden: (h, w) which is.
+        pace: How fast belief grows where ground was hidden, and where it never was.
+    """
+    fast, slow = pace
+    for y in range(share.shape[0]):
+        for x in range(share.shape[1]):
+            was_hidden[y, x] |= hidden[y, x]
+            grown = min(share[y, x] + (fast if was_hidden[y, x] else slow), np.float32(1))
+            share[y, x] = np.float32(0) if hidden[y, x] else grown

@@ -43,17 +43,87 @@ def best_shift(
         for i in range(shape.shape[1]):
             numbers[j % step, i % step] += shape[j, i]
     compared = numbers.max()
+    listed = _listed(shape, tone, free.shape[1], step, numbers[0, 0])
     # No shift that costs more than none at all can be the best.
     bound = _cost(image, free, shape, tone, corner, (step, compared, np.inf))
     best, best_x, best_y = np.inf, 0, 0
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
             far, place = 0.5 * hypot(dx, dy), (corner[0] + dx, corner[1] + dy)
-            cost = far + _cost(image, free, shape, tone, place, (step, compared, bound - far))
+            limits = (step, compared, bound - far)
+            if _is_within(shape, place, free):
+                cost = far + _listed_cost(image, free, listed, place, (compared, bound - far))
+            else:
+                cost = far + _cost(image, free, shape, tone, place, limits)
             if cost < best:
                 best, best_x, best_y = cost, dx, dy
                 bound = min(bound, best)
     return best, best_x, best_y
+
+
+@compiled
+def _is_within(shape: NDArray[np.bool_], corner: tuple[int, int], free: Floats) -> bool:
+    """Whether a template lies wholly in the image."""
+    left, top = corner
+    right, bottom = left + shape.shape[1], top + shape.shape[0]
+    return bool(min(left, top) >= 0 and right <= free.shape[1] and bottom <= free.shape[0])
+
+
+@compiled
+def _listed(
+    shape: NDArray[np.bool_], tone: Floats, width: int, step: int, count: int
+) -> tuple[NDArray[np.uint64], Floats, NDArray[np.int64]]:
+    """The pixels of a template that are compared where it lies wholly in an image of some width.
+
+    Returns:
+        (N,) how far each lies from the template's corner, pixels of the image in its order; (N, 3) tones;
+        and (M,) where the pixels of each row end.
+    """
+    away, tones = np.empty(count, np.uint64), np.empty((count, 3), np.float32)
+    ends, n = np.empty((shape.shape[0] + step - 1) // step, np.int64), 0
+    for row in range(len(ends)):
+        j = row * step
+        for i in range(0, shape.shape[1], step):
+            if shape[j, i]:
+                away[n], tones[n] = j * width + i, tone[j, i]
+                n += 1
+        ends[row] = n
+    return away, tones, ends
+
+
+@compiled
+def _listed_cost(
+    image: Floats,
+    free: Floats,
+    listed: tuple[NDArray[np.uint64], Floats, NDArray[np.int64]],
+    corner: tuple[int, int],
+    limits: tuple[int, float],
+) -> float:
+    """`_cost`, with the same result, of a template that lies wholly in the image; twice as fast.
+
+    Args:
+        image: As in `best_shift`, as is the next.
+        free: How far each pixel is free.
+        listed: From `_listed`.
+        corner: The template's place.
+        limits: As of `_cost`, without the stride.
+    """
+    away, tones, ends = listed
+    compared, bound = limits
+    flat, open_ = image.reshape(-1, 3), free.reshape(-1)
+    begin = np.uint64(corner[1] * free.shape[1] + corner[0])
+    total, n = 0.0, 0
+    for row in range(len(ends)):
+        while n < ends[row]:
+            p = begin + away[n]
+            gap = abs(flat[p, 0] - tones[n, 0])
+            gap += abs(flat[p, 1] - tones[n, 1])
+            gap += abs(flat[p, 2] - tones[n, 2])
+            total += MOST - (MOST - min(gap / 3, MOST)) * open_[p]
+            n += 1
+        if total > (bound + ROUNDING) * compared:
+            return np.inf
+    return total / n if n else np.inf
 
 
 @compiled

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.outlines.region_outline import component_areas
 
@@ -114,7 +115,20 @@ def find_blobs(
     keep = component_areas(filled, labels, count) >= least
     keep[0] = False
     number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
-    return Foreground(image, number[labels], int(keep.sum()), time, seconds)
+    return Foreground(
+        image, renumbered(np.asarray(labels, np.int32), number), int(keep.sum()), time, seconds
+    )
+
+
+@compiled
+def renumbered(labels: Labels, number: Labels) -> Labels:
+    """(h, w) labels, each replaced by its new number, (count,); most of them are 0, and stay so."""
+    out = np.zeros(labels.shape, np.int32)
+    for y in range(labels.shape[0]):
+        for x in range(labels.shape[1]):
+            if labels[y, x]:
+                out[y, x] = number[labels[y, x]]
+    return out
 
 
 def template_window(

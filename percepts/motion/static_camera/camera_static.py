@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from visup.percepts.motion.layers._dominant_motion_jit import grid_cells
 from visup.percepts.motion.layers.affine import STILL, Affine, distances
 from visup.percepts.motion.layers.dominant_motion import BALANCE_GRID
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
@@ -35,9 +36,7 @@ def _still_share(scene: FrameMeasurements, number: int) -> float | None:
     use = c.information[:, 0] + c.information[:, 2] > TELLS
     use &= scene.owner[scene.cell_of(c)] == 0
     rows, cols = BALANCE_GRID
-    row = np.clip(c.xy[:, 1] * rows / scene.image.shape[0], 0, rows - 1).astype(np.int64)
-    col = np.clip(c.xy[:, 0] * cols / scene.image.shape[1], 0, cols - 1).astype(np.int64)
-    place = (row * cols + col)[use]
+    place = grid_cells(c.xy, scene.image.shape, BALANCE_GRID)[use]
     fits = distances(Affine(STILL), c, 0.15)[use] < FITS
     all_ = np.bincount(place, minlength=rows * cols)
     rest = np.bincount(place[fits], minlength=rows * cols)

@@ -25,6 +25,7 @@ from visup.agent import Region
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.outlines.region_outline import describe_mask
+from visup.percepts.motion.static_camera._background_model_jit import believe_bare
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 Mask = NDArray[np.bool_]
@@ -123,9 +124,8 @@ class GroundBelief:
         """Note where the ground is hidden or unknown, `seconds` after the image before."""
         if self.share is None or self._was_hidden is None:
             self.share, self._was_hidden = np.zeros(hidden.shape, np.float32), hidden.copy()
-        self._was_hidden |= hidden
-        step = np.where(self._was_hidden, seconds / BACK_S, seconds / ALWAYS_S).astype(np.float32)
-        self.share = np.where(hidden, np.float32(0), np.minimum(self.share + step, np.float32(1)))
+        pace = np.float32(seconds / BACK_S), np.float32(seconds / ALWAYS_S)
+        believe_bare(self.share, self._was_hidden, hidden, pace)
 
     def cover(self, reported: Mask) -> None:
         """Note where bodies are reported, (h, w) bool."""
@@ -190,7 +190,7 @@ def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) 
         ground = ground + BARE * cells.mean(np.asarray(seen, np.float32))
     body = np.asarray(OWN * mine + CHANGED * change, np.float32)
     share = _random_walk(body, np.asarray(ground, np.float32), cells)
-    inside = (cells.paint(share > 0.5) > 0) | own
+    inside = cells.paint(share > 0.5) | own
     count, labels = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
     touched = np.zeros(count, dtype=bool)
     touched[labels[own]] = True

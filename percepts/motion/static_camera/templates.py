@@ -42,7 +42,9 @@ def split_blob(
     whole = view.labels == blob
     if len(rivals) < 2:
         return [(i, whole) for i, _ in rivals]
-    ys, xs = np.nonzero(whole)
+    x, y, w, h = cv2.boundingRect(whole.view(np.uint8))
+    ys, xs = np.nonzero(whole[y : y + h, x : x + w])
+    ys, xs = ys + y, xs + x
     tones = view.image[ys, xs]
     costs = [np.empty(0, np.float32)] * len(rivals)
     for n, dx, dy in _placed_templates([s for _, s in rivals], whole, view):

@@ -162,11 +162,11 @@ def update(
     """
     least = 0.3 * min_region_area(scene, settings)
     at = labelling.winner[scene.at]
+    gain = np.clip(likelihood[np.arange(len(at)), at] - likelihood[:, 0], -CLIP, CLIP)
+    gains = np.bincount(at, gain, len(tracks) + 1).tolist()
     out = []
     for k, t in enumerate(tracks, 1):
-        own = likelihood[at == k]
-        gain = np.clip(own[:, k] - own[:, 0], -CLIP, CLIP)
-        t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
+        t = replace(t, evidence=min(0.98 * t.evidence + gains[k], 2000.0))
         out.append(update_track(t, k, labelling, scene.cells, scene.time, least))
     return tuple(out)
 

@@ -82,7 +82,7 @@ class Track:
         initiated: Seconds.
         last_seen: Seconds when it was last visible.
         share: (count,) float32, probability of each superpixel.
-        occluded: (h, w) float32, where others hide it; None when they do not.
+        occluded: (h, w) bool, where others hide it; None when they do not.
         motions: The motions of its rigid parts; an arm has several.
         whole_rate: The single motion that fits all parts best.
         recent_share: (count,) float32, where it was recently: parts that appear there are its own.
@@ -94,7 +94,7 @@ class Track:
         unoccluded_velocity: (vx, vy) when it was last in full view, pixels per second.
         pending_shift: (x, y) of motion not yet applied to `occluded`, pixels.
         predicted_share: (count,) float32, where it would be by its own motion alone.
-        predicted_map: (h, w) float32, the same by pixels while others hide a part of it, or None.
+        predicted_map: (h, w) bool, the same by pixels while others hide a part of it, or None.
         core: (count,) bool, where it prevails, even by less than half, and objects are more certain than the
             background; None before the first update.
         path: (time, x, y) of its displacement since initiation, over the longest baseline.
@@ -113,7 +113,7 @@ class Track:
     initiated: float
     last_seen: float
     share: Floats
-    occluded: Floats | None = None
+    occluded: NDArray[np.bool_] | None = None
     motions: tuple[PartMotion, ...] = ()
     whole_rate: AffineRate | None = None
     recent_share: Floats | None = None
@@ -124,7 +124,7 @@ class Track:
     unoccluded_velocity: tuple[float, float] = (0.0, 0.0)
     pending_shift: tuple[float, float] = (0.0, 0.0)
     predicted_share: Floats | None = None
-    predicted_map: Floats | None = None
+    predicted_map: NDArray[np.bool_] | None = None
     core: NDArray[np.bool_] | None = None
     path: tuple[tuple[float, float, float], ...] = ()
     separate_s: Mapping[int, float] = field(default_factory=_nothing)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from math import inf
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features._superpixels_jit import carry_shares
@@ -14,6 +16,7 @@ from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.tracks.track import Track, Tracks
 
+T = TypeVar("T", bound=np.generic)
 PATH_S = 2.8  # how long the path of a track is remembered, seconds
 EVERY = 4  # every how many pixels of a cell are traced back along the flow
 FADE = 0.4  # share of `recent_share` that remains after a second
@@ -73,7 +76,7 @@ def _predicted(
     if track.occluded is None:
         own = new.shifted(old, body, by)
     else:
-        whole = shift_map(np.maximum(old.paint(body), track.occluded), *by)
+        whole = shift_map(old.paint(body) | track.occluded, *by)
         own = new.mean(whole)
     return replace(
         track,
@@ -88,7 +91,7 @@ def _predicted(
     )
 
 
-def shift_map(image: Floats, dx: int, dy: int) -> Floats:
+def shift_map(image: NDArray[T], dx: int, dy: int) -> NDArray[T]:
     """An image shifted by whole pixels, filled with zeros."""
     if dx == 0 and dy == 0:
         return image

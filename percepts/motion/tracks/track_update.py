@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.superpixels import Superpixels
-from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.layers.dense_labelling import Labelling
 from visup.percepts.motion.tracks.track import Track
 
@@ -75,8 +74,8 @@ def _unoccluded_velocity(
 
 def _occluded(
     track: Track, taken: NDArray[np.bool_], area: float, cells: Superpixels, least: float
-) -> tuple[Floats | None, float]:
-    """(h, w) float32, where others hide a track, or None; and the hidden area, pixels.
+) -> tuple[NDArray[np.bool_] | None, float]:
+    """(h, w) bool, where others hide a track, or None; and the hidden area, pixels.
 
     Args:
         track: The predicted track.
@@ -93,5 +92,5 @@ def _occluded(
         return None, lost
     if track.predicted_map is not None and own is not None:
         # By pixels: cells change in each frame, and its edges would wear away.
-        return track.predicted_map * cells.paint(taken & (own > 0)), lost
+        return track.predicted_map & cells.paint(taken & (own > 0)), lost
     return cells.paint(covered), lost

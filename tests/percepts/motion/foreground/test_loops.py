@@ -20,6 +20,7 @@ from visup.percepts.motion.foreground._cues_jit import (
 )
 
 SHAPE = (12, 16)
+HALF = np.array([0.5], np.float32)
 edges = arrays(bool, (6, 7))
 cells = arrays(np.int32, SHAPE, elements=st.integers(0, 5))
 flows = arrays(np.float32, (*SHAPE, 2), elements=st.floats(-6, 6, width=32))
@@ -74,14 +75,14 @@ def slow_inside(mask: np.ndarray) -> np.ndarray:
 @given(edges)
 @settings(max_examples=40, deadline=None)
 def test_rays_agree_with_walking_them(mask: np.ndarray) -> None:
-    assert np.allclose(inside_share(mask), slow_inside(mask))
+    assert np.allclose(inside_share(mask.astype(np.float32), HALF), slow_inside(mask))
 
 
 def test_what_is_enclosed_is_inside() -> None:
     mask = np.zeros((20, 30), bool)
     mask[5:15, 8:20] = True
     mask[6:14, 9:19] = False
-    share = inside_share(mask)
+    share = inside_share(mask.astype(np.float32), HALF)
     assert (share[7:13, 10:18] == 1).all()
     assert share[0, 0] < 0.5
 

@@ -10,8 +10,7 @@ from tests.percepts.motion.clips import texture
 from visup.evaluation.motion.mask_scores import iou
 from visup.percepts.motion.outlines._outline_refinement_jit import (
     BINS,
-    histogram_log_odds,
-    likeness_of_neighbours,
+    histogram_odds,
     mean_field,
     places_of,
     taken_side,
@@ -25,6 +24,7 @@ from visup.percepts.motion.outlines.outline_refinement import (
     NOISE,
     ROUNDS,
     SAMPLED,
+    likeness_of_neighbours,
     local_log_odds,
     refine_outline,
     window_means,
@@ -122,7 +122,8 @@ def test_odds_are_those_of_two_gaussians_in_the_window(seed: int) -> None:
     tone = rng.integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
     inside = disc(45, 35, 20).view(np.uint8)
     near = places_of(ring_of(inside))
-    found = local_log_odds(inside, near, tone, window_means(np.ascontiguousarray(tone[::2, ::2])))
+    coarse = np.ascontiguousarray(tone[::2, ::2])
+    found = local_log_odds(inside, near, tone, coarse, window_means(coarse))
     some, half = tone[::2, ::2], SAMPLED[0] // 2
     wide = cv2.copyMakeBorder(some, half, half, half, half, cv2.BORDER_REFLECT_101).astype(float)
     sides = np.ascontiguousarray(inside[::2, ::2])
@@ -151,7 +152,7 @@ def test_odds_are_those_of_the_colours_of_the_object_and_its_surroundings(seed: 
     tone = rng.choice(np.array([10, 30, 200], np.uint8), (*SHAPE, 3))
     inside, ring = disc(45, 35, 15).view(np.uint8), disc(45, 35, 25).view(np.uint8)
     near = places_of(ring_of(inside))
-    found = histogram_log_odds(near, inside, ring, tone, (NEITHER, MOST))
+    found = np.clip(np.log(histogram_odds(near, inside, ring, tone, NEITHER)), -MOST, MOST)
     colours = tone // (256 // BINS)
     sides = (inside > 0, (ring > 0) & (inside == 0))
     sizes = np.array([side.sum() for side in sides])

@@ -105,7 +105,6 @@ def test_what_is_certainly_no_shadow_is_looked_at_in_turn(monkeypatch: pytest.Mo
     unused: Any = None  # before a static camera the measurements are not asked for
     for n in range(41):
         frame = Frame(n, n / 25, image)
-        small = comparable_image(frame)
-        assert shadows.step(frame, small, unused, [region], static=True) == (region,)
+        assert shadows.step(frame, unused, [region], static=True) == (region,)
     # In four frames the evidence is as low as it can be; a fourth of the other 36.
     assert len(looks) == 4 + 9
