@@ -46,24 +46,30 @@ class CarrierSettings:
     past_share: float = 3.0
 
 
+Course = tuple[float, tuple[float, float]]
+"""How far a body has moved, as the length of its path and as a vector, pixels."""
+
+
 @dataclass(frozen=True, slots=True)
 class BodyMotion:
     """The memory of one body: when it rested and set out; seconds and pixels.
 
     Attributes:
         path: How far it has moved in all.
+        place: (x, y) of that as a vector.
         rested_since: Since when it rests; None while it moves.
         set_out: When it set out after a rest; None while it rests, or moves without having rested.
         way: (x, y) from where it set out.
-        touching: Who has touched it ever since, with their `path` at that time.
+        touching: Who has touched it ever since, with their `path` and `place` at that time.
         carrier: Who carries it, as far as is known.
     """
 
     path: float = 0.0
+    place: tuple[float, float] = (0.0, 0.0)
     rested_since: float | None = None
     set_out: float | None = None
     way: tuple[float, float] = (0.0, 0.0)
-    touching: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}))
+    touching: Mapping[int, Course] = field(default_factory=lambda: MappingProxyType({}))
     carrier: int | None = None
 
 
@@ -134,25 +140,27 @@ def _moved_bodies(
             found[number] = body
         elif speed <= settings.rest_share * least:
             since = mind.time if body.rested_since is None else body.rested_since
-            found[number] = BodyMotion(body.path, since)
+            found[number] = BodyMotion(body.path, body.place, since)
         else:
-            body = replace(body, path=body.path + speed * dt)
+            step = float(velocity[0]) * dt, float(velocity[1]) * dt
+            place = body.place[0] + step[0], body.place[1] + step[1]
+            body = replace(body, path=body.path + speed * dt, place=place)
             if sigma <= unclear and speed > max(least, MOVING_SIGMAS * sigma):
-                step = float(velocity[0]) * dt, float(velocity[1]) * dt
                 others = touching.get(number, ())
-                body = _moved(body, step, _paths(others, memory), mind.time, settings)
+                body = _moved(body, step, _courses(others, memory), mind.time, settings)
             found[number] = body
     return found
 
 
-def _paths(bodies: Iterable[int], memory: CarrierMemory) -> Mapping[int, float]:
-    return MappingProxyType({i: memory.of.get(i, AT_START).path for i in bodies})
+def _courses(bodies: Iterable[int], memory: CarrierMemory) -> Mapping[int, Course]:
+    found = ((i, memory.of.get(i, AT_START)) for i in bodies)
+    return MappingProxyType({i: (body.path, body.place) for i, body in found})
 
 
 def _moved(
     body: BodyMotion,
     step: tuple[float, float],
-    touching: Mapping[int, float],
+    touching: Mapping[int, Course],
     now: float,
     settings: CarrierSettings,
 ) -> BodyMotion:
@@ -179,7 +187,7 @@ def _with_carrier(
     set_out = body.set_out
     if set_out is None:
         return body
-    ever = {i: path for i, path in body.touching.items() if i in touching}
+    ever = {i: course for i, course in body.touching.items() if i in touching}
     if len(ever) < len(body.touching):
         body = replace(body, touching=MappingProxyType(ever))
     far = hypot(*body.way)
@@ -188,11 +196,11 @@ def _with_carrier(
     movers = [
         i
         for i in touching
-        if i in motions and _goes_along(motions[i], ever.get(i), settings.along_share * far)
+        if i in motions and _goes_along(motions[i], ever.get(i), body.way, settings)
     ]
     if len(movers) != 1 or movers[0] not in ever:
         return body
-    gone = motions[movers[0]].path - ever.pop(movers[0])
+    gone = motions[movers[0]].path - ever.pop(movers[0])[0]
     if gone > settings.past_share * far:
         return replace(body, touching=MappingProxyType(ever))
     return replace(body, carrier=movers[0])
@@ -207,6 +215,17 @@ def _has_come_far(
     return lasted >= settings.moving_s - 1e-6 and far >= max(settings.path_share * size, least)
 
 
-def _goes_along(other: BodyMotion, path: float | None, least: float) -> bool:
-    """Whether a body moves, and at least so far since its path was that; None if it came later."""
-    return other.rested_since is None and (path is None or other.path - path >= least)
+def _goes_along(
+    other: BodyMotion, course: Course | None, way: tuple[float, float], settings: CarrierSettings
+) -> bool:
+    """Whether a body moves, and since that course far enough for the way of another, and not against it.
+
+    The course is None if it came later. An arm that bends goes elsewhere than its hand, but not the other
+    way.
+    """
+    if other.rested_since is not None or course is None:
+        return other.rested_since is None
+    path, (x, y) = course
+    least = settings.along_share * hypot(*way)
+    along = (other.place[0] - x) * way[0] + (other.place[1] - y) * way[1]
+    return other.path - path >= least and along > -least * hypot(*way)

@@ -76,6 +76,19 @@ def test_who_goes_much_farther_passes_by(speed: float, carries: bool) -> None:
     assert ((HAND, PART) in carried(scene(belt, part))) is carries
 
 
+@pytest.mark.parametrize(("down", "carries"), [(30.0, False), (-30.0, True)])
+def test_who_is_thrown_off_is_not_carried_by_who_draws_back(down: float, carries: bool) -> None:
+    """A satellite that is knocked flies off, while the arm that still covers a part of it draws back."""
+
+    def hand(t: float) -> Box:
+        return (200, 0, 30, 345 - 40 * abs(t - LIFT_S))
+
+    def knocked(t: float) -> Box:
+        return (190, 300 + down * max(0.0, t - LIFT_S), 50, 50)
+
+    assert ((HAND, PART) in carried(scene(hand, knocked, seconds=4.9))) is carries
+
+
 def test_what_moves_from_the_start_on_tells_nothing() -> None:
     hand: Course = lambda t: (100 + 12 * t, 200, 80, 60)  # noqa: E731
     held: Course = lambda t: (180 + 12 * t, 200, 80, 60)  # noqa: E731
