@@ -43,7 +43,7 @@ class CouplingEvidence:
         rest_odds: Log odds, at least 0, that they touch and are at rest.
         rest_since: Since when these have been above 0.
         apart_since: Since when they are apart.
-        apart_path: How far they have moved apart since, pixels.
+        apart_path: How far they have moved apart since, as long as they were followed, pixels.
         relative_track: Their relative motion since they are near.
         contact: Contact of their outlines.
         decoupled_at: When they were decoupled, if they were.

@@ -91,7 +91,7 @@ class CouplingSettings:
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled; or
-        part_path: how far they must have moved apart, image diagonals.
+        part_path: how far they must have moved apart while they were followed, image diagonals.
         contact: When outlines that meet are in contact.
         carriers: When a body that sets out counts as carried.
     """
@@ -208,7 +208,11 @@ class CouplingReasoner(ExplainableReasoner):
         )
 
     def _parted(self, before: CouplingEvidence, pair: Pair, mind: Mind) -> float:
-        """How far two that are apart have moved relative to each other since, pixels."""
+        """How far two that are apart have moved relative to each other since, pixels.
+
+        Once they are followed no longer it stands still, and only the time counts: beyond that a gap may
+        just as well be an outline that has leapt.
+        """
         times = sample_window(mind).times
         lasted = float(times[-1] - times[-2]) if len(times) > 1 else 0.0
         speed = float(np.nan_to_num(kinematics(mind).pair("relative_speed", *pair)))
