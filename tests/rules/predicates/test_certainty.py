@@ -80,6 +80,11 @@ def test_a_machine_is_at_home_where_it_was_from_the_start(
     assert yes(mind, at_home(Snapshot(mind))) == home
 
 
+def shrunk(t: float) -> float:
+    """Pixels that are no longer seen of a body by then."""
+    return 145 * max(t - 1.6, 0.0)
+
+
 @pytest.mark.parametrize(
     ("box", "comes"),
     [
@@ -93,6 +98,7 @@ def test_a_machine_is_at_home_where_it_was_from_the_start(
         (lambda t: (5, 200, 100 - 25 * t, 80), False),  # at the border, cut to its rest
         (lambda t: (100 * t - 90 if t < 1 else 300, 200, 100, 80), False),  # leaps
         (lambda t: (100 * t - 90, 200, 100, 80 if t < 1.5 else 20), False),  # the rest of something
+        (lambda t: (540, 60 + 80 * t, 100 - shrunk(t) / 3, 150 - shrunk(t)), False),  # its rest
     ],
 )
 def test_what_came_in_has_come_over_the_border_in_one_piece(

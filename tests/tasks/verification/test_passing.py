@@ -15,7 +15,9 @@ from visup.agent import Coupling, Mind, Observation, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING
+from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.observe import RelationLookup, observe
 from visup.tasks.verification.passing import (
     goes_past,
     moves_on,
@@ -111,6 +113,21 @@ def test_what_rested_when_its_carrier_left_was_put_down_and_what_fell_was_not(
     thoughts = reason(at(i) for i in range(125))
     assert any(t.mind.couplings for t in thoughts)
     assert any(put_down(t.mind, (PART, TARGET)) for t in thoughts) is put
+    # It still is when the two have been decoupled.
+    parted = [t.mind for t in thoughts if t.mind.time > 4.0 and not t.mind.couplings]
+    assert any(put_down(mind, (PART, TARGET)) for mind in parted) is put
+
+
+@pytest.mark.parametrize(("coupled", "against"), [(True, False), (False, True)])
+def test_outlines_of_what_is_coupled_drift_and_it_moves_together(
+    coupled: bool, against: bool
+) -> None:
+    """A cart is hauled, and its outline creeps nearer to that of the tug."""
+    pair = (GRIPPER, PART)
+    facts = [("converging", Truth.TRUE), ("coupled", Truth.TRUE if coupled else Truth.FALSE)]
+    told = tuple(Relation(name, pair, truth, 1.0) for name, truth in facts)
+    seen = observe(ACTIONS["moving_together"], pair, RelationLookup(Mind(time=2.0, relations=told)))
+    assert (seen.contrary is not None) is against
 
 
 def test_what_rests_does_not_go_past() -> None:
