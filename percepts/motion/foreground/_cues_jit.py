@@ -276,7 +276,7 @@ def nearest_lengths(ground: Floats, flow: Floats) -> Floats:
         ground: (M, count, 2) displacements of each cell by the background's motions.
         flow: (count, 2) flow back at each.
     """
-    out = np.empty(len(flow), np.float32)
+    out = np.zeros(len(flow), np.float32)  # as it stays where a flow is no number
     for c in range(len(flow)):
         least = np.float32(np.inf)
         for m in range(len(ground)):
