@@ -167,9 +167,10 @@ class _Search:
         """Insert each word that may precede the next one."""
         if put >= MOST_PUT_IN_A_ROW:
             return
-        if stack not in self.offered:
-            self.offered[stack] = list(self.offers(stack))
-        for price, texts, after in self.offered[stack]:
+        offered = self.offered.get(stack)
+        if offered is None:
+            offered = self.offered[stack] = list(self.offers(stack))
+        for price, texts, after in offered:
             self.push(cost + price, at, after, _Change(at, 0, texts, change), put + 1)
 
     def offers(self, stack: Stack) -> Iterator[tuple[float, tuple[str, ...], Stack]]:
