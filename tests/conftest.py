@@ -45,8 +45,8 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 def pytest_collection(session: pytest.Session) -> None:
     """Of two workers one loads the test modules from the end: each rewrites half of the asserts for both.
 
-    pytest keeps what it has rewritten beside the module; on a fresh clone both would rewrite all of them at the
-    same time, for 5 s.
+    pytest keeps what it has rewritten beside the module; on a fresh clone both would rewrite all of them at
+    the same time, for 5 s.
     """
     worker = getattr(session.config, "workerinput", {}).get("workerid")
     whole = session.config.args_source is pytest.Config.ArgsSource.TESTPATHS

@@ -14,8 +14,8 @@ from visup.agent.storage.journal_reader import Recording
 
 EVERY = 6
 UNTIL_S = 4.0
-"""Seconds of the clip: both actors are recognised, and the first stage progresses. What is perceived is compared
-to the last bit, of which events show little."""
+"""Seconds of the clip: both actors are recognised, and the first stage progresses. What is perceived is
+compared to the last bit, of which events show little."""
 
 RUN = """
 import os, sys
@@ -57,7 +57,9 @@ def told(folder: Path, cores: list[int]) -> tuple[bytes, list[bytes], list[objec
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
-def test_what_is_seen_and_told_is_the_same_byte_for_byte_on_one_core_and_on_all(tmp_path: Path) -> None:
+def test_what_is_seen_and_told_is_the_same_byte_for_byte_on_one_core_and_on_all(
+    tmp_path: Path,
+) -> None:
     cores = sorted(os.sched_getaffinity(0))
     one = told(tmp_path / "one", cores[:1])
     assert one[0].count(b'"identified"') == 2
