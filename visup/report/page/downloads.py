@@ -112,7 +112,7 @@ def parquet_bytes(rows: Sequence[Row]) -> bytes | None:
 
 
 def _arrow_table(rows: Sequence[Row]) -> pa.Table:
-    """The rows, by way of JSON: to convert values of Python pyarrow imports pandas, for a third of a second."""
+    """The rows, by way of JSON: to convert values of Python pyarrow imports pandas, for 0.4 s."""
     import pyarrow as pa
     import pyarrow.json
 
