@@ -11,8 +11,11 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture.providers import AVAILABLE_PROVIDERS, HypothesisProvider
 from hypothesis.internal.constants_ast import Constants
@@ -37,6 +40,23 @@ settings.register_profile(
 )
 settings.register_profile("explore", deadline=None, print_blob=True, max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
+def pytest_collection(session: pytest.Session) -> None:
+    """Of two workers one loads the test modules from the end: each rewrites half of the asserts for both.
+
+    pytest keeps what it has rewritten beside the module; on a fresh clone both would rewrite all of them at
+    the same time, for 5 s.
+    """
+    worker = getattr(session.config, "workerinput", {}).get("workerid")
+    whole = session.config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if worker != "gw1" or not whole:
+        return
+    root = session.config.rootpath
+    for path in sorted((root / "tests").rglob("test_*.py"), reverse=True):
+        # What cannot be loaded, or skips itself, is told by the collection.
+        with suppress(Exception, pytest.skip.Exception):
+            import_module(".".join(path.relative_to(root).with_suffix("").parts))
 
 
 def pytest_collection_finish() -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher
 from functools import lru_cache
+from heapq import nlargest
 from pathlib import Path
 
 
@@ -25,8 +27,52 @@ def closest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
 @lru_cache(maxsize=256)  # the same mistake recurs, for example in each trial of a repair
 def _closest(word: str, known: tuple[str, ...], cutoff: float) -> str | None:
     by_folded = {k.casefold(): k for k in known}
-    near = get_close_matches(word.casefold(), by_folded, n=1, cutoff=cutoff)
+    near = close_matches(word.casefold(), by_folded, n=1, cutoff=cutoff)
     return by_folded[near[0]] if near else None
+
+
+def close_matches(word: str, known: Iterable[str], n: int = 3, cutoff: float = 0.6) -> list[str]:
+    """The same as `difflib.get_close_matches`, several times as fast where most words are unlike.
+
+    >>> close_matches("appel", ["ape", "apple", "peach"])
+    ['apple', 'ape']
+
+    Args:
+        word: The word.
+        known: Words to compare it with.
+        n: Most words to return.
+        cutoff: Least similarity, 0 to 1.
+
+    Returns:
+        The most similar ones, best first.
+    """
+    matcher, letters, found = SequenceMatcher(b=word), _letters(word), []
+    for other in known:
+        total = len(word) + len(other)
+        # No more letters can be in common than the shorter word has, or than occur in both.
+        if 2 * min(len(word), len(other)) < (cutoff - _ROUNDING) * total:
+            continue
+        held = _kept_letters(other) if len(other) < _LONG else _letters(other)
+        if 2 * len(letters & held) < (cutoff - _ROUNDING) * total:
+            continue
+        matcher.set_seq1(other)
+        ratio = matcher.ratio()
+        if ratio >= cutoff:
+            found.append((ratio, other))
+    return [other for _, other in nlargest(n, found)]
+
+
+_ROUNDING = 1e-9
+_LONG = 64
+"""Characters of a word from which on its letters are not kept."""
+
+
+def _letters(word: str) -> frozenset[tuple[str, int]]:
+    """The letters of a word, each with a number for every time that it occurs."""
+    return frozenset((c, n) for c, count in Counter(word).items() for n in range(count))
+
+
+_kept_letters = lru_cache(maxsize=4096)(_letters)
 
 
 def closest_file(path: Path, names: Iterable[str]) -> Path | None:

@@ -14,6 +14,7 @@ from lark.parsers.lalr_analysis import Shift
 
 Stack = tuple[int, ...]
 END = "$END"
+_NOT_TRIED: Stack = (-1,)
 
 
 @dataclass
@@ -45,9 +46,10 @@ class LrAutomaton:
     def step(self, stack: Stack, terminal: str) -> Stack | None:
         """The stack after a terminal; None if it is not accepted."""
         key = stack, terminal
-        if key not in self.known:
-            self.known[key] = self._step(stack, terminal)
-        return self.known[key]
+        after = self.known.get(key, _NOT_TRIED)
+        if after is _NOT_TRIED:
+            after = self.known[key] = self._step(stack, terminal)
+        return after
 
     def _step(self, stack: Stack, terminal: str) -> Stack | None:
         while True:

@@ -54,10 +54,20 @@ def culprit(text: str, begin: int, end: int, new: str) -> Culprit | None:
 
 def _with_neighbours(text: str, begin: int, end: int, new: str) -> tuple[int, int, str]:
     """A change together with the words before and after it, by which it is seen what is put in where."""
-    before = max((m.start() for m in _TOKEN.finditer(text, 0, begin)), default=begin)
+    before = _word_before(text, begin)
     after = _TOKEN.search(text, end)
     stop = after.end() if after else end
     return before, stop, text[before:begin] + new + text[end:stop]
+
+
+def _word_before(text: str, end: int) -> int:
+    """The offset of the last word that begins before another offset, or that offset if there is none."""
+    head = text[:end].rstrip()
+    if not head:
+        return end
+    # No word holds a blank: words are found from the last blank on, however long the text is.
+    start = len(head) - len(head.rsplit(maxsplit=1)[-1])
+    return max(m.start() for m in _TOKEN.finditer(text, start, end))
 
 
 def _changed(text: str, begin: int, end: int, new: str) -> Iterator[list[Span]]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 
+from visup.agent.model.did_you_mean import close_matches
 from visup.rules.correction.everyday import NUMBERS
 
 TOKEN = re.compile(r"::=|<[^<>\n]*>|\"[^\"\n]*\"|\w+(?:\.\d+)?|[<>=!]=|\S")
@@ -102,7 +102,7 @@ def _moved(
 
 def _ranked(word: str, words: Sequence[str]) -> list[str]:
     """Words spelt similarly, best first."""
-    return get_close_matches(word, words, n=5, cutoff=ALIKE) if len(word) > 2 else []
+    return close_matches(word, words, n=5, cutoff=ALIKE) if len(word) > 2 else []
 
 
 def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:

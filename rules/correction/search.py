@@ -11,6 +11,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Se
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, islice, product
+from typing import NamedTuple
 
 from visup.rules.correction.automaton import END, LrAutomaton, Stack
 from visup.rules.correction.edits import Repair
@@ -66,9 +67,11 @@ class Speller:
     loose: Container[str] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Change:
-    """A word replaced, inserted (`words` is 0) or dropped (no `texts`), linked to earlier changes."""
+class _Change(NamedTuple):
+    """A word replaced, inserted (`words` is 0) or dropped (no `texts`), linked to earlier changes.
+
+    A tuple, since a search makes thousands.
+    """
 
     at: int
     words: int
@@ -167,9 +170,10 @@ class _Search:
         """Insert each word that may precede the next one."""
         if put >= MOST_PUT_IN_A_ROW:
             return
-        if stack not in self.offered:
-            self.offered[stack] = list(self.offers(stack))
-        for price, texts, after in self.offered[stack]:
+        offered = self.offered.get(stack)
+        if offered is None:
+            offered = self.offered[stack] = list(self.offers(stack))
+        for price, texts, after in offered:
             self.push(cost + price, at, after, _Change(at, 0, texts, change), put + 1)
 
     def offers(self, stack: Stack) -> Iterator[tuple[float, tuple[str, ...], Stack]]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from functools import lru_cache, partial
 from types import MappingProxyType
 
 from lark import Lark
 
-from visup.agent.model.did_you_mean import closest
+from visup.agent.model.did_you_mean import close_matches, closest
 from visup.rules.correction.automaton import LrAutomaton
 from visup.rules.correction.everyday import FILLERS, meant_by
 from visup.rules.correction.search import Meaning, Speller
@@ -235,7 +234,7 @@ def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
         if meant.casefold() != first.casefold() or length > 1:
             yield Meaning(length, (_terminal(meant),), meant, LIKELY)
     if at and words[at - 1].text[0].isdigit():
-        units = get_close_matches(first.casefold(), _UNITS, n=2, cutoff=0.5)
+        units = close_matches(first.casefold(), _UNITS, n=2, cutoff=0.5)
         yield from (
             Meaning(1, ("UNIT",), unit, GUESS)
             for unit in units

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from types import MappingProxyType
 
 _MEANT = (
@@ -44,6 +45,7 @@ _MEANT = (
 """(meanings, likeliest first; words with these meanings)."""
 
 
+@lru_cache(maxsize=1024)
 def stem(word: str) -> str:
     """The stem of a word: `moves`, `moved` and `moving` give `mov`."""
     return re.sub(r"(?:ings?|ed|es|s|e)$", "", word.casefold())

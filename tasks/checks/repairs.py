@@ -9,10 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from itertools import islice
 from math import inf
 
+from visup.agent.model.did_you_mean import close_matches
 from visup.rules.correction.edits import ALIKE, Repair, edits, hint_of
 from visup.rules.correction.loss import KNOWN, LITTLE, loss
 from visup.rules.language.diagnostics import Diagnostic
@@ -252,13 +252,13 @@ def _misspelt(line: str, at: int) -> Iterator[str]:
     """Replacements of misspelt words of the language, nearest to the caret first."""
     for pair in re.finditer(r"(?=\b([a-z]+)\s+([a-z]+)\b)", line):
         turned = f"{pair[2]} {pair[1]}"
-        for meant in get_close_matches(turned, PHRASES, n=1, cutoff=ALIKE):
+        for meant in close_matches(turned, PHRASES, n=1, cutoff=ALIKE):
             yield f"write `{meant}` in place of `{pair[1]} {pair[2]}`"
     for match in sorted(LONE_WORD.finditer(line), key=lambda m: _distance(m, at)):
         if match[0] in OTHER_WORDS:
             yield _hint(line, match, OTHER_WORDS[match[0]], at)
         elif match[0] not in MEANT_WORDS:
-            for meant in get_close_matches(match[0].lower(), MEANT_WORDS, n=3, cutoff=ALIKE):
+            for meant in close_matches(match[0].lower(), MEANT_WORDS, n=3, cutoff=ALIKE):
                 yield _hint(line, match, meant, at)
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from functools import lru_cache
 from types import MappingProxyType
 
-from visup.agent.model.did_you_mean import closest
+from visup.agent.model.did_you_mean import close_matches, closest
 from visup.agent.model.errors import SourceLocation
 from visup.rules.correction.automaton import LrAutomaton
 from visup.rules.correction.edits import TOKEN, Repair
@@ -262,7 +261,7 @@ class _Meanings:
         elif word.casefold() in KEYWORDS:
             yield 1, word.casefold(), SURE
         elif not called and len(word) > 2:
-            near = get_close_matches(word.casefold(), KEYWORDS, n=3)
+            near = close_matches(word.casefold(), KEYWORDS, n=3)
             yield from ((1, meant, GUESS) for meant in near)
         if called and word not in known_actions():
             named = synonym(word, ACTIONS) or closest(word, known_actions())

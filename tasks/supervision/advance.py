@@ -57,9 +57,9 @@ class Advance:
         if all(self.observe(x.step).paused for x in leaves(hypothesis.state)):
             yield hypothesis, 1.0
             return
-        transitions = [t for t in transitions if not self._awaits(t)]
-        barred = tuple(t.entered for t in transitions if self._is_paused(t))
-        transitions = [t for t in transitions if not self._is_paused(t)]
+        present = [(t, self._is_paused(t)) for t in transitions if not self._awaits(t)]
+        barred = tuple(t.entered for t, paused in present if paused)
+        transitions = [t for t, paused in present if not paused]
         hypothesis = self._met(hypothesis, transitions)
         ends = any(t.ends and t.may_end for t in transitions)
         if ends and hypothesis.finished is None:

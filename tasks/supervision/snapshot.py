@@ -39,7 +39,7 @@ class TaskSnapshot:
         self._relations = RelationLookup(mind, model.looks, before, model.rhythms)
         self._conditions = ConditionEvaluator(model.task, self._holds, self._relations)
         self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
-        self._judged: dict[TaskStep, ActionObservation] = {}
+        self._observed: dict[int, tuple[TaskStep, ActionObservation]] = {}
         self._pausing = model.pauses
         self.pauses = before.pauses.noted(
             model.pauses,
@@ -51,14 +51,16 @@ class TaskSnapshot:
 
     def observe(self, step: TaskStep) -> ActionObservation:
         """The present observation of a step."""
-        if not step.conditions:
-            return self._look(step.action, step.actors).settled
-        if step not in self._judged:
-            self._judged[step] = self._judge(step)
-        return self._judged[step]
+        # By identity, since steps are asked for a hundred times a frame; what is kept keeps its number.
+        found = self._observed.get(id(step))
+        if found is None:
+            found = self._observed[id(step)] = step, self._judge(step)
+        return found[1]
 
     def _judge(self, step: TaskStep) -> ActionObservation:
-        """The observation of a step that has conditions of its own."""
+        """The observation of a step, with the conditions of its own if it has any."""
+        if not step.conditions:
+            return self._look(step.action, step.actors).settled
         if self.pauses.now(step.pauses) is not None:
             return ActionObservation(paused=True, pauses=self.pauses)
         seen = replace(self._look(step.action, step.actors).settled, pauses=self.pauses)

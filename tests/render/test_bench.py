@@ -110,7 +110,8 @@ def test_a_clip_is_scored_from_its_scenario(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camel = shipped_scenario("bench/exposure").resized((160, 120))
-    short = camel.model_copy(update={"duration_s": 2.8})
+    slower = camel.camera.model_copy(update={"fps": camel.camera.fps / 2})
+    short = camel.model_copy(update={"duration_s": 2.8, "camera": slower})
     monkeypatch.setattr("visup.evaluation.motion.rendered_clips.shipped_scenario", lambda _: short)
     told: list[str] = []
     figures = evaluate_clips(tmp_path, ["exposure"], workers=1, progress=told.append)

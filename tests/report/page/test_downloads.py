@@ -39,6 +39,24 @@ def test_parquet_holds_the_same_as_the_run() -> None:
         assert parquet.read_table(BytesIO(made)).to_pylist() == [dict(r) for r in rows]
 
 
+TABLE = st.fixed_dictionaries(
+    {
+        "text": CELLS | st.sampled_from(["2026-11-28", "2026-11-28T10:00:00Z", "1.5", "null"]),
+        "maybe": st.none() | CELLS,
+        "time": st.floats(allow_nan=False),
+        "id": st.none() | st.integers(-(2**40), 2**40),
+    }
+)
+
+
+@given(st.lists(TABLE, min_size=1))
+def test_texts_and_numbers_stay_what_they_are_in_parquet(rows: list[dict[str, object]]) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `tables`")
+    made = parquet_bytes(rows)
+    assert made is not None
+    assert parquet.read_table(BytesIO(made)).to_pylist() == rows
+
+
 def test_each_table_that_has_rows_can_be_downloaded() -> None:
     page = downloads(data())
     found = re.findall(r'download="(\w+)\.csv" href="data:text/csv;base64,([^"]+)"', page)
