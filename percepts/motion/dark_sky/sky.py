@@ -1,0 +1,103 @@
+"""A dark sky, and the components of the picture that are brighter than it.
+
+Black space has one tone, and no shadow can fall on it. So what is brighter is a body, a star, or the Earth,
+whether it moves or not, and its outline is where the tone changes. What is as dark as the sky is lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+DARKEST = 40  # levels below which a pixel may be sky
+LEAST_SKY = 0.15  # share of the picture that must be sky
+MOST_NOISE = 4.0  # standard deviation of its tones, levels: a dark room has more
+EVERY = 4  # pixels: every so many are looked at for the sky's tone
+BRIGHTER = 9.0  # levels above the sky from which a pixel is a body: compression leaves halos of less
+SIGMAS = 5.0  # the same, in standard deviations of the sky
+SMOOTH = 3  # pixels: side of the window over which tones are averaged
+JOINED = 0.012  # gaps of up to this share of the image diagonal do not part a body
+BIGGEST = 0.5  # share of the picture: a larger component is a ground
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Components:
+    """Bright components before a dark sky.
+
+    Attributes:
+        bright: (H, W) bool: pixels brighter than the sky.
+        labels: (H, W) int32: component of each pixel; 0 for the sky and for what is too small or large.
+        areas: (N + 1,) bright pixels of each; 0 first.
+        cut: (N + 1,) bool: whether it touches the border of the image.
+    """
+
+    bright: Mask
+    labels: NDArray[np.int32]
+    areas: NDArray[np.int64]
+    cut: Mask
+
+
+def bright_components(image: NDArray[np.uint8], least: float) -> Components | None:
+    """The components of a picture that are brighter than a dark sky.
+
+    Args:
+        image: (H, W), (H, W, 1) or (H, W, 3) uint8.
+        least: Least area, pixels.
+
+    Returns:
+        The components, or None when the picture shows no dark sky.
+    """
+    tone = brightness(image)
+    threshold = sky_threshold(tone)
+    if threshold is None:
+        return None
+    smooth = cv2.blur(tone, (SMOOTH, SMOOTH))
+    bright = np.asarray(smooth > threshold)
+    return _labelled(bright, least)
+
+
+def brightness(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The brightest channel of each pixel, (H, W) uint8: a blue panel is dark in grey."""
+    if image.ndim == 2 or image.shape[2] == 1:
+        return image.reshape(image.shape[:2])
+    blue, green, red = cv2.split(image)
+    return np.asarray(cv2.max(cv2.max(blue, green), red), np.uint8)
+
+
+def sky_threshold(tone: NDArray[np.uint8]) -> float | None:
+    """The level above which a pixel is not dark sky; None when there is no dark sky.
+
+    Args:
+        tone: (H, W) uint8, from `brightness`.
+    """
+    some = tone[::EVERY, ::EVERY]
+    dark = some[some < DARKEST].astype(np.float32)
+    if dark.size < LEAST_SKY * some.size:
+        return None
+    level = float(np.median(dark))
+    noise = 1.4826 * float(np.median(np.abs(dark - level)))
+    if noise > MOST_NOISE:
+        return None
+    return level + max(BRIGHTER, SIGMAS * noise / SMOOTH)
+
+
+def _labelled(bright: Mask, least: float) -> Components:
+    height, width = bright.shape
+    gap = 2 * (round(JOINED * float(np.hypot(height, width))) // 2) + 1
+    closed = cv2.morphologyEx(bright.view(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
+    count, labels = cv2.connectedComponents(closed, connectivity=4, ltype=cv2.CV_32S)
+    areas = np.bincount(labels[bright], minlength=count)
+    areas[0] = 0
+    good = (areas >= least) & (areas <= BIGGEST * bright.size)
+    number = np.where(good, np.cumsum(good), 0).astype(np.int32)
+    labels = np.asarray(number[labels])
+    edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    areas = np.concatenate([[0], areas[good]])
+    cut = np.isin(np.arange(len(areas)), edge)
+    cut[0] = False
+    return Components(bright, labels, areas, cut)
