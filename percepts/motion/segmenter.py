@@ -193,7 +193,9 @@ class MotionSegmenter:
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
         regions = self._shadows.step(frame, scene, regions, static=self._static.active)
-        regions = self._sky.step(frame, regions, self._ground_shift(scene), self._least(scene), self._ids)
+        regions = self._sky.step(
+            frame, regions, self._ground_shift(scene), self._least(scene), self._ids
+        )
         return select_regions(regions, directives)
 
     def _ground_shift(self, scene: FrameMeasurements) -> tuple[float, float]:

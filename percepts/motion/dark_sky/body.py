@@ -13,10 +13,13 @@ from visup.percepts.motion.dark_sky.sky import Mask
 
 PATH_S = 3.0  # how long a path is kept, seconds
 SPEED_S = 0.5  # time over which a speed is measured, seconds
-DRIFT = 0.002  # way, as a share of the image diagonal, from which a body has moved by itself
+DRIFT = 0.0006  # way, as a share of the image diagonal, from which a body has moved by itself
+STEADY = 4.0  # the same, in root mean squares of its deviations from a steady course
+LEAST_S = 0.5  # time over which a drift is measured at least, seconds
 
 Point = tuple[float, float]
 Corner = tuple[int, int]
+Path = tuple[tuple[float, float, float, float, float], ...]
 Slices = tuple[slice, slice]
 
 
@@ -27,10 +30,12 @@ class Look:
     Attributes:
         mask: (h, w) bool, cropped to its box.
         tone: (h, w) uint8 brightness in the box.
+        corner: (x, y) of the box then, frame pixels.
     """
 
     mask: Mask
     tone: NDArray[np.uint8]
+    corner: Corner
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +51,7 @@ class SkyBody:
         alone: Whether it was a component of its own in that frame.
         cut: Whether it touched the border of the image when it was last alone.
         path: (time, x, y, ground x, ground y) of its centre since it has been alone, or not: frame pixels.
+        velocity: (vx, vy) in the image, frame pixels per second.
         id: Public id of its region; 0 while it has none.
     """
 
@@ -56,7 +62,8 @@ class SkyBody:
     seen: float
     alone: bool
     cut: bool
-    path: tuple[tuple[float, float, float, float, float], ...] = ()
+    path: Path = ()
+    velocity: Point = (0.0, 0.0)
     id: int = 0
 
     @property
@@ -65,13 +72,9 @@ class SkyBody:
         return int(np.count_nonzero(self.look.mask))
 
     @property
-    def velocity(self) -> Point:
-        """(vx, vy) in the image, frame pixels per second."""
-        recent = [p for p in self.path if self.path[-1][0] - p[0] <= SPEED_S]
-        if len(recent) < 2:
-            return 0.0, 0.0
-        (t0, x0, y0, *_), (t1, x1, y1, *_) = recent[0], recent[-1]
-        return (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
+    def span(self) -> float:
+        """How long it has been alone, or not, seconds; `PATH_S` at most."""
+        return self.path[-1][0] - self.path[0][0]
 
     def expected(self, now: float) -> Corner:
         """The corner of its box at a time soon after it was seen."""
@@ -79,11 +82,15 @@ class SkyBody:
         return round(self.corner[0] + vx * ahead), round(self.corner[1] + vy * ahead)
 
     def drifted(self, diagonal: float) -> bool:
-        """Whether it has moved against the ground while it was alone, beyond what outlines wobble."""
-        if self.cut or not self.alone or len(self.path) < 2:
+        """Whether it has moved steadily against the ground while it was alone, beyond its wobble."""
+        way = np.asarray(self.path)
+        if self.cut or not self.alone or way[-1, 0] - way[0, 0] < LEAST_S:
             return False
-        (_, x0, y0, gx0, gy0), (_, x1, y1, gx1, gy1) = self.path[0], self.path[-1]
-        return float(np.hypot(x1 - x0 - gx1 + gx0, y1 - y0 - gy1 + gy0)) > DRIFT * diagonal
+        times = np.stack([np.ones(len(way)), (way[:, 0] - way[0, 0]) / np.ptp(way[:, 0])], axis=1)
+        places = way[:, 1:3] - way[:, 3:5]
+        course = np.linalg.lstsq(times, places, rcond=None)[0]
+        wobble = float(np.sqrt(np.mean(np.sum((places - times @ course) ** 2, axis=1))))
+        return float(np.hypot(*course[1])) > max(DRIFT * diagonal, STEADY * wobble)
 
     def moved_to(self, now: float, centre: Point, ground: Point, *, alone: bool) -> SkyBody:
         """The body with its path continued; the path begins anew when it meets or leaves others.
@@ -96,7 +103,15 @@ class SkyBody:
         """
         kept = [p for p in self.path if now - p[0] <= PATH_S] if alone == self.alone else []
         path = (*kept, (now, *centre, *ground))
-        return replace(self, path=path, alone=alone, seen=now)
+        velocity = self.velocity if now - path[0][0] < LEAST_S / 2 else _speed(path)
+        return replace(self, path=path, velocity=velocity, alone=alone, seen=now)
+
+
+def _speed(path: Path) -> Point:
+    """Mean velocity in the image over the last part of a path, pixels per second."""
+    recent = [p for p in path if path[-1][0] - p[0] <= SPEED_S]
+    (t0, x0, y0, *_), (t1, x1, y1, *_) = recent[0], recent[-1]
+    return (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
 
 
 def centre_of(mask: Mask, corner: Corner = (0, 0)) -> Point:
@@ -105,8 +120,8 @@ def centre_of(mask: Mask, corner: Corner = (0, 0)) -> Point:
     return sums["m10"] / sums["m00"] + corner[0], sums["m01"] / sums["m00"] + corner[1]
 
 
-def look_at(mask: Mask, tone: NDArray[np.uint8]) -> tuple[Look, Corner]:
-    """How a body looks, and the corner of its box.
+def look_at(mask: Mask, tone: NDArray[np.uint8]) -> Look:
+    """How a body looks.
 
     Args:
         mask: (H, W) bool, not empty.
@@ -114,7 +129,27 @@ def look_at(mask: Mask, tone: NDArray[np.uint8]) -> tuple[Look, Corner]:
     """
     x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
-    return Look(mask[part].copy(), tone[part].copy()), (x, y)
+    return Look(mask[part].copy(), tone[part].copy(), (x, y))
+
+
+def renewed(
+    look: Look, corner: Corner, visible: Mask, tone: NDArray[np.uint8], bright: Mask
+) -> Look:
+    """How a body looks when a part of it may be hidden: there as it looked before.
+
+    Args:
+        look: How it looked before.
+        corner: (x, y) of its box now.
+        visible: (H, W) bool: its pixels that are not hidden.
+        tone: (H, W) uint8.
+        bright: (H, W) bool: where there is something.
+    """
+    shape = (tone.shape[0], tone.shape[1])
+    inside, part = overlap(look, corner, shape)
+    known = np.where(visible[inside], tone[inside], look.tone[part])
+    both = tone.copy()
+    both[inside] = known
+    return look_at((pasted(look, corner, shape) & bright) | visible, both)
 
 
 def pasted(look: Look, corner: Corner, shape: tuple[int, int]) -> Mask:

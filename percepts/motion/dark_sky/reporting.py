@@ -7,17 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from visup.agent import Region
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.dark_sky.body import SkyBody
 from visup.percepts.motion.dark_sky.sky import Mask
 from visup.percepts.motion.dark_sky.tracking import Bodies
-from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 OVER = 0.5  # share of a region's bright pixels that are a body's, from which it is this body
 BRIGHT = 0.3  # share of a region that must be brighter than the sky
 COVERED = 0.6  # share of a body cut by the border that regions must cover: else it is a ground
-SIGMA = 1.0  # standard deviation of the velocity of a body without a moving region, pixels per second
+SIGMA = (
+    1.0  # standard deviation of the velocity of a body without a moving region, pixels per second
+)
 CONFIDENCE = 0.9  # confidence in the same
 
 Regions = tuple[Region, ...]

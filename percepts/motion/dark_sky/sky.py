@@ -18,10 +18,13 @@ DARKEST = 40  # levels below which a pixel may be sky
 LEAST_SKY = 0.15  # share of the picture that must be sky
 MOST_NOISE = 4.0  # standard deviation of its tones, levels: a dark room has more
 EVERY = 4  # pixels: every so many are looked at for the sky's tone
-BRIGHTER = 9.0  # levels above the sky from which a pixel is a body: compression leaves halos of less
+BRIGHTER = (
+    9.0  # levels above the sky from which a pixel is a body: compression leaves halos of less
+)
 SIGMAS = 5.0  # the same, in standard deviations of the sky
 SMOOTH = 3  # pixels: side of the window over which tones are averaged
 JOINED = 0.012  # gaps of up to this share of the image diagonal do not part a body
+SPECK = 0.2  # share of the least area up to which a connected bright spot is a star
 BIGGEST = 0.5  # share of the picture: a larger component is a ground
 
 
@@ -87,6 +90,7 @@ def sky_threshold(tone: NDArray[np.uint8]) -> float | None:
 
 
 def _labelled(bright: Mask, least: float) -> Components:
+    bright = _without_specks(bright, SPECK * least)
     height, width = bright.shape
     gap = 2 * (round(JOINED * float(np.hypot(height, width))) // 2) + 1
     closed = cv2.morphologyEx(bright.view(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
@@ -101,3 +105,13 @@ def _labelled(bright: Mask, least: float) -> Components:
     cut = np.isin(np.arange(len(areas)), edge)
     cut[0] = False
     return Components(bright, labels, areas, cut)
+
+
+def _without_specks(bright: Mask, most: float) -> Mask:
+    """Without connected spots of up to `most` pixels."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        bright.view(np.uint8), connectivity=8, ltype=cv2.CV_32S
+    )
+    keep = stats[:, cv2.CC_STAT_AREA] > most
+    keep[0] = False
+    return np.asarray(keep[labels]) if count > 1 else bright
