@@ -16,9 +16,11 @@ SPEED_S = 0.5  # time over which a speed is measured, seconds
 DRIFT = 0.0006  # way, as a share of the image diagonal, from which a body has moved by itself
 STEADY = 4.0  # the same, in root mean squares of its deviations from a steady course
 LEAST_S = 0.5  # time over which a drift is measured at least, seconds
+SETTLED_S = 1.0  # time alone from which a body is no part of what it touches later, seconds
 
 Point = tuple[float, float]
 Corner = tuple[int, int]
+Sides = tuple[bool, bool, bool, bool]
 Path = tuple[tuple[float, float, float, float, float], ...]
 Slices = tuple[slice, slice]
 
@@ -49,9 +51,12 @@ class SkyBody:
         visible: (H, W) bool: its pixels in the last frame in which it was seen.
         seen: Time of that frame, seconds.
         alone: Whether it was a component of its own in that frame.
-        cut: Whether it touched the border of the image when it was last alone.
-        path: (time, x, y, ground x, ground y) of its centre since it has been alone, or not: frame pixels.
+        sides: Whether its look touches the left, upper, right and lower border of the image.
+        path: (time, x, y, ground x, ground y) of its anchor, frame pixels, since it has been alone, or not,
+            and cut at these sides.
         velocity: (vx, vy) in the image, frame pixels per second.
+        covers: Keys of bodies that were last seen behind it.
+        settled: Whether it has been alone for long enough not to be a part of something else.
         id: Public id of its region; 0 while it has none.
     """
 
@@ -61,20 +66,22 @@ class SkyBody:
     visible: Mask
     seen: float
     alone: bool
-    cut: bool
+    sides: Sides
     path: Path = ()
     velocity: Point = (0.0, 0.0)
+    covers: frozenset[int] = frozenset()
+    settled: bool = False
     id: int = 0
+
+    @property
+    def cut(self) -> bool:
+        """Whether the border of the image cuts it."""
+        return any(self.sides)
 
     @property
     def area(self) -> int:
         """Pixels of its look."""
         return int(np.count_nonzero(self.look.mask))
-
-    @property
-    def span(self) -> float:
-        """How long it has been alone, or not, seconds; `PATH_S` at most."""
-        return self.path[-1][0] - self.path[0][0]
 
     def expected(self, now: float) -> Corner:
         """The corner of its box at a time soon after it was seen."""
@@ -92,32 +99,59 @@ class SkyBody:
         wobble = float(np.sqrt(np.mean(np.sum((places - times @ course) ** 2, axis=1))))
         return float(np.hypot(*course[1])) > max(DRIFT * diagonal, STEADY * wobble)
 
-    def moved_to(self, now: float, centre: Point, ground: Point, *, alone: bool) -> SkyBody:
-        """The body with its path continued; the path begins anew when it meets or leaves others.
+    def looking(self, look: Look, ground: Point, now: float, *, alone: bool) -> SkyBody:
+        """The body in the next frame, when it looks like this.
 
         Args:
-            now: Time of the frame, seconds.
-            centre: (x, y) of its centre.
+            look: How it looks, and where.
             ground: (x, y) way of the ground since the first frame.
-            alone: Whether it is a component of its own in this frame.
+            now: Time of the frame, seconds.
+            alone: Whether it is a component of its own.
         """
-        kept = [p for p in self.path if now - p[0] <= PATH_S] if alone == self.alone else []
-        path = (*kept, (now, *centre, *ground))
-        velocity = self.velocity if now - path[0][0] < LEAST_S / 2 else _speed(path)
-        return replace(self, path=path, velocity=velocity, alone=alone, seen=now)
+        sides = sides_of(look, self.visible.shape)
+        same = (alone, sides) == (self.alone, self.sides)
+        body = replace(self, look=look, corner=look.corner, alone=alone, sides=sides, seen=now)
+        return body.moved_to(look.corner, ground, now, follows=same)
+
+    def moved_to(self, corner: Corner, ground: Point, now: float, *, follows: bool) -> SkyBody:
+        """The body with its path continued, or begun anew.
+
+        Args:
+            corner: (x, y) of the box of its look.
+            ground: (x, y) way of the ground since the first frame.
+            now: Time of the frame, seconds.
+            follows: Whether its path is continued.
+        """
+        kept = [p for p in self.path if now - p[0] <= PATH_S] if follows else []
+        path = (*kept, (now, *_anchor(self.look, corner, self.sides), *ground))
+        lasts = now - path[0][0]
+        velocity = self.velocity if lasts < LEAST_S / 2 else _speed(path) or self.velocity
+        settled = self.settled or (self.alone and lasts >= SETTLED_S)
+        return replace(self, corner=corner, path=path, velocity=velocity, settled=settled, seen=now)
 
 
-def _speed(path: Path) -> Point:
-    """Mean velocity in the image over the last part of a path, pixels per second."""
+def sides_of(look: Look, shape: tuple[int, ...]) -> Sides:
+    """Whether a look touches the left, upper, right and lower border of the image."""
+    (x, y), (h, w) = look.corner, look.mask.shape
+    return x <= 0, y <= 0, x + w >= shape[1], y + h >= shape[0]
+
+
+def _anchor(look: Look, corner: Corner, sides: Sides) -> Point:
+    """A point that moves as the body does: its centre, or its ends in view while the border cuts it."""
+    sums = cv2.moments(look.mask.view(np.uint8), binaryImage=True)
+    (h, w), (left, top, right, bottom) = look.mask.shape, sides
+    x = sums["m10"] / sums["m00"] if left == right else w if left else 0
+    y = sums["m01"] / sums["m00"] if top == bottom else h if top else 0
+    return corner[0] + float(x), corner[1] + float(y)
+
+
+def _speed(path: Path) -> Point | None:
+    """Mean velocity in the image over the last part of a path, pixels per second; None after a gap."""
     recent = [p for p in path if path[-1][0] - p[0] <= SPEED_S]
+    if len(recent) < 2:
+        return None
     (t0, x0, y0, *_), (t1, x1, y1, *_) = recent[0], recent[-1]
     return (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
-
-
-def centre_of(mask: Mask, corner: Corner = (0, 0)) -> Point:
-    """The centre of a mask that is not empty, frame pixels."""
-    sums = cv2.moments(mask.view(np.uint8), binaryImage=True)
-    return sums["m10"] / sums["m00"] + corner[0], sums["m01"] / sums["m00"] + corner[1]
 
 
 def look_at(mask: Mask, tone: NDArray[np.uint8]) -> Look:

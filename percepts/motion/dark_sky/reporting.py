@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from visup.agent import Region
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.dark_sky.body import SkyBody
-from visup.percepts.motion.dark_sky.sky import Mask
+from visup.percepts.motion.dark_sky.sky import Mask, joining_gap, square
 from visup.percepts.motion.dark_sky.tracking import Bodies
-from visup.percepts.motion.outlines.region_outline import describe_mask
+from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 OVER = 0.5  # share of a region's bright pixels that are a body's, from which it is this body
@@ -102,8 +103,22 @@ def regions_of(
 
 def _region(body: SkyBody, members: Sequence[Region]) -> Region:
     height, width = body.visible.shape
-    outline = describe_mask(body.visible, (0, 0), (width, height))
+    outline = describe_mask(_whole(body.visible), (0, 0), (width, height))
     if not members:
         return outline.region(body.id, body.velocity, SIGMA, CONFIDENCE)
     main = max(members, key=lambda r: r.area)
     return replace(outline.applied_to(main), id=body.id)
+
+
+def _whole(mask: Mask) -> Mask:
+    """A mask without small holes, and without the narrow gaps between its parts if it has several."""
+    clean = clean_mask(mask, 1)
+    if clean is None:
+        return mask
+    if cv2.connectedComponents(clean.view(np.uint8), connectivity=4)[0] <= 2:
+        return clean
+    joined = cv2.morphologyEx(
+        clean.view(np.uint8), cv2.MORPH_CLOSE, square(joining_gap(mask.shape))
+    )
+    found = clean_mask(np.asarray(joined, np.uint8).view(bool), 1)
+    return clean if found is None else found

@@ -7,6 +7,7 @@ whether it moves or not, and its outline is where the tone changes. What is as d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -34,28 +35,27 @@ class Components:
 
     Attributes:
         bright: (H, W) bool: pixels brighter than the sky.
-        labels: (H, W) int32: component of each pixel; 0 for the sky and for what is too small or large.
+        labels: (H, W) int: component of each pixel; 0 for the sky and for what is too small or large.
         areas: (N + 1,) bright pixels of each; 0 first.
         cut: (N + 1,) bool: whether it touches the border of the image.
     """
 
     bright: Mask
-    labels: NDArray[np.int32]
+    labels: NDArray[Any]
     areas: NDArray[np.int64]
     cut: Mask
 
 
-def bright_components(image: NDArray[np.uint8], least: float) -> Components | None:
+def bright_components(tone: NDArray[np.uint8], least: float) -> Components | None:
     """The components of a picture that are brighter than a dark sky.
 
     Args:
-        image: (H, W), (H, W, 1) or (H, W, 3) uint8.
+        tone: (H, W) uint8, from `brightness`.
         least: Least area, pixels.
 
     Returns:
         The components, or None when the picture shows no dark sky.
     """
-    tone = brightness(image)
     threshold = sky_threshold(tone)
     if threshold is None:
         return None
@@ -89,22 +89,35 @@ def sky_threshold(tone: NDArray[np.uint8]) -> float | None:
     return level + max(BRIGHTER, SIGMAS * noise / SMOOTH)
 
 
+def joining_gap(shape: tuple[int, ...]) -> int:
+    """Width of the gaps that do not part a body, pixels; odd.
+
+    Args:
+        shape: (height, width) of the image.
+    """
+    return 2 * (round(JOINED * float(np.hypot(shape[0], shape[1]))) // 2) + 1
+
+
+def square(side: int) -> NDArray[np.uint8]:
+    """A square structuring element."""
+    return np.ones((side, side), np.uint8)
+
+
 def _labelled(bright: Mask, least: float) -> Components:
     bright = _without_specks(bright, SPECK * least)
-    height, width = bright.shape
-    gap = 2 * (round(JOINED * float(np.hypot(height, width))) // 2) + 1
-    closed = cv2.morphologyEx(bright.view(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
+    kernel = square(joining_gap(bright.shape))
+    closed = cv2.morphologyEx(bright.view(np.uint8), cv2.MORPH_CLOSE, kernel)
     count, labels = cv2.connectedComponents(closed, connectivity=4, ltype=cv2.CV_32S)
     areas = np.bincount(labels[bright], minlength=count)
     areas[0] = 0
     good = (areas >= least) & (areas <= BIGGEST * bright.size)
     number = np.where(good, np.cumsum(good), 0).astype(np.int32)
-    labels = np.asarray(number[labels])
-    edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    areas = np.concatenate([[0], areas[good]])
-    cut = np.isin(np.arange(len(areas)), edge)
+    labels = np.asarray(number[labels], np.int32)
+    kept = np.concatenate([[0], areas[good]]).astype(np.int64)
+    cut = np.zeros(len(kept), bool)
+    cut[np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])] = True
     cut[0] = False
-    return Components(bright, labels, areas, cut)
+    return Components(bright, labels, kept, cut)
 
 
 def _without_specks(bright: Mask, most: float) -> Mask:

@@ -44,11 +44,12 @@ class DarkSkySegmenter:
             The regions, by id.
         """
         self._ground = self._ground[0] - shift[0], self._ground[1] - shift[1]
-        found = bright_components(frame.image, least)
+        tone = brightness(frame.image)
+        found = bright_components(tone, least)
         if found is None:
             self._bodies = ()
             return regions
-        here = SkyFrame(brightness(frame.image), found, frame.time, self._ground)
+        here = SkyFrame(tone, found, frame.time, self._ground)
         bodies = follow(self._bodies, here)
         members = members_of(bodies, regions, found.bright, frame.time)
         diagonal = float(np.hypot(*frame.size))

@@ -11,26 +11,23 @@ from numpy.typing import NDArray
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.dark_sky.body import (
     Corner,
-    Look,
     Point,
     SkyBody,
-    centre_of,
     look_at,
     overlap,
     renewed,
+    sides_of,
 )
 from visup.percepts.motion.dark_sky.sky import Components, Mask
-from visup.percepts.motion.dark_sky.splitting import placed, split
+from visup.percepts.motion.dark_sky.splitting import Share, placed, split
 
 SHARED = 0.25  # share of the smaller of a body and a component from which they belong together
 GROWS = 1.5  # growth of an area from one frame to the next from which something else has joined
-VISIBLE = (
-    0.5  # share of its look that must be visible for a body to be looked at anew beside others
-)
+VISIBLE = 0.5  # share of its look that must be visible for it to be looked at anew beside others
 MOVED = 3  # pixels, along either axis, from which it is
 LARGER = 1.03  # the same, as a growth of its area
-SETTLED_S = 1.0  # how long a body must have been alone not to be a part of what it touches, seconds
 FORGOTTEN_S = 0.5  # how long a body that is not seen is looked for, seconds
+HIDDEN_S = 10.0  # the same while it may be hidden by another one
 
 Bodies = tuple[SkyBody, ...]
 
@@ -60,12 +57,13 @@ def follow(bodies: Bodies, frame: SkyFrame) -> Bodies:
         frame: The frame.
     """
     within = [_component(b, frame) for b in bodies]
-    out = [b for b, c in zip(bodies, within, strict=True) if not c]
+    now = frame.now
+    out = [b for b, c in zip(bodies, within, strict=True) if not c and now - b.seen <= FORGOTTEN_S]
     for component in sorted({*within} - {0}):
         out += _followed(
             [b for b, c in zip(bodies, within, strict=True) if c == component], component, frame
         )
-    out = [b for b in out if frame.now - b.seen <= FORGOTTEN_S]
+    out = [b for b in out if now - b.seen <= HIDDEN_S]
     first = max((b.key for b in bodies), default=0) + 1
     new = [c for c in range(1, len(frame.found.areas)) if c not in within]
     return (*sorted(out, key=_key), *(_new(first + i, c, frame) for i, c in enumerate(new)))
@@ -98,42 +96,37 @@ def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Ite
     union = frame.found.bright & (frame.found.labels == component)
     grows = frame.found.areas[component] > GROWS * one.area and not (one.cut and cut)
     if len(bodies) == 1 and not grows:
-        yield _alone(one, union, cut, frame)
+        yield _alone(one, union, frame)
         return
     places = [placed(frame.tone, b, frame.now) for b in bodies]
-    masks = split(frame.tone, union, bodies, [at for at, _ in places])
-    for body, (corner, fits) in zip(bodies, places, strict=True):
-        mask = masks[body.key]
-        yield _touching(body, corner, mask, frame, fits=fits) if mask.any() else body
+    shares = split(frame.tone, union, bodies, [at for at, _ in places])
+    for body, (corner, fits), share in zip(bodies, places, shares, strict=True):
+        yield _touching(body, corner, share, frame, fits=fits)
 
 
 def _settled(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
     """The bodies without those that were alone too shortly, which are parts of the others."""
-    return [b for b in bodies if b.id or b.cut or b.span >= SETTLED_S] or bodies[:1]
+    return [b for b in bodies if b.id or b.cut or b.settled] or bodies[:1]
 
 
-def _alone(body: SkyBody, mask: Mask, cut: bool, frame: SkyFrame) -> SkyBody:
+def _alone(body: SkyBody, mask: Mask, frame: SkyFrame) -> SkyBody:
     """A body that is a component of its own: it looks as it looks now."""
-    look = look_at(mask, frame.tone)
-    moved = body.moved_to(frame.now, centre_of(mask), frame.ground, alone=True)
-    return replace(moved, look=look, corner=look.corner, visible=mask, cut=cut)
+    known = replace(body, visible=mask)
+    return known.looking(look_at(mask, frame.tone), frame.ground, frame.now, alone=True)
 
 
-def _touching(body: SkyBody, corner: Corner, mask: Mask, frame: SkyFrame, *, fits: bool) -> SkyBody:
-    """A body that touches others.
-
-    What the border cuts looks as it looks now; another one as well, but where it is hidden as it did before.
-    """
-    centre = centre_of(body.look.mask, corner)
-    moved = body.moved_to(frame.now, centre, frame.ground, alone=False)
-    if body.cut:
-        look = look_at(mask, frame.tone)
-        cut = _at_border(look, mask.shape)
-        return replace(moved, look=look, corner=look.corner, visible=mask, cut=cut)
-    if fits and _changed(body, corner, np.count_nonzero(mask)):
-        look = renewed(body.look, corner, mask, frame.tone, frame.found.bright)
-        return replace(moved, look=look, corner=look.corner, visible=mask)
-    return replace(moved, corner=corner, visible=mask)
+def _touching(
+    body: SkyBody, corner: Corner, share: Share, frame: SkyFrame, *, fits: bool
+) -> SkyBody:
+    """A body that touches others: it looks as it looks now, and where it is hidden as it did before."""
+    if not share.mask.any():
+        return body
+    known = replace(body, visible=share.mask, covers=share.covers)
+    if body.cut or (fits and _changed(body, corner, int(np.count_nonzero(share.mask)))):
+        look = renewed(body.look, corner, share.mask, frame.tone, frame.found.bright)
+        return known.looking(look, frame.ground, frame.now, alone=False)
+    moved = replace(known, alone=False)
+    return moved.moved_to(corner, frame.ground, frame.now, follows=not body.alone)
 
 
 def _changed(body: SkyBody, corner: Corner, visible: int) -> bool:
@@ -143,15 +136,10 @@ def _changed(body: SkyBody, corner: Corner, visible: int) -> bool:
     return seen > LARGER or (seen > VISIBLE and way >= MOVED)
 
 
-def _at_border(look: Look, shape: tuple[int, ...]) -> bool:
-    (x, y), (h, w) = look.corner, look.mask.shape
-    return x == 0 or y == 0 or x + w == shape[1] or y + h == shape[0]
-
-
 def _new(key: int, component: int, frame: SkyFrame) -> SkyBody:
     """A body that was not known."""
     mask = frame.found.bright & (frame.found.labels == component)
     look = look_at(mask, frame.tone)
-    cut = bool(frame.found.cut[component])
-    body = SkyBody(key, look, look.corner, mask, frame.now, alone=True, cut=cut)
-    return body.moved_to(frame.now, centre_of(mask), frame.ground, alone=True)
+    sides = sides_of(look, mask.shape)
+    body = SkyBody(key, look, look.corner, mask, frame.now, alone=True, sides=sides)
+    return body.moved_to(look.corner, frame.ground, frame.now, follows=False)
