@@ -56,6 +56,7 @@ class SkyBody:
             and cut at these sides.
         velocity: (vx, vy) in the image, frame pixels per second.
         covers: Keys of bodies that were last seen behind it.
+        whole: Whether it has ever been alone and not cut by the border.
         settled: Whether it has been alone for long enough not to be a part of something else.
         id: Public id of its region; 0 while it has none.
     """
@@ -70,6 +71,7 @@ class SkyBody:
     path: Path = ()
     velocity: Point = (0.0, 0.0)
     covers: frozenset[int] = frozenset()
+    whole: bool = False
     settled: bool = False
     id: int = 0
 
@@ -127,7 +129,8 @@ class SkyBody:
         lasts = now - path[0][0]
         velocity = self.velocity if lasts < LEAST_S / 2 else _speed(path) or self.velocity
         settled = self.settled or (self.alone and lasts >= SETTLED_S)
-        return replace(self, corner=corner, path=path, velocity=velocity, settled=settled, seen=now)
+        known = replace(self, corner=corner, path=path, velocity=velocity, seen=now)
+        return replace(known, settled=settled, whole=self.whole or (self.alone and not self.cut))
 
 
 def sides_of(look: Look, shape: tuple[int, ...]) -> Sides:

@@ -24,6 +24,8 @@ BRIGHTER = (
 )
 SIGMAS = 5.0  # the same, in standard deviations of the sky
 SMOOTH = 3  # pixels: side of the window over which tones are averaged
+HALO = 0.7  # share of the brightest neighbour's level that a pixel of an outline must have
+ROUNDS = 2  # pixels by which such halos are trimmed at most
 JOINED = 0.012  # gaps of up to this share of the image diagonal do not part a body
 SPECK = 0.2  # share of the least area up to which a connected bright spot is a star
 BIGGEST = 0.5  # share of the picture: a larger component is a ground
@@ -56,11 +58,14 @@ def bright_components(tone: NDArray[np.uint8], least: float) -> Components | Non
     Returns:
         The components, or None when the picture shows no dark sky.
     """
-    threshold = sky_threshold(tone)
-    if threshold is None:
+    sky = sky_tone(tone)
+    if sky is None:
         return None
+    level, noise = sky
     smooth = cv2.blur(tone, (SMOOTH, SMOOTH))
-    bright = np.asarray(smooth > threshold)
+    bright = np.asarray(smooth > level + max(BRIGHTER, SIGMAS * noise / SMOOTH))
+    for _ in range(ROUNDS):
+        bright = _trimmed(bright, tone, level)
     return _labelled(bright, least)
 
 
@@ -72,8 +77,8 @@ def brightness(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.max(cv2.max(blue, green), red), np.uint8)
 
 
-def sky_threshold(tone: NDArray[np.uint8]) -> float | None:
-    """The level above which a pixel is not dark sky; None when there is no dark sky.
+def sky_tone(tone: NDArray[np.uint8]) -> tuple[float, float] | None:
+    """The level of a dark sky and the standard deviation of its noise; None when there is no dark sky.
 
     Args:
         tone: (H, W) uint8, from `brightness`.
@@ -84,9 +89,7 @@ def sky_threshold(tone: NDArray[np.uint8]) -> float | None:
         return None
     level = float(np.median(dark))
     noise = 1.4826 * float(np.median(np.abs(dark - level)))
-    if noise > MOST_NOISE:
-        return None
-    return level + max(BRIGHTER, SIGMAS * noise / SMOOTH)
+    return (level, noise) if noise <= MOST_NOISE else None
 
 
 def joining_gap(shape: tuple[int, ...]) -> int:
@@ -101,6 +104,16 @@ def joining_gap(shape: tuple[int, ...]) -> int:
 def square(side: int) -> NDArray[np.uint8]:
     """A square structuring element."""
     return np.ones((side, side), np.uint8)
+
+
+def _trimmed(bright: Mask, tone: NDArray[np.uint8], level: float) -> Mask:
+    """Bright pixels without those beside the sky that only catch the light of a brighter neighbour.
+
+    Lenses and compression blur edges; of what is left the outline lies where the body ends.
+    """
+    inner = cv2.erode(bright.view(np.uint8), square(3)).view(bool)
+    lit = cv2.dilate(tone, square(3)).astype(np.float32)
+    return np.asarray(bright & (inner | (tone - level > HALO * (lit - level))))
 
 
 def _labelled(bright: Mask, least: float) -> Components:

@@ -24,8 +24,12 @@ from visup.percepts.motion.dark_sky.splitting import Share, placed, split
 SHARED = 0.25  # share of the smaller of a body and a component from which they belong together
 GROWS = 1.5  # growth of an area from one frame to the next from which something else has joined
 VISIBLE = 0.5  # share of its look that must be visible for it to be looked at anew beside others
+LEAST_SEEN = 0.05  # share of its look that must be visible for a body not to be hidden
 MOVED = 3  # pixels, along either axis, from which it is
 LARGER = 1.03  # the same, as a growth of its area
+PART = 0.5  # area, as a share of that of a body, up to which what has just come off may be a part of it
+SAME_WAY = 0.5  # difference of velocities, as a share of the greater, up to which two move alike
+SLOWEST = 5.0  # pixels per second from which a body clearly comes in
 FORGOTTEN_S = 0.5  # how long a body that is not seen is looked for, seconds
 HIDDEN_S = 10.0  # the same while it may be hidden by another one
 
@@ -91,11 +95,12 @@ def _component(body: SkyBody, frame: SkyFrame) -> int:
 
 def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Iterator[SkyBody]:
     """Bodies that share a component, in this frame."""
-    bodies = _settled(bodies)
+    joined = _one_of_parts(_settled(bodies))
+    merged, bodies = len(joined) < len(bodies), joined
     one, cut = bodies[0], bool(frame.found.cut[component])
     union = frame.found.bright & (frame.found.labels == component)
     grows = frame.found.areas[component] > GROWS * one.area and not (one.cut and cut)
-    if len(bodies) == 1 and not grows:
+    if len(bodies) == 1 and (merged or not grows):
         yield _alone(one, union, frame)
         return
     places = [placed(frame.tone, b, frame.now) for b in bodies]
@@ -105,8 +110,26 @@ def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Ite
 
 
 def _settled(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
-    """The bodies without those that were alone too shortly, which are parts of the others."""
-    return [b for b in bodies if b.id or b.cut or b.settled] or bodies[:1]
+    """The bodies without small ones that were alone too shortly, which are parts of the others."""
+    least = PART * max(b.area for b in bodies)
+    return [b for b in bodies if b.id or b.cut or b.settled or b.area > least]
+
+
+def _one_of_parts(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
+    """The bodies without parts of one that has come in: none was ever seen whole, and they move alike."""
+    kept: list[SkyBody] = []
+    for body in sorted(bodies, key=lambda b: (not b.id, -b.area, b.key)):
+        if not any(_parts_of_one(body, k) for k in kept):
+            kept.append(body)
+    return sorted(kept, key=_key)
+
+
+def _parts_of_one(a: SkyBody, b: SkyBody) -> bool:
+    if a.whole or b.whole:
+        return False
+    fast = max(float(np.hypot(*v)) for v in (a.velocity, b.velocity))
+    apart = float(np.hypot(a.velocity[0] - b.velocity[0], a.velocity[1] - b.velocity[1]))
+    return fast > SLOWEST and apart < SAME_WAY * fast
 
 
 def _alone(body: SkyBody, mask: Mask, frame: SkyFrame) -> SkyBody:
@@ -119,7 +142,7 @@ def _touching(
     body: SkyBody, corner: Corner, share: Share, frame: SkyFrame, *, fits: bool
 ) -> SkyBody:
     """A body that touches others: it looks as it looks now, and where it is hidden as it did before."""
-    if not share.mask.any():
+    if np.count_nonzero(share.mask) < LEAST_SEEN * body.area:
         return body
     known = replace(body, visible=share.mask, covers=share.covers)
     if body.cut or (fits and _changed(body, corner, int(np.count_nonzero(share.mask)))):
