@@ -52,6 +52,7 @@ class SkyBody:
         seen: Time of that frame, seconds.
         alone: Whether it was a component of its own in that frame.
         sides: Whether its look touches the left, upper, right and lower border of the image.
+        born: Time when it came into view, seconds; minus infinity if it was there from the first frame on.
         path: (time, x, y, ground x, ground y) of its anchor, frame pixels, since it has been alone, or not,
             and cut at these sides.
         velocity: (vx, vy) in the image, frame pixels per second.
@@ -68,6 +69,7 @@ class SkyBody:
     seen: float
     alone: bool
     sides: Sides
+    born: float
     path: Path = ()
     velocity: Point = (0.0, 0.0)
     covers: frozenset[int] = frozenset()

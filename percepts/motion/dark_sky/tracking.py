@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ LEAST_SEEN = 0.05  # share of its look that must be visible for a body not to be
 MOVED = 3  # pixels, along either axis, from which it is
 LARGER = 1.03  # the same, as a growth of its area
 PART = 0.5  # area, as a share of that of a body, up to which what has just come off may be a part of it
+COMING_S = 2.0  # age of a body up to which it has just come into view, seconds
 SAME_WAY = 0.5  # difference of velocities, as a share of the greater, up to which two move alike
 SLOWEST = 5.0  # pixels per second from which a body clearly comes in
 FORGOTTEN_S = 0.5  # how long a body that is not seen is looked for, seconds
@@ -69,8 +71,9 @@ def follow(bodies: Bodies, frame: SkyFrame) -> Bodies:
         )
     out = [b for b in out if now - b.seen <= HIDDEN_S]
     first = max((b.key for b in bodies), default=0) + 1
+    born = now if bodies else -inf
     new = [c for c in range(1, len(frame.found.areas)) if c not in within]
-    return (*sorted(out, key=_key), *(_new(first + i, c, frame) for i, c in enumerate(new)))
+    return (*sorted(out, key=_key), *(_new(first + i, c, frame, born) for i, c in enumerate(new)))
 
 
 def _key(body: SkyBody) -> int:
@@ -95,7 +98,7 @@ def _component(body: SkyBody, frame: SkyFrame) -> int:
 
 def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Iterator[SkyBody]:
     """Bodies that share a component, in this frame."""
-    joined = _one_of_parts(_settled(bodies))
+    joined = _one_of_parts(_settled(bodies), frame.now)
     merged, bodies = len(joined) < len(bodies), joined
     one, cut = bodies[0], bool(frame.found.cut[component])
     union = frame.found.bright & (frame.found.labels == component)
@@ -115,18 +118,23 @@ def _settled(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
     return [b for b in bodies if b.id or b.cut or b.settled or b.area > least]
 
 
-def _one_of_parts(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
-    """The bodies without parts of one that has come in: none was ever seen whole, and they move alike."""
+def _one_of_parts(bodies: Sequence[SkyBody], now: float) -> Sequence[SkyBody]:
+    """The bodies without parts of one that has come in.
+
+    Neither was ever seen whole, and they have just come into view, or move alike.
+    """
     kept: list[SkyBody] = []
     for body in sorted(bodies, key=lambda b: (not b.id, -b.area, b.key)):
-        if not any(_parts_of_one(body, k) for k in kept):
+        if not any(_parts_of_one(body, k, now) for k in kept):
             kept.append(body)
     return sorted(kept, key=_key)
 
 
-def _parts_of_one(a: SkyBody, b: SkyBody) -> bool:
+def _parts_of_one(a: SkyBody, b: SkyBody, now: float) -> bool:
     if a.whole or b.whole:
         return False
+    if max(now - a.born, now - b.born) < COMING_S:
+        return True
     fast = max(float(np.hypot(*v)) for v in (a.velocity, b.velocity))
     apart = float(np.hypot(a.velocity[0] - b.velocity[0], a.velocity[1] - b.velocity[1]))
     return fast > SLOWEST and apart < SAME_WAY * fast
@@ -159,10 +167,10 @@ def _changed(body: SkyBody, corner: Corner, visible: int) -> bool:
     return seen > LARGER or (seen > VISIBLE and way >= MOVED)
 
 
-def _new(key: int, component: int, frame: SkyFrame) -> SkyBody:
+def _new(key: int, component: int, frame: SkyFrame, born: float) -> SkyBody:
     """A body that was not known."""
     mask = frame.found.bright & (frame.found.labels == component)
     look = look_at(mask, frame.tone)
     sides = sides_of(look, mask.shape)
-    body = SkyBody(key, look, look.corner, mask, frame.now, alone=True, sides=sides)
+    body = SkyBody(key, look, look.corner, mask, frame.now, alone=True, sides=sides, born=born)
     return body.moved_to(look.corner, frame.ground, frame.now, follows=False)
