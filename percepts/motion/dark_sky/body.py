@@ -83,6 +83,11 @@ class SkyBody:
         return any(self.sides)
 
     @property
+    def has_speed(self) -> bool:
+        """Whether its velocity was measured since it has been alone, or not."""
+        return self.path[-1][0] - self.path[0][0] >= LEAST_S / 2
+
+    @property
     def area(self) -> int:
         """Pixels of its look."""
         return int(np.count_nonzero(self.look.mask))

@@ -106,8 +106,11 @@ def _region(body: SkyBody, members: Sequence[Region]) -> Region:
     outline = describe_mask(_whole(body.visible), (0, 0), (width, height))
     if not members:
         return outline.region(body.id, body.velocity, SIGMA, CONFIDENCE)
-    main = max(members, key=lambda r: r.area)
-    return replace(outline.applied_to(main), id=body.id)
+    main = replace(outline.applied_to(max(members, key=lambda r: r.area)), id=body.id)
+    # The end of what the border cuts may bend; where all is in view, its way tells best how it moves.
+    if body.cut or not body.has_speed:
+        return main
+    return replace(main, velocity=body.velocity, velocity_sigma=SIGMA)
 
 
 def _whole(mask: Mask) -> Mask:
