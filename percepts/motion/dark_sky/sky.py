@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
 
-DARKEST = 40  # levels below which a pixel may be sky
+DARKEST = 30  # levels below which a pixel may be sky
 LEAST_SKY = 0.15  # share of the picture that must be sky
-MOST_NOISE = 4.0  # standard deviation of its tones, levels: a dark room has more
+ONE_TONE = 0.9  # share of the dark pixels that must have the sky's tone: a dark room has many
+SPREAD = 6.0  # levels from the sky's by which these may differ
+MOST_NOISE = 4.0  # standard deviation of its tones, levels
 EVERY = 4  # pixels: every so many are looked at for the sky's tone
 BRIGHTER = (
     9.0  # levels above the sky from which a pixel is a body: compression leaves halos of less
@@ -88,8 +90,10 @@ def sky_tone(tone: NDArray[np.uint8]) -> tuple[float, float] | None:
     if dark.size < LEAST_SKY * some.size:
         return None
     level = float(np.median(dark))
-    noise = 1.4826 * float(np.median(np.abs(dark - level)))
-    return (level, noise) if noise <= MOST_NOISE else None
+    off = np.abs(dark - level)
+    noise = 1.4826 * float(np.median(off))
+    same = float(np.mean(off <= max(SPREAD, 3 * noise)))
+    return (level, noise) if noise <= MOST_NOISE and same >= ONE_TONE else None
 
 
 def joining_gap(shape: tuple[int, ...]) -> int:

@@ -66,7 +66,8 @@ def test_a_narrow_gap_does_not_part_a_body_but_stays_dark() -> None:
     [
         ("daylight", np.full(SHAPE, 120, np.uint8)),
         ("a little black", painted([bar(0, 160, 14, 120)], [120])),
-        ("a dark room", np.random.default_rng(1).integers(0, 40, SHAPE).astype(np.uint8)),
+        ("a dark room", painted([bar(0, 160, 0, 40), bar(0, 60, 40, 120)], [22, 16])),
+        ("a noisy picture", np.random.default_rng(1).integers(0, 40, SHAPE).astype(np.uint8)),
     ],
 )
 def test_without_a_dark_sky_there_are_no_components(name: str, tone: np.ndarray) -> None:
