@@ -40,6 +40,13 @@ FAR = np.cos(np.radians(12.0))
 
 _MARGIN = 0.25
 _QUALITY, _APART_PX = 0.02, 4
+_RING = (
+    5,
+    13,
+)  # pixels: sides of the squares by which a body grows to where its surroundings begin and end
+_PLAIN = (
+    12  # range of tones, from the 5th to the 95th percentile, up to which surroundings are plain
+)
 _RETURNS_PX = 0.3
 _WINDOW = (15, 15)
 _ROUNDS = 8
@@ -166,11 +173,27 @@ def surface_picture(frame: Frame, region: Region) -> SurfacePicture | None:
     mask = np.zeros(grey.shape, np.uint8)
     left, top = round((size[0] - w) / 2), round((size[1] - h) / 2)
     mask[top : top + h, left : left + w] = region.mask
-    inside = cv2.erode(mask, np.ones((5, 5), np.uint8))
+    # Beside a plain background there is nothing else to follow, and corners of the outline tell most.
+    inside = mask if _is_plain_around(mask, grey) else cv2.erode(mask, np.ones((5, 5), np.uint8))
     points = cv2.goodFeaturesToTrack(grey, MOST_POINTS, _QUALITY, _APART_PX, mask=inside)
     if points is None or len(points) < FEWEST:
         return None
     return SurfacePicture(grey, np.asarray(points[:, 0], np.float32))
+
+
+def _is_plain_around(mask: NDArray[np.uint8], grey: NDArray[np.uint8]) -> bool:
+    """Whether the background around a body has one tone.
+
+    Args:
+        mask: (h, w) not 0 on the body.
+        grey: (h, w).
+    """
+    near, far = (cv2.dilate(mask, np.ones((k, k), np.uint8)) for k in _RING)
+    around = grey[(far > 0) & (near == 0)]
+    if not around.size:
+        return False
+    low, high = np.percentile(around, (5, 95))
+    return bool(high - low <= _PLAIN)
 
 
 def _surroundings(frame: Frame, region: Region, size: tuple[int, int]) -> NDArray[np.uint8]:

@@ -1,0 +1,127 @@
+"""Regions of bodies before a dark sky: with the outlines of the bodies, one for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from visup.agent import Region
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.dark_sky.body import SkyBody
+from visup.percepts.motion.dark_sky.sky import Mask, joining_gap, square
+from visup.percepts.motion.dark_sky.tracking import Bodies
+from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+
+OVER = 0.5  # share of a region's bright pixels that are a body's, from which it is this body
+BRIGHT = 0.3  # share of a region that must be brighter than the sky
+COVERED = 0.6  # share of a body cut by the border that regions must cover: else it is a ground
+SIGMA = (
+    1.0  # standard deviation of the velocity of a body without a moving region, pixels per second
+)
+CONFIDENCE = 0.9  # confidence in the same
+
+Regions = tuple[Region, ...]
+
+
+def bodies_with_ids(
+    bodies: Bodies, members: Sequence[Sequence[Region]], ids: IdAllocator, diagonal: float
+) -> Bodies:
+    """The bodies, with ids for those that are to be reported: those with a moving region, or that drifted.
+
+    Args:
+        bodies: The bodies.
+        members: The moving regions of each.
+        ids: Gives new ids.
+        diagonal: Of the image, frame pixels.
+    """
+    used = {b.id for b in bodies}
+    out = []
+    for body, regions in zip(bodies, members, strict=True):
+        free = sorted(r.id for r in regions if r.id not in used)
+        asked = bool(regions) or body.drifted(diagonal)
+        number = body.id or (free[0] if free else ids.new() if asked else 0)
+        used.add(number)
+        out.append(replace(body, id=number))
+    return tuple(out)
+
+
+def members_of(bodies: Bodies, regions: Regions, bright: Mask, now: float) -> list[list[Region]]:
+    """The moving regions that are a part of each body, or all of it.
+
+    Args:
+        bodies: The bodies.
+        regions: The moving regions.
+        bright: (H, W) bool.
+        now: Time, seconds; a body that was not seen in this frame has none.
+    """
+    found: list[list[Region]] = [[] for _ in bodies]
+    for region in regions:
+        x, y, w, h = region.bbox
+        part = np.s_[y : y + h, x : x + w]
+        mine = region.mask & bright[part]
+        lit = np.count_nonzero(mine)
+        if lit < BRIGHT * region.area:
+            continue
+        for k, body in enumerate(bodies):
+            if body.seen == now and np.count_nonzero(mine & body.visible[part]) > OVER * lit:
+                found[k].append(region)
+    return [_unless_ground(b, some) for b, some in zip(bodies, found, strict=True)]
+
+
+def _unless_ground(body: SkyBody, regions: list[Region]) -> list[Region]:
+    """The regions of a body; none when it is cut by the border and hardly any of it moves."""
+    if not body.cut or not regions:
+        return regions
+    covered = np.zeros(body.visible.shape, bool)
+    for r in regions:
+        x, y, w, h = r.bbox
+        covered[y : y + h, x : x + w] |= r.mask
+    enough = COVERED * np.count_nonzero(body.visible)
+    return regions if np.count_nonzero(covered & body.visible) > enough else []
+
+
+def regions_of(
+    bodies: Bodies, members: Sequence[Sequence[Region]], regions: Regions, now: float
+) -> Regions:
+    """All regions: one for each body with an id, and the moving ones that are of no body; by id.
+
+    Args:
+        bodies: The bodies, with ids.
+        members: The moving regions of each.
+        regions: All moving regions.
+        now: Time, seconds.
+    """
+    pairs = [(b, m) for b, m in zip(bodies, members, strict=True) if b.id and b.seen == now]
+    kept = [(b, m) for b, m in pairs if m or not b.cut]
+    taken = {r.id for _, m in kept for r in m} | {b.id for b, _ in kept}
+    others = [r for r in regions if r.id not in taken]
+    return tuple(sorted([*others, *(_region(b, m) for b, m in kept)], key=lambda r: r.id))
+
+
+def _region(body: SkyBody, members: Sequence[Region]) -> Region:
+    height, width = body.visible.shape
+    outline = describe_mask(_whole(body.visible), (0, 0), (width, height))
+    if not members:
+        return outline.region(body.id, body.velocity, SIGMA, CONFIDENCE)
+    main = replace(outline.applied_to(max(members, key=lambda r: r.area)), id=body.id)
+    # The end of what the border cuts may bend; where all is in view, its way tells best how it moves.
+    if body.cut or not body.has_speed:
+        return main
+    return replace(main, velocity=body.velocity, velocity_sigma=SIGMA)
+
+
+def _whole(mask: Mask) -> Mask:
+    """A mask without small holes, and without the narrow gaps between its parts if it has several."""
+    clean = clean_mask(mask, 1)
+    if clean is None:
+        return mask
+    if cv2.connectedComponents(clean.view(np.uint8), connectivity=4)[0] <= 2:
+        return clean
+    joined = cv2.morphologyEx(
+        clean.view(np.uint8), cv2.MORPH_CLOSE, square(joining_gap(mask.shape))
+    )
+    found = clean_mask(np.asarray(joined, np.uint8).view(bool), 1)
+    return clean if found is None else found

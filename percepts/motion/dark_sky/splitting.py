@@ -1,0 +1,165 @@
+"""Bodies that touch or cover each other in the image share one bright component: who owns which pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.dark_sky.body import Corner, Look, SkyBody, Slices, overlap
+from visup.percepts.motion.dark_sky.sky import Mask
+
+Tones = NDArray[np.uint8]
+
+REACH = 4  # pixels around the expected place where a body is looked for
+ALIKE = 30.0  # root mean square difference of levels up to which a body is found again
+STRAY = (
+    10.0  # squared difference of levels for which a body may lie a pixel from where it is expected
+)
+FEW = 16  # fewest pixels in which the looks of two bodies are compared
+HELD = 0.7  # factor on the difference of a body that was seen before the other one
+
+_STEPS = np.arange(-REACH, REACH + 1, dtype=np.float32) ** 2
+_FAR = _STEPS[:, None] + _STEPS
+"""Squared distances from the expected place, pixels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Share:
+    """What a body has of a component.
+
+    Attributes:
+        mask: (H, W) bool: its pixels.
+        covers: Keys of the bodies behind it.
+    """
+
+    mask: Mask
+    covers: frozenset[int]
+
+
+def placed(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
+    """The corner of a body's box in a picture where it touches others, where its look fits best; does it fit?
+
+    Where it fits nowhere it is expected where its velocity leads.
+
+    Args:
+        tone: (H, W) uint8.
+        body: The body.
+        now: Time of the picture, seconds.
+    """
+    x, y = body.expected(now)
+    look, (dx, dy) = _within(body.look, (x, y), tone.shape)
+    h, w = look.mask.shape
+    window = tone[y + dy - REACH : y + dy + h + REACH, x + dx - REACH : x + dx + w + REACH]
+    area = np.count_nonzero(look.mask)
+    if area < FEW or window.shape != (h + 2 * REACH, w + 2 * REACH):
+        return (x, y), False
+    cost = cv2.matchTemplate(window, look.tone, cv2.TM_SQDIFF, mask=look.mask.view(np.uint8)) / area
+    _, _, at, _ = cv2.minMaxLoc(cost + STRAY * _FAR)
+    fits = bool(cost[at[1], at[0]] <= ALIKE**2)
+    return ((x - REACH + at[0], y - REACH + at[1]) if fits else (x, y)), fits
+
+
+def _within(look: Look, corner: Corner, shape: tuple[int, ...]) -> tuple[Look, Corner]:
+    """The part of a look that stays in the image wherever it is looked for, and where it begins."""
+    x, y = corner
+    h, w = look.mask.shape
+    left, top = max(REACH - x, 0), max(REACH - y, 0)
+    right, bottom = min(w, shape[1] - REACH - x), min(h, shape[0] - REACH - y)
+    part = np.s_[top : max(bottom, top), left : max(right, left)]
+    tone, mask = np.ascontiguousarray(look.tone[part]), np.ascontiguousarray(look.mask[part])
+    return Look(mask, tone, look.corner), (left, top)
+
+
+def split(
+    tone: Tones, union: Mask, bodies: Sequence[SkyBody], corners: Sequence[Corner]
+) -> tuple[Share, ...]:
+    """Share bright pixels among bodies that touch in the image.
+
+    Of two whose looks lie over each other, the one that is more like the pixels there is in front. Pixels of
+    none go to the nearest body; with a single one they are something that is not known.
+
+    Args:
+        tone: (H, W) uint8.
+        union: (H, W) bool: bright pixels of the component that they share.
+        bodies: At least one.
+        corners: Where the box of each lies.
+
+    Returns:
+        The share of each.
+    """
+    x, y, w, h = cv2.boundingRect(union.view(np.uint8))
+    part = np.s_[y : y + h, x : x + w]
+    places = [
+        _Place(b, (at[0] - x, at[1] - y), union[part])
+        for b, at in zip(bodies, corners, strict=True)
+    ]
+    fronts = [frozenset(_behind(p, places, tone[part])) for p in places]
+    owner = np.full((h, w), -1, np.int8)
+    for k in sorted(range(len(places)), key=lambda k: (len(fronts[k]), -bodies[k].key)):
+        owner[places[k].mask] = k
+    left = union[part] & (owner < 0)
+    if len(bodies) > 1 and left.any():
+        owner[left] = _nearest([owner == k for k in range(len(bodies))])[left]
+    masks = [_in_image(owner == k, part, union.shape) for k in range(len(bodies))]
+    return tuple(Share(m, f) for m, f in zip(masks, fronts, strict=True))
+
+
+class _Place:
+    """Where the look of a body lies in a part of the image.
+
+    Attributes:
+        body: The body.
+        corner: (x, y) of its box in this part.
+        mask: (h, w) bool: the bright pixels there.
+    """
+
+    def __init__(self, body: SkyBody, corner: Corner, bright: Mask) -> None:
+        self.body, self.corner = body, corner
+        self.mask = np.zeros(bright.shape, bool)
+        inside, part = overlap(body.look, corner, (bright.shape[0], bright.shape[1]))
+        self.mask[inside] = body.look.mask[part] & bright[inside]
+
+    def unlike(self, tone: Tones, where: Mask) -> float:
+        """Mean difference of levels between the image and the look, over some pixels of the look."""
+        inside, part = overlap(self.body.look, self.corner, (tone.shape[0], tone.shape[1]))
+        gap = cv2.absdiff(tone[inside], np.ascontiguousarray(self.body.look.tone[part]))
+        return float(gap[where[inside]].mean())
+
+
+def _behind(one: _Place, places: Sequence[_Place], tone: Tones) -> list[int]:
+    """Keys of the bodies behind one."""
+    return [o.body.key for o in places if o is not one and _covers(one, o, tone)]
+
+
+def _covers(one: _Place, other: _Place, tone: Tones) -> bool:
+    """Whether one body is in front of another: where both lie, it is more like the image; else as before."""
+    before, after = other.body.key in one.body.covers, one.body.key in other.body.covers
+    both = one.mask & other.mask
+    if np.count_nonzero(both) < FEW:
+        return before
+    mine = one.unlike(tone, both) * (HELD if before else 1)
+    yours = other.unlike(tone, both) * (HELD if after else 1)
+    return (mine, -one.body.area) < (yours, -other.body.area)
+
+
+def _in_image(mask: Mask, part: Slices, shape: tuple[int, ...]) -> Mask:
+    out = np.zeros(shape, bool)
+    out[part] = mask
+    return out
+
+
+def _nearest(masks: Sequence[Mask]) -> NDArray[np.int8]:
+    """The nearest body to each pixel, of those that are seen."""
+    nearest = np.zeros(masks[0].shape, np.int8)
+    least = np.full(masks[0].shape, np.inf, np.float32)
+    for k, mask in enumerate(masks):
+        if mask.any():
+            far = cv2.distanceTransform((~mask).view(np.uint8), cv2.DIST_L2, 3)
+            nearer = far < least
+            nearest[nearer] = k
+            least[nearer] = far[nearer]
+    return nearest

@@ -1,0 +1,176 @@
+"""Following bodies before a dark sky from frame to frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.dark_sky.body import (
+    Corner,
+    Point,
+    SkyBody,
+    look_at,
+    overlap,
+    renewed,
+    sides_of,
+)
+from visup.percepts.motion.dark_sky.sky import Components, Mask
+from visup.percepts.motion.dark_sky.splitting import Share, placed, split
+
+SHARED = 0.25  # share of the smaller of a body and a component from which they belong together
+GROWS = 1.5  # growth of an area from one frame to the next from which something else has joined
+VISIBLE = 0.5  # share of its look that must be visible for it to be looked at anew beside others
+LEAST_SEEN = 0.05  # share of its look that must be visible for a body not to be hidden
+MOVED = 3  # pixels, along either axis, from which it is
+LARGER = 1.03  # the same, as a growth of its area
+PART = 0.5  # area, as a share of that of a body, up to which what has just come off may be a part of it
+COMING_S = 2.0  # age of a body up to which it has just come into view, seconds
+SAME_WAY = 0.5  # difference of velocities, as a share of the greater, up to which two move alike
+SLOWEST = 5.0  # pixels per second from which a body clearly comes in
+FORGOTTEN_S = 0.5  # how long a body that is not seen is looked for, seconds
+HIDDEN_S = 10.0  # the same while it may be hidden by another one
+
+Bodies = tuple[SkyBody, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SkyFrame:
+    """What bodies are followed in.
+
+    Attributes:
+        tone: (H, W) uint8.
+        found: Its bright components.
+        now: Time, seconds.
+        ground: (x, y) way of the ground since the first frame, frame pixels.
+    """
+
+    tone: NDArray[np.uint8]
+    found: Components
+    now: float
+    ground: Point
+
+
+def follow(bodies: Bodies, frame: SkyFrame) -> Bodies:
+    """The bodies in the next frame, by key: those that were followed, and new ones.
+
+    Args:
+        bodies: Those of the frame before.
+        frame: The frame.
+    """
+    within = [_component(b, frame) for b in bodies]
+    now = frame.now
+    out = [b for b, c in zip(bodies, within, strict=True) if not c and now - b.seen <= FORGOTTEN_S]
+    for component in sorted({*within} - {0}):
+        out += _followed(
+            [b for b, c in zip(bodies, within, strict=True) if c == component], component, frame
+        )
+    out = [b for b in out if now - b.seen <= HIDDEN_S]
+    first = max((b.key for b in bodies), default=0) + 1
+    born = now if bodies else -inf
+    new = [c for c in range(1, len(frame.found.areas)) if c not in within]
+    return (*sorted(out, key=_key), *(_new(first + i, c, frame, born) for i, c in enumerate(new)))
+
+
+def _key(body: SkyBody) -> int:
+    return body.key
+
+
+def _component(body: SkyBody, frame: SkyFrame) -> int:
+    """The component that a body belongs to; 0 for none.
+
+    It shares most with it; what the border cuts belongs to one that the border cuts, if there is any.
+    """
+    areas, labels = frame.found.areas, frame.found.labels
+    inside, part = overlap(body.look, body.expected(frame.now), (labels.shape[0], labels.shape[1]))
+    mine = labels[inside][body.look.mask[part] & frame.found.bright[inside]]
+    both = np.bincount(mine, minlength=len(areas)).astype(float)
+    both[0] = 0
+    both[both <= SHARED * np.minimum(areas, body.area)] = 0
+    if body.cut and both[frame.found.cut].any():
+        both[~frame.found.cut] = 0
+    return int(both.argmax())
+
+
+def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Iterator[SkyBody]:
+    """Bodies that share a component, in this frame."""
+    joined = _one_of_parts(_settled(bodies), frame.now)
+    merged, bodies = len(joined) < len(bodies), joined
+    one, cut = bodies[0], bool(frame.found.cut[component])
+    union = frame.found.bright & (frame.found.labels == component)
+    grows = frame.found.areas[component] > GROWS * one.area and not (one.cut and cut)
+    if len(bodies) == 1 and (merged or not grows):
+        yield _alone(one, union, frame)
+        return
+    places = [placed(frame.tone, b, frame.now) for b in bodies]
+    shares = split(frame.tone, union, bodies, [at for at, _ in places])
+    for body, (corner, fits), share in zip(bodies, places, shares, strict=True):
+        yield _touching(body, corner, share, frame, fits=fits)
+
+
+def _settled(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
+    """The bodies without small ones that were alone too shortly, which are parts of the others."""
+    least = PART * max(b.area for b in bodies)
+    return [b for b in bodies if b.id or b.cut or b.settled or b.area > least]
+
+
+def _one_of_parts(bodies: Sequence[SkyBody], now: float) -> Sequence[SkyBody]:
+    """The bodies without parts of one that has come in.
+
+    Neither was ever seen whole, and they have just come into view, or move alike.
+    """
+    kept: list[SkyBody] = []
+    for body in sorted(bodies, key=lambda b: (not b.id, -b.area, b.key)):
+        if not any(_parts_of_one(body, k, now) for k in kept):
+            kept.append(body)
+    return sorted(kept, key=_key)
+
+
+def _parts_of_one(a: SkyBody, b: SkyBody, now: float) -> bool:
+    if a.whole or b.whole:
+        return False
+    if max(now - a.born, now - b.born) < COMING_S:
+        return True
+    fast = max(float(np.hypot(*v)) for v in (a.velocity, b.velocity))
+    apart = float(np.hypot(a.velocity[0] - b.velocity[0], a.velocity[1] - b.velocity[1]))
+    return fast > SLOWEST and apart < SAME_WAY * fast
+
+
+def _alone(body: SkyBody, mask: Mask, frame: SkyFrame) -> SkyBody:
+    """A body that is a component of its own: it looks as it looks now."""
+    known = replace(body, visible=mask)
+    return known.looking(look_at(mask, frame.tone), frame.ground, frame.now, alone=True)
+
+
+def _touching(
+    body: SkyBody, corner: Corner, share: Share, frame: SkyFrame, *, fits: bool
+) -> SkyBody:
+    """A body that touches others: it looks as it looks now, and where it is hidden as it did before."""
+    if np.count_nonzero(share.mask) < LEAST_SEEN * body.area:
+        return body
+    known = replace(body, visible=share.mask, covers=share.covers)
+    if body.cut or (fits and _changed(body, corner, int(np.count_nonzero(share.mask)))):
+        look = renewed(body.look, corner, share.mask, frame.tone, frame.found.bright)
+        return known.looking(look, frame.ground, frame.now, alone=False)
+    moved = replace(known, alone=False)
+    return moved.moved_to(corner, frame.ground, frame.now, follows=not body.alone)
+
+
+def _changed(body: SkyBody, corner: Corner, visible: int) -> bool:
+    """Whether a body is at another place than when it was looked at, or larger."""
+    (x, y), seen = body.look.corner, visible / body.area
+    way = max(abs(corner[0] - x), abs(corner[1] - y))
+    return seen > LARGER or (seen > VISIBLE and way >= MOVED)
+
+
+def _new(key: int, component: int, frame: SkyFrame, born: float) -> SkyBody:
+    """A body that was not known."""
+    mask = frame.found.bright & (frame.found.labels == component)
+    look = look_at(mask, frame.tone)
+    sides = sides_of(look, mask.shape)
+    body = SkyBody(key, look, look.corner, mask, frame.now, alone=True, sides=sides, born=born)
+    return body.moved_to(look.corner, frame.ground, frame.now, follows=False)
