@@ -41,6 +41,7 @@ NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
 CONTACTS = ("touching", "in_contact", "on")
+HELD = ("coupled", "held_by")
 
 CARRIED_SPEED = 0.005
 """Least speed at which coupled objects count as moving together, image diagonals per second."""
@@ -177,8 +178,16 @@ class RelationLookup:
             return False
         if action == "moving_together" and self.find("coupled", objects).truth is Truth.TRUE:
             return True
-        met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
+        meets = action in ("converging", *HELD)
+        met = meets and self.find("in_contact", objects).truth is Truth.TRUE
         return met or self.goes_round(trend.name, objects) or went_round(self._mind, trend)
+
+    def distance(self, objects: tuple[int, ...]) -> float | None:
+        """The gap of two bodies, pixels; None if unknown."""
+        if len(objects) != 2:
+            return None
+        gap = kinematics(self._mind).pair("gap", *objects)
+        return None if math.isnan(gap) else gap
 
     @property
     def time(self) -> float:
@@ -283,8 +292,8 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
-    if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
-        contrary = None
+    excused = contrary is not None and relations.explains_away(contrary, meaning.name, ids)
+    contrary = None if excused else contrary
     unreached = relations.unreached(meaning.name, ids, contrary)
     known = (*meaning.helps, *meaning.contrary)
     entry, sudden = relations.begun(meaning.begins, ids)
@@ -299,6 +308,8 @@ def observe(
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
         unreached=unreached,
+        excused=excused,
+        distance=relations.distance(ids),
         carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
     )
 

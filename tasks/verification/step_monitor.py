@@ -18,6 +18,9 @@ from visup.tasks.verification.settings import TaskSettings
 
 BAD = (Status.FAILING, Status.FAILED)
 
+REGAINED = 0.5
+"""Greatest gap, as a share of the greatest since a step fails, at which drawing nearer counts as recovery."""
+
 Worked = Callable[[float, float], float]
 """Working time between two times, without pauses, seconds."""
 
@@ -72,6 +75,8 @@ class StepMonitor:
         told: Reported relations of it and of earlier steps; incompatible ones are reported to begin later.
         earliest: The earliest time at which it can have begun: when the previous step was first observed, or
             had lasted as long as required.
+        excused_at: When a contrary was last explained away: it counts only from then on.
+        farthest: Greatest gap of its actors since it fails, pixels; None while it does not, or if unknown.
     """
 
     entered: float
@@ -109,6 +114,8 @@ class StepMonitor:
     fulfilled_at: float | None = None
     told: ReportedRelations = ()
     earliest: float = -math.inf
+    excused_at: float = -math.inf
+    farthest: float | None = None
 
     @property
     def begun_anew(self) -> bool:
@@ -117,8 +124,8 @@ class StepMonitor:
 
 
 def entered(now: float) -> StepMonitor:
-    """The monitor of a step that begins now."""
-    return StepMonitor(entered=now, since=now, after=now)
+    """The monitor of a step that begins now; what was so before is no evidence that it has begun."""
+    return StepMonitor(entered=now, turn=now, since=now, after=now)
 
 
 def update(
@@ -149,6 +156,7 @@ def update(
     worked = partial(seen.elapsed, step)
     if monitor.early:
         monitor, seen = _disregard_early(monitor, seen, moment, settings, worked)
+    monitor = _note_distance(monitor, seen)
     noted = _note_progress(monitor, step, meaning, seen, moment, settings)
     noted = _note_contrary(noted, seen, now)
     noted = _note_lateness(noted, step, meaning, seen, now)
@@ -308,7 +316,9 @@ def _note_progress(
         helped_by=seen.helps.name if seen.helps else monitor.helped_by,
         helped_since=seen.helps.since if seen.helps else monitor.helped_since,
         helped_at=now if helping else monitor.helped_at,
-        better_since=_first(monitor.better_since, now) if helping and not seen.contrary else None,
+        better_since=_first(monitor.better_since, now)
+        if helping and not seen.contrary and _regained(monitor, seen)
+        else None,
         ceased=ceased,
         denied=monitor.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
         unseen_since=None,
@@ -316,14 +326,35 @@ def _note_progress(
     )
 
 
+def _note_distance(monitor: StepMonitor, seen: ActionObservation) -> StepMonitor:
+    """Record how far the actors of a failing step have come apart."""
+    if monitor.status not in BAD:
+        return monitor if monitor.farthest is None else replace(monitor, farthest=None)
+    if seen.distance is None or (monitor.farthest or 0.0) >= seen.distance:
+        return monitor
+    return replace(monitor, farthest=seen.distance)
+
+
+def _regained(monitor: StepMonitor, seen: ActionObservation) -> bool:
+    """Whether two that have come apart are together again, or have made good half of the way at least.
+
+    What bobs, or passes at a distance, draws nearer for a while as well.
+    """
+    if seen.holds is Truth.TRUE or monitor.farthest is None or seen.distance is None:
+        return True
+    return seen.distance <= REGAINED * monitor.farthest
+
+
 def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
     """Record a contrary, from its onset within this step, unless it holds, or held and is over."""
     if not seen.observed:
         return monitor
+    if seen.excused:
+        monitor = replace(monitor, excused_at=now)
     holds = seen.holds is Truth.TRUE and not seen.decisive
     if seen.contrary is None or holds or (monitor.held and seen.unreached is not None):
         return replace(monitor, contrary=None, contrary_since=None)
-    since = max(monitor.entered, seen.contrary.since)
+    since = max(monitor.entered, monitor.excused_at, seen.contrary.since)
     if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:
         since = min(since, monitor.contrary_since)
     return replace(

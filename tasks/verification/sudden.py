@@ -7,6 +7,7 @@ distance of two bodies changes much faster than it is noisy, a few samples tell 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from math import sqrt
 
 import numpy as np
@@ -17,6 +18,7 @@ from visup.rules.geometry.rise import RiseLimits, sudden_rise
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.relations.trend import SIGNS
+from visup.tasks.verification.setting_out import setting_out
 
 OPPOSITE = {"converging": "diverging", "diverging": "converging"}
 
@@ -43,9 +45,13 @@ class SuddenTrends:
         self._found: dict[tuple[str, tuple[int, ...]], Relation | None] = {}
 
     def first(self, names: Iterable[str], ids: tuple[int, ...]) -> Relation | None:
-        """The first of some relations that is a trend which has just set in, or None."""
+        """The first of some relations that is a trend which has just set in, or None.
+
+        Who is named first is the one that comes or goes. While only the other one moves, the trend must last.
+        """
         found = (self._trend(name, ids) for name in names if name in SIGNS)
-        return next((t for t in found if t is not None), None)
+        sudden = next((t for t in found if t is not None), None)
+        return None if sudden is None or ids[0] not in self._setting_out else sudden
 
     def ends(self, relation: Relation) -> bool:
         """Whether a relation is a trend of which the opposite has just set in."""
@@ -56,6 +62,10 @@ class SuddenTrends:
         if (name, ids) not in self._found:
             self._found[name, ids] = sudden_trend(self._mind, name, ids)
         return self._found[name, ids]
+
+    @cached_property
+    def _setting_out(self) -> frozenset[int]:
+        return setting_out(self._mind)
 
 
 def sudden_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
