@@ -81,13 +81,11 @@ CAME_LATER_S = 0.3
 beginning."""
 
 
-def stirring(
-    model: MonitoredPhases, snapshot: TaskSnapshot, posterior: TaskHypotheses | None
-) -> bool:
+def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
     """Whether actors of the most likely active steps start to move, or have just appeared.
 
-    A stage begins with the last of its steps, and who is named first is the one that comes or goes: that a
-    giver brings a payload does not begin what the receiver does.
+    A stage of several steps begins with the last of them, and who is named first is the one that comes or
+    goes: that a giver brings a payload does not begin what the receiver does.
     """
     if posterior is None or posterior.likeliest.finished is not None:
         return False
@@ -100,10 +98,9 @@ def stirring(
         return True
     out = setting_out(mind)
 
-    def stirs(step: TaskStep) -> bool:
-        leads = step.actors[:1] if model.actions[step.action].name in TRENDS else step.actors
+    def stirs(step: TaskStep, *, alone: bool) -> bool:
+        leads = step.actors[:1] if step.action in TRENDS and not alone else step.actors
         return not out.isdisjoint(snapshot.objects(leads))
 
-    return any(
-        all(stirs(s) for s in steps if s.stage == stage) for stage in {s.stage for s in steps}
-    )
+    stages = [[s for s in steps if s.stage == stage] for stage in {s.stage for s in steps}]
+    return any(all(stirs(s, alone=len(stage) == 1) for s in stage) for stage in stages)

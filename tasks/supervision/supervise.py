@@ -249,7 +249,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     one = machines(model.task, bindings)
     told = memory.belief.stages
-    stirs = is_first(told) and stirring(model, snapshot, posterior)
+    stirs = is_first(told) and stirring(snapshot, posterior)
     stages = with_begun(told, belief.stages, stirs=stirs)
     belief = replace(belief, stages=stages, unexplained=lasting, bystanders=let_be, machines=one)
     return TaskMemory(

@@ -7,7 +7,6 @@ distance of two bodies changes much faster than it is noisy, a few samples tell 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property
 from math import sqrt
 
 import numpy as np
@@ -18,7 +17,6 @@ from visup.rules.geometry.rise import RiseLimits, sudden_rise
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.relations.trend import SIGNS
-from visup.tasks.verification.setting_out import setting_out
 
 OPPOSITE = {"converging": "diverging", "diverging": "converging"}
 
@@ -51,7 +49,7 @@ class SuddenTrends:
         """
         found = (self._trend(name, ids) for name in names if name in SIGNS)
         sudden = next((t for t in found if t is not None), None)
-        return None if sudden is None or ids[0] not in self._setting_out else sudden
+        return None if sudden is None or self._comes_by_the_other(ids) else sudden
 
     def ends(self, relation: Relation) -> bool:
         """Whether a relation is a trend of which the opposite has just set in."""
@@ -63,9 +61,11 @@ class SuddenTrends:
             self._found[name, ids] = sudden_trend(self._mind, name, ids)
         return self._found[name, ids]
 
-    @cached_property
-    def _setting_out(self) -> frozenset[int]:
-        return setting_out(self._mind)
+    def _comes_by_the_other(self, ids: tuple[int, ...]) -> bool:
+        """Whether the second of two moves while the first one rests, as far as is known."""
+        now, still = kinematics(self._mind), RelationSettings().still_speed
+        still *= image_diagonal(self._mind.frame_size)
+        return now.one("speed", ids[0]) < still < now.one("speed", ids[1])
 
 
 def sudden_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
