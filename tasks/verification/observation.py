@@ -32,7 +32,6 @@ class ActionObservation:
         absent: Whether one of its actors is optional and has no object: then the step is not due.
         moves_on: Whether it is a contact at which neither has slowed down yet.
         unreached: Since when it is an approach, or carrying, that is over without what it was for, or None.
-        excused: Whether a relation by which it would fail is there, but only in appearance.
         distance: Gap of its two actors, pixels; None if unknown, or if it has not two.
         carried_past: Whether it would begin by a contact, but one of the two is known now to be carried past.
     """
@@ -53,7 +52,6 @@ class ActionObservation:
     moves_on: bool = False
     carried_past: bool = False
     unreached: float | None = None
-    excused: bool = False
     distance: float | None = None
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:

@@ -292,8 +292,8 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
-    excused = contrary is not None and relations.explains_away(contrary, meaning.name, ids)
-    contrary = None if excused else contrary
+    if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
+        contrary = None
     unreached = relations.unreached(meaning.name, ids, contrary)
     known = (*meaning.helps, *meaning.contrary)
     entry, sudden = relations.begun(meaning.begins, ids)
@@ -308,7 +308,6 @@ def observe(
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
         unreached=unreached,
-        excused=excused,
         distance=relations.distance(ids),
         carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
     )

@@ -75,7 +75,6 @@ class StepMonitor:
         told: Reported relations of it and of earlier steps; incompatible ones are reported to begin later.
         earliest: The earliest time at which it can have begun: when the previous step was first observed, or
             had lasted as long as required.
-        excused_at: When a contrary was last explained away: it counts only from then on.
         farthest: Greatest gap of its actors since it fails, pixels; None while it does not, or if unknown.
     """
 
@@ -114,7 +113,6 @@ class StepMonitor:
     fulfilled_at: float | None = None
     told: ReportedRelations = ()
     earliest: float = -math.inf
-    excused_at: float = -math.inf
     farthest: float | None = None
 
     @property
@@ -349,12 +347,10 @@ def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) ->
     """Record a contrary, from its onset within this step, unless it holds, or held and is over."""
     if not seen.observed:
         return monitor
-    if seen.excused:
-        monitor = replace(monitor, excused_at=now)
     holds = seen.holds is Truth.TRUE and not seen.decisive
     if seen.contrary is None or holds or (monitor.held and seen.unreached is not None):
         return replace(monitor, contrary=None, contrary_since=None)
-    since = max(monitor.entered, monitor.excused_at, seen.contrary.since)
+    since = max(monitor.entered, seen.contrary.since)
     if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:
         since = min(since, monitor.contrary_since)
     return replace(
