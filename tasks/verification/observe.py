@@ -41,7 +41,6 @@ NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
 CONTACTS = ("touching", "in_contact", "on")
-HELD = ("coupled", "held_by")
 
 CARRIED_SPEED = 0.005
 """Least speed at which coupled objects count as moving together, image diagonals per second."""
@@ -178,8 +177,7 @@ class RelationLookup:
             return False
         if action == "moving_together" and self.find("coupled", objects).truth is Truth.TRUE:
             return True
-        meets = action in ("converging", *HELD)
-        met = meets and self.find("in_contact", objects).truth is Truth.TRUE
+        met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
         return met or self.goes_round(trend.name, objects) or went_round(self._mind, trend)
 
     def distance(self, objects: tuple[int, ...]) -> float | None:
