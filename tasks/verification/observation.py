@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from visup.agent import Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.rhythm import Beats
-from visup.tasks.automaton.states import TaskStep
+from visup.tasks.automaton.states import RunningDeadline, TaskStep
 from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 
 
@@ -68,6 +68,17 @@ class ActionObservation:
 
 
 UNOBSERVED = ActionObservation()
+
+
+def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadline | None:
+    """The first expired `within` around the step, or None; it is suspended in pauses around it."""
+
+    def left(due: RunningDeadline) -> float:
+        if not due.pauses:
+            return due.at - now
+        return due.seconds - seen.pauses.elapsed(due.pauses, due.at - due.seconds, now)
+
+    return next((d for d in step.deadlines if left(d) < 0.0), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -180,13 +180,6 @@ class RelationLookup:
         met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
         return met or self.goes_round(trend.name, objects) or went_round(self._mind, trend)
 
-    def distance(self, objects: tuple[int, ...]) -> float | None:
-        """The gap of two bodies, pixels; None if unknown."""
-        if len(objects) != 2:
-            return None
-        gap = kinematics(self._mind).pair("gap", *objects)
-        return None if math.isnan(gap) else gap
-
     @property
     def time(self) -> float:
         """Seconds of this moment."""
@@ -306,7 +299,6 @@ def observe(
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
         unreached=unreached,
-        distance=relations.distance(ids),
         carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
     )
 

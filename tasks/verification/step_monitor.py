@@ -12,14 +12,12 @@ from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import RunningDeadline, TaskStep
-from visup.tasks.verification.observation import UNOBSERVED, ActionObservation
+from visup.tasks.verification.observation import UNOBSERVED, ActionObservation, overdue
+from visup.tasks.verification.recovery import farthest, regained
 from visup.tasks.verification.reported import ReportedRelations, with_reported
 from visup.tasks.verification.settings import TaskSettings
 
 BAD = (Status.FAILING, Status.FAILED)
-
-REGAINED = 0.5
-"""Greatest gap, as a share of the greatest since a step fails, at which drawing nearer counts as recovery."""
 
 Worked = Callable[[float, float], float]
 """Working time between two times, without pauses, seconds."""
@@ -154,7 +152,8 @@ def update(
     worked = partial(seen.elapsed, step)
     if monitor.early:
         monitor, seen = _disregard_early(monitor, seen, moment, settings, worked)
-    monitor = _note_distance(monitor, seen)
+    gap = farthest(monitor.farthest, seen) if monitor.status in BAD else None
+    monitor = monitor if gap == monitor.farthest else replace(monitor, farthest=gap)
     noted = _note_progress(monitor, step, meaning, seen, moment, settings)
     noted = _note_contrary(noted, seen, now)
     noted = _note_lateness(noted, step, meaning, seen, now)
@@ -260,17 +259,6 @@ def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> boo
     return monitor.fulfilled and (not meaning.lasts or explicit)
 
 
-def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadline | None:
-    """The first expired `within` around the step, or None; it is suspended in pauses around it."""
-
-    def left(due: RunningDeadline) -> float:
-        if not due.pauses:
-            return due.at - now
-        return due.seconds - seen.pauses.elapsed(due.pauses, due.at - due.seconds, now)
-
-    return next((d for d in step.deadlines if left(d) < 0.0), None)
-
-
 def _note_progress(
     monitor: StepMonitor,
     step: TaskStep,
@@ -315,32 +303,13 @@ def _note_progress(
         helped_since=seen.helps.since if seen.helps else monitor.helped_since,
         helped_at=now if helping else monitor.helped_at,
         better_since=_first(monitor.better_since, now)
-        if helping and not seen.contrary and _regained(monitor, seen)
+        if helping and not seen.contrary and regained(monitor.farthest, seen)
         else None,
         ceased=ceased,
         denied=monitor.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
         unseen_since=None,
         confidence=seen.helps.confidence if seen.helps else 1.0,
     )
-
-
-def _note_distance(monitor: StepMonitor, seen: ActionObservation) -> StepMonitor:
-    """Record how far the actors of a failing step have come apart."""
-    if monitor.status not in BAD:
-        return monitor if monitor.farthest is None else replace(monitor, farthest=None)
-    if seen.distance is None or (monitor.farthest or 0.0) >= seen.distance:
-        return monitor
-    return replace(monitor, farthest=seen.distance)
-
-
-def _regained(monitor: StepMonitor, seen: ActionObservation) -> bool:
-    """Whether two that have come apart are together again, or have made good half of the way at least.
-
-    What bobs, or passes at a distance, draws nearer for a while as well.
-    """
-    if seen.holds is Truth.TRUE or monitor.farthest is None or seen.distance is None:
-        return True
-    return seen.distance <= REGAINED * monitor.farthest
 
 
 def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:

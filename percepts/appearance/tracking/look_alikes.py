@@ -8,10 +8,10 @@ from itertools import permutations
 
 import numpy as np
 
+from visup.percepts.appearance.looks.patches import ALIKE
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
-from visup.percepts.appearance.tracking.coloured import ALIKE
 from visup.percepts.appearance.tracking.finding import SURE, ThingPlace, home_of
 from visup.percepts.appearance.tracking.verification import verify
 

@@ -17,13 +17,13 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
 from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
 from visup.percepts.appearance.tracking.change import ChangeMap
-from visup.percepts.appearance.tracking.coloured import coloured_places
 from visup.percepts.appearance.tracking.finding import (
     SURE,
     ThingPlace,
     assigned,
     body_places,
     candidates,
+    coloured_places,
     footprint,
     lost_places,
     moving_places,

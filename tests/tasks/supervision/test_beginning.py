@@ -57,6 +57,30 @@ def test_what_the_stage_before_asked_for_already_does_not_begin_the_next() -> No
     assert begun(script, text)["carry"] == pytest.approx(8.0, abs=0.4)
 
 
+OFFER = """
+actor dish is dish
+<t> ::= coupled(arm, satellite) & converging(dish, satellite)
+"""
+
+
+@pytest.mark.parametrize("since", [3.0, 6.0])
+def test_a_first_stage_of_two_things_begins_with_what_was_not_so_from_the_start(
+    since: float,
+) -> None:
+    """A giver holds its payload all the time: an offer begins when the receiver comes."""
+    held = Spell("touching", 0.0, 20.0), Spell("coupled", 0.5, 20.0)
+    nears = Spell("converging", since, 12.0, (SATELLITE, INTRUDER))
+    script = Script((*held, nears), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(since, abs=0.4)
+
+
+def test_a_first_stage_of_two_things_begins_with_either_that_comes_about() -> None:
+    meets = Spell("touching", 3.0, 20.0), Spell("coupled", 3.5, 20.0)
+    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = Script((*meets, nears), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(3.0, abs=0.4)
+
+
 def dated(script: Script, text: str, until: float = 14.0) -> dict[str, tuple[float, float]]:
     """Stage -> when its beginning was reported, and when it is said to have begun."""
     events = watch(script, until, text).events

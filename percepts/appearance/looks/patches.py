@@ -1,4 +1,4 @@
-"""Things that have never been in view, found by their colours alone, wherever they are.
+"""Patches of the picture that have a thing's colours: where it is, whatever it looks like else.
 
 A thing that rests as it was not taught (in other light, turned, or cut by the border of the picture) matches
 no taught view. Where its colours make up one patch of about its size, stand out from all around it, and are
@@ -18,9 +18,7 @@ from visup.percepts.appearance.looks.bodies import body_colours
 from visup.percepts.appearance.looks.colours import OWN, colour_bins
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
-from visup.percepts.appearance.tracking.finding import APART, ThingPlace
-from visup.percepts.appearance.tracking.verification import Match
+from visup.percepts.appearance.looks.thing_model import Appearance
 
 EXCESS = 0.85
 """Least share of its colours in a patch beyond that around it."""
@@ -29,6 +27,9 @@ ALIKE = 0.45
 """Least common share of the colours of a patch and of the thing. In 54 rendered and real clips no patch of
 another thing passes both, but for equal bottles."""
 
+APART = 1.5
+"""Least agreement of its colours in a patch, as a multiple of that in any other."""
+
 SIDES = (0.5, 1.6)
 """Sides of a patch that may be a thing, in its own."""
 
@@ -36,16 +37,17 @@ _SPECK = np.ones((3, 3), np.uint8)
 _GAP = np.ones((5, 5), np.uint8)
 
 
-def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
+def only_patch(scene: Scene, it: Appearance, unit: float) -> tuple[PatchPose, float] | None:
     """The only patch of the picture with a thing's colours and about its size, if there is one.
 
     Args:
         scene: The frame.
-        view: The taught view.
-        number: Its number.
+        it: The thing, as it was taught.
+        unit: Working pixels per pixel of its taught patch.
+
+    Returns:
+        Its pose, and how well its colours agree, 0 to 1.
     """
-    it = view.appearance
-    unit = view.pose.scale * max(scene.size) / max(view.size)
     least, most = SIDES
     found: list[tuple[float, Blob]] = []
     for blob in _patches(scene, it):
@@ -55,10 +57,8 @@ def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPla
     found.sort(key=lambda f: -f[0])
     rival = found[1][0] if len(found) > 1 else 0.0
     if not found or rival * APART > found[0][0] or not looks_alike(scene, it, found[0][1]):
-        return []
-    share = float(np.sqrt(found[0][0]))
-    pose = _pose_of(found[0][1], it, unit, scene.size)
-    return [ThingPlace(view.name, number, it, Match(pose, share, share), share)]
+        return None
+    return _pose_of(found[0][1], it, unit, scene.size), float(np.sqrt(found[0][0]))
 
 
 def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
@@ -70,8 +70,9 @@ def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
 def _patches(scene: Scene, it: Appearance) -> Iterator[Blob]:
     """The connected patches of a thing's own colours, without specks and narrow gaps."""
     own = (it.colours.odds(colour_bins(scene.lab[0])) > OWN).astype(np.uint8)
-    own = cv2.morphologyEx(cv2.morphologyEx(own, cv2.MORPH_OPEN, _SPECK), cv2.MORPH_CLOSE, _GAP)
-    count, labels, boxes, _ = cv2.connectedComponentsWithStats(own)
+    opened = cv2.morphologyEx(own, cv2.MORPH_OPEN, _SPECK)
+    closed = cv2.morphologyEx(opened, cv2.MORPH_CLOSE, _GAP)
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats(closed)
     for k in range(1, count):
         x, y, w, h = (int(v) for v in boxes[k, :4])
         part: NDArray[np.bool_] = np.equal(labels[y : y + h, x : x + w], k)
