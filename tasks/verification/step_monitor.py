@@ -120,8 +120,8 @@ class StepMonitor:
 
 
 def entered(now: float) -> StepMonitor:
-    """The monitor of a step that begins now; what was so before is no evidence that it has begun."""
-    return StepMonitor(entered=now, turn=now, since=now, after=now)
+    """The monitor of a step that begins now."""
+    return StepMonitor(entered=now, since=now, after=now)
 
 
 def update(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, Script, Spell, watch
+from visup.tasks.supervision import beginning
 
 APPROACH = "<t> ::= converging(arm, satellite)"
 THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
@@ -79,6 +80,19 @@ def test_a_first_stage_of_two_things_begins_with_either_that_comes_about() -> No
     nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = Script((*meets, nears), THREE, identities=IDENTITIES)
     assert begun(script, OFFER)["t"] == pytest.approx(3.0, abs=0.4)
+
+
+@pytest.mark.parametrize(
+    ("movers", "at"), [((ARM, SATELLITE), 8.0), ((INTRUDER,), 8.0), ((ARM, INTRUDER), 0.1)]
+)
+def test_a_first_stage_of_two_things_begins_as_all_who_come_set_out(
+    monkeypatch: pytest.MonkeyPatch, movers: tuple[int, ...], at: float
+) -> None:
+    """The giver brings its payload; the offer begins when the receiver, who is named first, sets out, too."""
+    monkeypatch.setattr(beginning, "setting_out", lambda mind: frozenset(movers))
+    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = Script((nears,), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(at, abs=0.4)
 
 
 def dated(script: Script, text: str, until: float = 14.0) -> dict[str, tuple[float, float]]:
