@@ -8,6 +8,7 @@ behind it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from visup.agent.model.fast_replace import replace
@@ -21,6 +22,8 @@ class ContactSettings:
         passing: Relative speed from which one passes the other, image diagonals per second.
         passing_share: The same as a share of the speed at which both move.
         slowed_share: The same as a share of the speed at which they met: braking indicates contact.
+        sure_share: The same where the velocity is known well: what eases alongside brakes long before; and
+        sure_sigmas: by how many standard deviations the speed must lie above that.
         settled_s: How long they must not pass each other to have settled.
         unknown_s: How long outlines must meet to have settled while their motion is unknown.
         doubt_share: Distance passed across the other, in sizes of the smaller one, from which one is
@@ -30,6 +33,8 @@ class ContactSettings:
     passing: float = 0.0125
     passing_share: float = 0.5
     slowed_share: float = 0.4
+    sure_share: float = 0.15
+    sure_sigmas: float = 3.0
     settled_s: float = 0.15
     unknown_s: float = 0.5
     doubt_share: float = 0.4
@@ -67,6 +72,7 @@ def updated_contact(
     moment: tuple[float, float],
     settings: ContactSettings,
     *,
+    sigma: float = math.inf,
     thrown_back: bool = False,
 ) -> OutlineContact:
     """Update the contact of two bodies whose outlines meet.
@@ -77,6 +83,7 @@ def updated_contact(
         limit: Speed from which one passes the other, pixels per second.
         moment: Current time, and time since the previous update, seconds.
         settings: Settings.
+        sigma: Standard deviation of the speed, pixels per second.
         thrown_back: Whether they separate on the side on which they met, which implies contact.
     """
     now, dt = moment
@@ -87,6 +94,8 @@ def updated_contact(
     if speed is not None:
         contact = replace(contact, fastest=max(contact.fastest, speed), known_at=now)
         passing = speed > max(limit, settings.slowed_share * contact.fastest)
+        least = max(limit, settings.sure_share * contact.fastest)
+        passing |= speed - settings.sure_sigmas * sigma > least
         if passing is not contact.passing or not contact.known:
             contact = replace(contact, passing=passing, changed_at=now, known=True)
         path = contact.path + speed * dt if passing else 0.0

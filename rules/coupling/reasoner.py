@@ -15,6 +15,7 @@ be apart in space: with the depth of one of the two unknown this is not told apa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -277,7 +278,10 @@ class CouplingReasoner(ExplainableReasoner):
         moment, crossed = (mind.time, dt), before.contact.path if before.contact else 0.0
         least = s.doubt_share * smaller_size(seen.pair, mind)
         back = seen.diverging == YES and crossed < least
-        return updated_contact(before.contact, speed, limit, moment, s, thrown_back=back)
+        sigma = math.inf if found is None else found.speed_sigma
+        return updated_contact(
+            before.contact, speed, limit, moment, s, sigma=sigma, thrown_back=back
+        )
 
     def _leaves(
         self,

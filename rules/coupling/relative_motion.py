@@ -316,6 +316,14 @@ class RelativeVelocity:
     covariance: Floats
     span: float
 
+    @property
+    def speed_sigma(self) -> float:
+        """Standard deviation of the speed, pixels per second."""
+        speed = float(np.hypot(*self.velocity))
+        if speed <= 0.0:
+            return float(np.sqrt(np.trace(self.covariance)))
+        return float(np.sqrt(self.velocity @ self.covariance @ self.velocity)) / speed
+
     def rest_odds(self, still: float, moving: float) -> float:
         """Log odds of rest against motion, given this velocity.
 

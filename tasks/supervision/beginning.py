@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from visup.agent import Mind, StageBelief, Status, TaskBelief
 from visup.agent.model.fast_replace import replace
 from visup.rules.relations.reasoner import sample_window
-from visup.tasks.automaton.states import leaves
+from visup.tasks.automaton.states import TaskStep, leaves
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.verification.dating import stage_onset
+from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.setting_out import setting_out
 
 
@@ -81,13 +82,25 @@ beginning."""
 
 
 def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
-    """Whether an actor of the most likely active steps starts to move, or has just appeared."""
+    """Whether actors of the most likely active steps start to move, or have just appeared.
+
+    A stage of several steps begins with the last of them, and who is named first is the one that comes or
+    goes: that a giver brings a payload does not begin what the receiver does.
+    """
     if posterior is None or posterior.likeliest.finished is not None:
         return False
-    actors = {a for leaf in leaves(posterior.likeliest.state) for a in leaf.step.actors}
+    steps = [x.step for x in leaves(posterior.likeliest.state)]
+    actors = {a for step in steps for a in step.actors}
     ids, mind = snapshot.objects(tuple(actors)), snapshot.mind
     came = [mind.objects[i].first_seen for i in ids if i in mind.objects]
     start = min((b.first_seen for b in mind.objects.values()), default=0.0)
     if came and max(came) - start > CAME_LATER_S:
         return True
-    return not setting_out(mind).isdisjoint(ids)
+    out = setting_out(mind)
+
+    def stirs(step: TaskStep, *, alone: bool) -> bool:
+        leads = step.actors[:1] if step.action in TRENDS and not alone else step.actors
+        return not out.isdisjoint(snapshot.objects(leads))
+
+    stages = [[s for s in steps if s.stage == stage] for stage in {s.stage for s in steps}]
+    return any(all(stirs(s, alone=len(stage) == 1) for s in stage) for stage in stages)

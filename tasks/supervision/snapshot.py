@@ -11,6 +11,7 @@ from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.verification.observation import NOTHING_KEPT, ActionObservation, Kept
 from visup.tasks.verification.observe import RelationLookup
 from visup.tasks.verification.observe import observe as observe_action
+from visup.tasks.verification.passing import gap_between
 from visup.tasks.verification.stage_conditions import ConditionEvaluator
 
 
@@ -84,7 +85,8 @@ class TaskSnapshot:
             absent = any(
                 o is None and a in self._spare for a, o in zip(actors, objects, strict=True)
             )
-            self._seen[key] = replace(seen, absent=True) if absent else seen
+            gap = gap_between(self.mind, objects)
+            self._seen[key] = replace(seen, absent=absent, distance=gap)
         return self._seen[key]
 
     def _holds(self, action: str, actors: tuple[str, ...]) -> Truth:

@@ -2,9 +2,9 @@
 
 Read in this order: `observe.py` (the current observation of an action), `passing.py` (outlines that meet
 while one body moves on), `stage_conditions.py` (conditions of the task on the beginning, end, progress and
-failure of a step), `step_monitor.py` (the status of a step over time), `together.py` (actions joined by `&`),
-`setting_out.py` (motion onset), `reported.py` (relations of actors as reported), `step_model.py` (the
-likelihood of observations), `settings.py` (the time constants).
+failure of a step), `step_monitor.py` (the status of a step over time), `recovery.py` (those who have come
+apart), `together.py` (actions joined by `&`), `setting_out.py` (motion onset), `reported.py` (relations of
+actors as reported), `step_model.py` (the likelihood of observations), `settings.py` (the time constants).
 """
 
 from visup.tasks.verification.observation import ActionObservation

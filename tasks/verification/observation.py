@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from visup.agent import Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.rhythm import Beats
-from visup.tasks.automaton.states import TaskStep
+from visup.tasks.automaton.states import RunningDeadline, TaskStep
 from visup.tasks.verification.pauses import NO_PAUSES, PauseRecord
 
 
@@ -32,6 +32,7 @@ class ActionObservation:
         absent: Whether one of its actors is optional and has no object: then the step is not due.
         moves_on: Whether it is a contact at which neither has slowed down yet.
         unreached: Since when it is an approach, or carrying, that is over without what it was for, or None.
+        distance: Gap of its two actors, pixels; None if unknown, or if it has not two.
         carried_past: Whether it would begin by a contact, but one of the two is known now to be carried past.
     """
 
@@ -51,6 +52,7 @@ class ActionObservation:
     moves_on: bool = False
     carried_past: bool = False
     unreached: float | None = None
+    distance: float | None = None
 
     def elapsed(self, step: TaskStep, since: float, now: float) -> float:
         """Seconds from one time to another in which the work on a step was not paused."""
@@ -66,6 +68,17 @@ class ActionObservation:
 
 
 UNOBSERVED = ActionObservation()
+
+
+def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadline | None:
+    """The first expired `within` around the step, or None; it is suspended in pauses around it."""
+
+    def left(due: RunningDeadline) -> float:
+        if not due.pauses:
+            return due.at - now
+        return due.seconds - seen.pauses.elapsed(due.pauses, due.at - due.seconds, now)
+
+    return next((d for d in step.deadlines if left(d) < 0.0), None)
 
 
 @dataclass(frozen=True, slots=True)

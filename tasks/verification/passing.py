@@ -194,6 +194,14 @@ def gapes(mind: Mind, a: int, b: int) -> bool:
     return kinematics(mind).pair("gap", a, b) > LET_GO_GAP * image_diagonal(mind.frame_size)
 
 
+def gap_between(mind: Mind, objects: tuple[int | None, ...]) -> float | None:
+    """The gap between the outlines of two bodies, pixels; None if unknown, or if there are not two."""
+    if len(objects) != 2 or objects[0] is None or objects[1] is None:
+        return None
+    gap = kinematics(mind).pair("gap", objects[0], objects[1])
+    return None if math.isnan(gap) else gap
+
+
 def _contact(mind: Mind, objects: tuple[int, ...]) -> OutlineContact | None:
     evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
     return None if evidence is None else evidence.contact

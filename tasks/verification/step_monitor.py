@@ -12,7 +12,8 @@ from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import RunningDeadline, TaskStep
-from visup.tasks.verification.observation import UNOBSERVED, ActionObservation
+from visup.tasks.verification.observation import UNOBSERVED, ActionObservation, overdue
+from visup.tasks.verification.recovery import farthest, regained
 from visup.tasks.verification.reported import ReportedRelations, with_reported
 from visup.tasks.verification.settings import TaskSettings
 
@@ -72,6 +73,7 @@ class StepMonitor:
         told: Reported relations of it and of earlier steps; incompatible ones are reported to begin later.
         earliest: The earliest time at which it can have begun: when the previous step was first observed, or
             had lasted as long as required.
+        farthest: Greatest gap of its actors since it fails, pixels; None while it does not, or if unknown.
     """
 
     entered: float
@@ -109,6 +111,7 @@ class StepMonitor:
     fulfilled_at: float | None = None
     told: ReportedRelations = ()
     earliest: float = -math.inf
+    farthest: float | None = None
 
     @property
     def begun_anew(self) -> bool:
@@ -149,6 +152,8 @@ def update(
     worked = partial(seen.elapsed, step)
     if monitor.early:
         monitor, seen = _disregard_early(monitor, seen, moment, settings, worked)
+    gap = farthest(monitor.farthest, seen) if monitor.status in BAD else None
+    monitor = monitor if gap == monitor.farthest else replace(monitor, farthest=gap)
     noted = _note_progress(monitor, step, meaning, seen, moment, settings)
     noted = _note_contrary(noted, seen, now)
     noted = _note_lateness(noted, step, meaning, seen, now)
@@ -254,17 +259,6 @@ def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> boo
     return monitor.fulfilled and (not meaning.lasts or explicit)
 
 
-def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadline | None:
-    """The first expired `within` around the step, or None; it is suspended in pauses around it."""
-
-    def left(due: RunningDeadline) -> float:
-        if not due.pauses:
-            return due.at - now
-        return due.seconds - seen.pauses.elapsed(due.pauses, due.at - due.seconds, now)
-
-    return next((d for d in step.deadlines if left(d) < 0.0), None)
-
-
 def _note_progress(
     monitor: StepMonitor,
     step: TaskStep,
@@ -308,7 +302,9 @@ def _note_progress(
         helped_by=seen.helps.name if seen.helps else monitor.helped_by,
         helped_since=seen.helps.since if seen.helps else monitor.helped_since,
         helped_at=now if helping else monitor.helped_at,
-        better_since=_first(monitor.better_since, now) if helping and not seen.contrary else None,
+        better_since=_first(monitor.better_since, now)
+        if helping and not seen.contrary and regained(monitor.farthest, seen)
+        else None,
         ceased=ceased,
         denied=monitor.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
         unseen_since=None,

@@ -43,9 +43,13 @@ class SuddenTrends:
         self._found: dict[tuple[str, tuple[int, ...]], Relation | None] = {}
 
     def first(self, names: Iterable[str], ids: tuple[int, ...]) -> Relation | None:
-        """The first of some relations that is a trend which has just set in, or None."""
+        """The first of some relations that is a trend which has just set in, or None.
+
+        Who is named first is the one that comes or goes. While only the other one moves, the trend must last.
+        """
         found = (self._trend(name, ids) for name in names if name in SIGNS)
-        return next((t for t in found if t is not None), None)
+        sudden = next((t for t in found if t is not None), None)
+        return None if sudden is None or self._comes_by_the_other(ids) else sudden
 
     def ends(self, relation: Relation) -> bool:
         """Whether a relation is a trend of which the opposite has just set in."""
@@ -56,6 +60,12 @@ class SuddenTrends:
         if (name, ids) not in self._found:
             self._found[name, ids] = sudden_trend(self._mind, name, ids)
         return self._found[name, ids]
+
+    def _comes_by_the_other(self, ids: tuple[int, ...]) -> bool:
+        """Whether the second of two moves while the first one rests, as far as is known."""
+        now, still = kinematics(self._mind), RelationSettings().still_speed
+        still *= image_diagonal(self._mind.frame_size)
+        return now.one("speed", ids[0]) < still < now.one("speed", ids[1])
 
 
 def sudden_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:

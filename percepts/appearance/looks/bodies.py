@@ -47,5 +47,4 @@ def body_colours(scene: Scene, it: Appearance, blob: Blob) -> tuple[float, float
     own = it.colours.odds(colour_bins(lab)) > OWN
     beside = float(np.mean(own[ring])) if ring.any() else 0.0
     colours = learn_colours(lab, seen.astype(np.float32), ring.astype(np.float32))
-    alike = float(np.minimum(colours.thing, it.colours.thing).sum())
-    return float(np.mean(own[seen])) - beside, alike
+    return float(np.mean(own[seen])) - beside, colours.shared(it.colours)

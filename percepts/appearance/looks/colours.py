@@ -42,6 +42,10 @@ class ColourModel:
         """
         return self.table[bins]
 
+    def shared(self, other: ColourModel) -> float:
+        """Common share of the colours of two objects, 0 to 1."""
+        return float(np.minimum(self.thing, other.thing).sum())
+
     def blended(self, other: ColourModel, thing: float, around: float) -> ColourModel:
         """This model blended with shares of another's object and surroundings."""
         return colour_model(

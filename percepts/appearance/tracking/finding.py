@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.bodies import MovingBody, body_colours
+from visup.percepts.appearance.looks.patches import only_patch
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
@@ -129,6 +130,22 @@ def _place_of(scene: Scene, view: ViewModel, number: int, body: MovingBody) -> T
     pose = PatchPose((left + right - 1) / 2, (top + bottom - 1) / 2, unit)
     share = float(np.sqrt(min(1.0, excess) * alike))
     return ThingPlace(view.name, number, it, Match(pose, share, share), share)
+
+
+def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
+    """The only patch of the picture with an object's colours and about its size, if there is one.
+
+    Args:
+        scene: The frame.
+        view: The taught view.
+        number: Its number.
+    """
+    it, unit = view.appearance, home_of(scene, view).scale
+    found = only_patch(scene, it, unit)
+    if found is None:
+        return []
+    pose, share = found
+    return [ThingPlace(view.name, number, it, Match(pose, share, share), share)]
 
 
 def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:

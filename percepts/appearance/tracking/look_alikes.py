@@ -8,6 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
+from visup.percepts.appearance.looks.patches import ALIKE
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
@@ -30,6 +31,8 @@ def look_alikes(views: Sequence[ViewModel]) -> LookAlikes:
 
 
 def _like(it: Appearance, other: Appearance) -> bool:
+    if it.colours.shared(other.colours) < ALIKE:
+        return False  # one is seen beside the other in its view, say
     height, width = other.shape
     shown = Scene(0.0, [other.lab], np.ascontiguousarray(other.lab[..., 0]), (width, height))
     middle = PatchPose((width - 1) / 2, (height - 1) / 2, other.radius / it.radius)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.patches import looks_alike
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
@@ -53,12 +54,19 @@ def recalled(
     number, best = _elsewhere(track, number, best, views, scene)
     taught = views[number].appearance
     blob = footprint(scene, best.pose, taught)
-    if best.score < DOUBTFUL and track.state is State.RESTING and not track.proven:
+    doubtful = best.score < DOUBTFUL and track.state is State.RESTING and not track.proven
+    if doubtful and not _has_colours(track, views, scene):
         # It passed for the object while it moved; at rest it does not look like it.
         return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
     if best.score <= SURE or blob is None or any(overlap(blob, o) > 0.5 for o in others):
         return track
     return replace(_as_taught(track, number, best, views, scene), proven=True)
+
+
+def _has_colours(track: ThingTrack, views: Sequence[ViewModel], scene: Scene) -> bool:
+    """Whether what is seen of a track has the colours of its object, beyond doubt."""
+    it = views[track.number].appearance
+    return track.visible is not None and looks_alike(scene, it, track.visible)
 
 
 def _strayed(track: ThingTrack, best: Match) -> bool:

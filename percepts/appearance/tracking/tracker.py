@@ -23,6 +23,7 @@ from visup.percepts.appearance.tracking.finding import (
     assigned,
     body_places,
     candidates,
+    coloured_places,
     footprint,
     lost_places,
     moving_places,
@@ -189,6 +190,7 @@ class ThingTracker:
         found = self._searched(scene, due)
         new = {t.name for t in lost if not t.id}
         found += self._moving(scene, bodies, new - {f.name for f in found})
+        found += self._coloured(scene, (new & {t.name for t in due}) - {f.name for f in found})
         taken = [b for t in self.tracks if t.state in IN_VIEW for b in _occupied(t, scene)]
         placed = self._settled(assigned(scene, found, taken), scene)
         names = {t.name for t in due}
@@ -213,6 +215,11 @@ class ThingTracker:
         known = {t.id for t in self.tracks}
         free = [b for b in bodies if b.id not in known]
         return [c for k, v in self._views_of(names) for c in body_places(scene, v, k, free)]
+
+    def _coloured(self, scene: Scene, names: Collection[str]) -> list[ThingPlace]:
+        """Places of objects by their colours alone; these do not tell look-alikes apart."""
+        sought = [(k, v) for k, v in self._views_of(names) if not self._alike[k]]
+        return [c for k, v in sought for c in coloured_places(scene, v, k)]
 
     def _views_of(self, names: Collection[str]) -> list[tuple[int, ViewModel]]:
         """The views of some objects, each with its number."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from hypothesis import given
@@ -35,6 +36,38 @@ def test_what_passes_by_never_settles_and_its_path_grows() -> None:
 
 def test_what_moves_on_has_settled_no_more() -> None:
     assert seen([0.0] * 5 + [30.0]).settled_since is None
+
+
+def eased(sigma: float) -> OutlineContact:
+    """A boat that eases alongside: it keeps a fifth of its speed for a while, known to within `sigma`."""
+    contact = None
+    for k, speed in enumerate([100.0] * 5 + [20.0] * 5):
+        contact = updated_contact(contact, speed, LIMIT, (k * DT, DT), SETTINGS, sigma=sigma)
+    assert contact is not None
+    return contact
+
+
+def test_what_eases_alongside_settles_late_where_its_velocity_is_known_well() -> None:
+    assert eased(sigma=0.5).settled_since is None
+    assert eased(sigma=5.0).settled_since is not None
+    assert eased(sigma=math.inf) == seen([100.0] * 5 + [20.0] * 5)
+
+
+@given(st.lists(st.floats(0, 40), min_size=1, max_size=30), st.floats(0, 20), st.floats(0, 20))
+def test_nobody_settles_earlier_for_knowing_better(
+    told: list[float], one: float, more: float
+) -> None:
+    kept: list[OutlineContact | None] = [None, None]
+    for k, speed in enumerate(told):
+        moment = k * DT, DT
+        kept = [
+            updated_contact(c, speed, LIMIT, moment, SETTINGS, sigma=sigma)
+            for c, sigma in zip(kept, (one, one + more), strict=True)
+        ]
+        well, badly = kept
+        assert well is not None
+        assert badly is not None
+        assert well.passing >= badly.passing
 
 
 def test_where_nothing_is_known_of_their_motion_it_settles_later() -> None:

@@ -118,6 +118,18 @@ def test_bodies_at_different_depths_pass_each_other() -> None:
     assert not raised(reason(observations))
 
 
+@pytest.mark.parametrize(("across", "threatens"), [(0.0, True), (0.8, True), (3.6, False)])
+def test_who_moves_mostly_across_is_on_no_collision_course(across: float, threatens: bool) -> None:
+    """It comes nearer to a long wall by 20 pixels per second, and goes along it."""
+
+    def at(i: int) -> Observation:
+        wall, body = (60, 60, 520, 40), (80 + across * i, 330 - 0.8 * i, 40, 40)
+        return seen(i, [box_region(1, wall), box_region(2, body)], names=NAMES)
+
+    found = raised(reason(at(i) for i in range(125)))
+    assert (("collision_course", frozenset({1, 2})) in found) is threatens
+
+
 def test_a_body_threatens_what_it_meets_first_and_not_what_stands_behind() -> None:
     observations = (
         seen(o.frame_index, [*o.of("region"), box_region(3, (10, 200, 60, 60))], names=NAMES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, Script, Spell, watch
+from visup.tasks.supervision import beginning
 
 APPROACH = "<t> ::= converging(arm, satellite)"
 THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
@@ -55,6 +56,43 @@ def test_what_the_stage_before_asked_for_already_does_not_begin_the_next() -> No
     nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = carried(Spell("moving_together", 3.0, 12.0), nears)
     assert begun(script, text)["carry"] == pytest.approx(8.0, abs=0.4)
+
+
+OFFER = """
+actor dish is dish
+<t> ::= coupled(arm, satellite) & converging(dish, satellite)
+"""
+
+
+@pytest.mark.parametrize("since", [3.0, 6.0])
+def test_a_first_stage_of_two_things_begins_with_what_was_not_so_from_the_start(
+    since: float,
+) -> None:
+    """A giver holds its payload all the time: an offer begins when the receiver comes."""
+    held = Spell("touching", 0.0, 20.0), Spell("coupled", 0.5, 20.0)
+    nears = Spell("converging", since, 12.0, (SATELLITE, INTRUDER))
+    script = Script((*held, nears), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(since, abs=0.4)
+
+
+def test_a_first_stage_of_two_things_begins_with_either_that_comes_about() -> None:
+    meets = Spell("touching", 3.0, 20.0), Spell("coupled", 3.5, 20.0)
+    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = Script((*meets, nears), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(3.0, abs=0.4)
+
+
+@pytest.mark.parametrize(
+    ("movers", "at"), [((ARM, SATELLITE), 8.0), ((INTRUDER,), 8.0), ((ARM, INTRUDER), 0.1)]
+)
+def test_a_first_stage_of_two_things_begins_as_all_who_come_set_out(
+    monkeypatch: pytest.MonkeyPatch, movers: tuple[int, ...], at: float
+) -> None:
+    """The giver brings its payload; the offer begins when the receiver, who is named first, sets out, too."""
+    monkeypatch.setattr(beginning, "setting_out", lambda mind: frozenset(movers))
+    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = Script((nears,), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(at, abs=0.4)
 
 
 def dated(script: Script, text: str, until: float = 14.0) -> dict[str, tuple[float, float]]:

@@ -3,6 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -186,6 +187,26 @@ def test_what_has_failed_goes_on_only_when_it_went_well_for_as_long() -> None:
     assert task_of(played, 22.0).verdict is Verdict.FAILED
     assert status(played, "approach") is Status.PROGRESSING
     assert task_of(played).verdict is Verdict.IN_PROGRESS
+
+
+def bobbing(nearest: float) -> Script:
+    """Two that met part again, to 40 pixels, and then draw nearer for a while."""
+    spells = (
+        Spell("converging", 0, 4),
+        Spell("touching", 4, 6),
+        Spell("diverging", 6, 9),
+        Spell("converging", 10, 14),
+    )
+    times, gaps = (0.0, 4.0, 6.0, 9.0, 10.0, 13.0), (80.0, 0.0, 0.0, 40.0, 40.0, nearest)
+    return Script(spells, gaps=lambda t: float(np.interp(t, times, gaps)))
+
+
+@pytest.mark.parametrize(("nearest", "mended"), [(36.0, False), (24.0, False), (8.0, True)])
+def test_who_has_parted_recovers_by_coming_back_half_the_way(nearest: float, mended: bool) -> None:
+    berth = "<t> ::= <near> <stay>\n<near> ::= converging(arm, satellite)\n"
+    played = watch(bobbing(nearest), 14.0, berth + "<stay> ::= touching(arm, satellite) for 5 s")
+    assert status(played, "stay", 9.5) is Status.FAILING
+    assert (status(played, "stay") is Status.PROGRESSING) is mended
 
 
 def test_a_capture_that_is_lost_at_once_is_no_success() -> None:

@@ -19,14 +19,16 @@ NOW = float(TIMES[-1])
 SINCE = float(TIMES[-5])
 
 
-def mind(rate: float, speed: float = 0.0, relations: tuple[Relation, ...] = ()) -> Mind:
+def mind(
+    rate: float, speed: float | tuple[float, float] = 0.0, relations: tuple[Relation, ...] = ()
+) -> Mind:
     """Two bodies whose distance begins to change at that rate, pixels per second, a moment ago."""
     apart = np.full((len(TIMES), 2, 2), np.nan)
     apart[:, 0, 1] = apart[:, 1, 0] = 40.0 + rate * np.maximum(0.0, TIMES - SINCE)
     tables = np.zeros((5, 2, 2))
     tables[3] = abs(rate)
     tables[1] = rate
-    now = Kinematics((1, 2), tables, np.zeros((3, 2, 2)), np.full(2, speed))
+    now = Kinematics((1, 2), tables, np.zeros((3, 2, 2)), np.broadcast_to(speed, 2))
     memory = RelationMemory(SampleWindow(ids=(1, 2), times=TIMES, separation=apart), now)
     return Mind(time=NOW, frame_size=(480, 360)).remember(RELATIONS, memory, relations=relations)
 
@@ -67,6 +69,21 @@ def test_an_action_begins_by_it_but_does_not_hold_yet() -> None:
     closing = observe(ACTIONS["converging"], (1, 2), RelationLookup(mind(90.0, relations=stale)))
     assert closing.entry is closing.sudden is None
     assert closing.held_by is not None
+
+
+@pytest.mark.parametrize(
+    ("speeds", "begins"),
+    [((0.0, 90.0), False), ((90.0, 0.0), True), ((0.0, 0.0), True), ((np.nan, 90.0), True)],
+)
+def test_who_is_named_first_comes_or_the_trend_must_last(
+    speeds: tuple[float, float], begins: bool
+) -> None:
+    """Of an arm that bends, hardly any speed is seen; so only who rests while the other moves waits."""
+    seen = observe(ACTIONS["converging"], (1, 2), RelationLookup(mind(-90.0, speeds)))
+    assert (seen.entry is not None) is begins
+    lasting = (Relation("converging", (1, 2), Truth.TRUE, 0.0),)
+    later = observe(ACTIONS["converging"], (1, 2), RelationLookup(mind(-90.0, speeds, lasting)))
+    assert later.entry is not None
 
 
 def passing(relative_speed: float) -> Mind:
