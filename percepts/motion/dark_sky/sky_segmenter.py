@@ -21,6 +21,7 @@ class DarkSkySegmenter:
     def __init__(self) -> None:
         self._bodies: Bodies = ()
         self._ground: Point = (0.0, 0.0)
+        self._last_key = 0
 
     def step(
         self,
@@ -50,7 +51,8 @@ class DarkSkySegmenter:
             self._bodies = ()
             return regions
         here = SkyFrame(tone, found, frame.time, self._ground)
-        bodies = follow(self._bodies, here)
+        bodies = follow(self._bodies, here, self._last_key + 1)
+        self._last_key = max([self._last_key, *(b.key for b in bodies)])
         members = members_of(bodies, regions, found.bright, frame.time)
         diagonal = float(np.hypot(*frame.size))
         self._bodies = bodies_with_ids(bodies, members, ids, diagonal)

@@ -55,12 +55,13 @@ class SkyFrame:
     ground: Point
 
 
-def follow(bodies: Bodies, frame: SkyFrame) -> Bodies:
+def follow(bodies: Bodies, frame: SkyFrame, first: int) -> Bodies:
     """The bodies in the next frame, by key: those that were followed, and new ones.
 
     Args:
         bodies: Those of the frame before.
         frame: The frame.
+        first: Key of the first new body; no other one has had it.
     """
     within = [_component(b, frame) for b in bodies]
     now = frame.now
@@ -70,7 +71,6 @@ def follow(bodies: Bodies, frame: SkyFrame) -> Bodies:
             [b for b, c in zip(bodies, within, strict=True) if c == component], component, frame
         )
     out = [b for b in out if now - b.seen <= HIDDEN_S]
-    first = max((b.key for b in bodies), default=0) + 1
     born = now if bodies else -inf
     new = [c for c in range(1, len(frame.found.areas)) if c not in within]
     return (*sorted(out, key=_key), *(_new(first + i, c, frame, born) for i, c in enumerate(new)))

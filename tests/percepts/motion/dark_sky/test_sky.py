@@ -49,6 +49,13 @@ def test_stars_are_no_bodies() -> None:
     assert len(found.areas) == 1
 
 
+def test_a_star_beside_a_body_is_no_part_of_it() -> None:
+    found = bright_components(painted([disc(60, 60, 12), disc(77, 60, 1.5)], [90, 255]), 200.0)
+    assert found is not None
+    assert found.bright[60, 60]
+    assert not found.bright[60, 77]
+
+
 def test_a_narrow_gap_does_not_part_a_body_but_stays_dark() -> None:
     gap = joining_gap(SHAPE) - 2
     halves = bar(40, 60, 40, 60) | bar(60 + gap, 80, 40, 60)
@@ -66,7 +73,7 @@ def test_a_narrow_gap_does_not_part_a_body_but_stays_dark() -> None:
     [
         ("daylight", np.full(SHAPE, 120, np.uint8)),
         ("a little black", painted([bar(0, 160, 14, 120)], [120])),
-        ("a dark room", painted([bar(0, 160, 0, 40), bar(0, 60, 40, 120)], [22, 16])),
+        ("a dark room", painted([bar(0, 160, 0, 18), bar(0, 160, 18, 36)], [20, 26])),
         ("a noisy picture", np.random.default_rng(1).integers(0, 40, SHAPE).astype(np.uint8)),
     ],
 )

@@ -68,6 +68,29 @@ def test_two_bodies_keep_their_own_regions() -> None:
     }
 
 
+def test_a_track_that_passes_to_another_body_does_not_lend_it_the_number() -> None:
+    a, b, run = disc(40, 60, 12), disc(120, 60, 12), Run(last=1)
+    assert [r.id for r in run.step(painted([a, b], [120, 90]), [region(a, 1)])] == [1]
+    found = run.step(painted([a, b], [120, 90], 1), [region(b, 1)])
+    assert len({r.id for r in found}) == len(found) == 2
+    own = next(r for r in found if r.id == 1)
+    assert alike(whole(own), a) > 0.85
+
+
+def test_a_body_in_full_view_moves_as_its_way_tells() -> None:
+    run = Run(last=1)
+    for k in range(12):
+        body = disc(60 + 0.5 * k, 60, 14)
+        found = run.step(painted([body], [120], k), [region(body, 1)])
+    assert found[0].velocity[0] == pytest.approx(0.5 * FPS, rel=0.3)
+
+
+def test_small_holes_are_filled() -> None:
+    ring, run = disc(80, 60, 16) & ~disc(80, 60, 3), Run(last=1)
+    found = run.step(painted([ring], [120]), [region(ring, 1)])
+    assert whole(found[0])[60, 80]
+
+
 def test_a_body_at_rest_is_reported_only_once_it_drifts() -> None:
     run = Run(last=5)
     for k in range(20):

@@ -27,7 +27,9 @@ def followed(scene: Scene, frames: int) -> list[Bodies]:
         tone = painted(masks, levels, k, corners)
         found = bright_components(tone, 40.0)
         assert found is not None
-        out.append(follow(out[-1] if out else (), SkyFrame(tone, found, k / FPS, (0.0, 0.0))))
+        first = max((b.key for bodies in out for b in bodies), default=0) + 1
+        here = SkyFrame(tone, found, k / FPS, (0.0, 0.0))
+        out.append(follow(out[-1] if out else (), here, first))
     return out
 
 
@@ -76,6 +78,34 @@ def test_the_arm_that_takes_hold_of_a_body_does_not_swallow_it() -> None:
     assert not last[satellite].alone
     assert last[arm].cut
     assert not last[satellite].cut
+
+
+def test_an_arm_that_reaches_across_a_body_is_one_arm_before_one_body() -> None:
+    def scene(k: int) -> tuple[Masks, Sequence[float], Sequence[tuple[float, float]]]:
+        reach = min(30 + k, 120)
+        return [disc(80, 60, 16), bar(0, reach, 56, 64)], [150, 90], [(80, 60), (reach, 60)]
+
+    all_ = followed(scene, 100)
+    satellite, arm = (body_at(all_[0], m).key for m in scene(0)[0])
+    last = {b.key: b for b in all_[-1]}
+    behind, before = scene(99)[0]
+    assert set(last) == {satellite, arm}
+    assert alike(last[arm].visible, before) > 0.85
+    assert alike(last[satellite].visible, behind & ~before) > 0.85
+
+
+def test_what_comes_off_for_a_moment_is_a_part() -> None:
+    """A shadow runs across a body, and for some frames parts an end of it from the rest."""
+
+    def scene(k: int) -> tuple[Masks, Sequence[float], Sequence[tuple[float, float]]]:
+        shadow = bar(72, 80, 40, 80) if 20 <= k < 25 else bar(0, 0, 0, 0)
+        return [bar(40, 95, 50, 70), shadow], [120, 4], [(40, 50), (0, 0)]
+
+    all_ = followed(scene, 40)
+    assert len(all_[22]) == 2
+    assert len(all_[-1]) == 1
+    assert all_[-1][0].key == all_[0][0].key
+    assert alike(all_[-1][0].visible, scene(39)[0][0]) > 0.9
 
 
 def test_a_hidden_body_is_the_same_when_it_is_seen_again() -> None:
@@ -142,7 +172,7 @@ def test_a_slow_drift_is_told_from_rest(speed: float, angle: float) -> None:
             picture = tone(k, moving)
             found = bright_components(picture, 40.0)
             assert found is not None
-            bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)))
+            bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)), 1)
             told = told or bodies[0].drifted(200.0)
         assert told == moving
 
@@ -153,5 +183,30 @@ def test_a_drift_with_the_ground_is_no_drift() -> None:
         picture = painted([disc(40 + k, 60, 12)], [120], seed=k)
         found = bright_components(picture, 40.0)
         assert found is not None
-        bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (float(k), 0.0)))
+        bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (float(k), 0.0)), 1)
         assert not bodies[0].drifted(200.0)
+
+
+def test_what_wobbles_in_place_has_not_drifted() -> None:
+    rng = np.random.default_rng(3)
+    bodies: Bodies = ()
+    for k in range(60):
+        dx, dy = rng.normal(0, 0.4, 2)
+        picture = painted([disc(80 + dx, 60 + dy, 14)], [120], seed=k)
+        found = bright_components(picture, 40.0)
+        assert found is not None
+        bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)), 1)
+        assert not bodies[0].drifted(200.0)
+
+
+def test_what_comes_in_moves_as_its_end_in_view_does() -> None:
+    """Its centre moves at half that speed while more and more of it comes over the border."""
+
+    def scene(k: int) -> tuple[Masks, Sequence[float], Sequence[tuple[float, float]]]:
+        return [bar(0, 10 + 2 * k, 50, 66), disc(140, 20, 8)], [120, 90], [(2 * k, 50), (140, 20)]
+
+    bodies = followed(scene, 25)[-1]
+    came = body_at(bodies, scene(24)[0][0])
+    assert came.cut
+    assert abs(came.velocity[0] - 2 * FPS) < 0.2 * FPS
+    assert abs(came.velocity[1]) < 0.2 * FPS

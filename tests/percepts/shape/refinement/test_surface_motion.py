@@ -12,7 +12,11 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel, mesh_model
 from visup.percepts.shape.refinement.pose_fit import USUAL_FOCAL, PoseFit
 from visup.percepts.shape.refinement.pose_refiner import _KnownOrientations
 from visup.percepts.shape.refinement.region_picture import region_picture
-from visup.percepts.shape.refinement.surface_motion import FollowedSurface, followed_surface
+from visup.percepts.shape.refinement.surface_motion import (
+    FollowedSurface,
+    followed_surface,
+    surface_picture,
+)
 from visup.render.meshes.spacecraft import spartan
 from visup.testing import region_of
 
@@ -69,6 +73,26 @@ def test_a_rotation_is_told_to_a_fraction_of_a_degree() -> None:
         rolls.append(np.degrees(abs(Rotation.from_matrix(now @ after.T).as_rotvec()[2])))
     assert np.median(errors) < 0.7
     assert np.median(rolls) < 0.25
+
+
+@pytest.mark.parametrize(("textured", "near"), [(False, True), (True, False)])
+def test_corners_of_the_outline_are_followed_only_beside_a_plain_background(
+    textured: bool, near: bool
+) -> None:
+    frame, region = seen(satellite(), np.eye(3))
+    mask = region.full_mask((SIDE, SIDE))
+    if textured:
+        noise = np.random.default_rng(2).integers(0, 255, (SIDE, SIDE, 3)).astype(np.uint8)
+        image = np.where(mask[..., None], frame.image, noise)
+        frame = Frame(0, 0.0, image)
+    picture = surface_picture(frame, region)
+    assert picture is not None
+    x, y, w, h = region.bbox
+    height, width = picture.grey.shape
+    at = picture.points + np.array([x + (w - width) / 2, y + (h - height) / 2])
+    inner = cv2.erode(mask.view(np.uint8), np.ones((3, 3), np.uint8))
+    column, row = np.round(at).astype(int).T
+    assert bool((inner[row, column] == 0).any()) == near
 
 
 def test_another_surface_is_not_followed() -> None:
