@@ -94,6 +94,22 @@ def test_an_arm_that_reaches_across_a_body_is_one_arm_before_one_body() -> None:
     assert alike(last[satellite].visible, behind & ~before) > 0.85
 
 
+def test_a_body_that_is_hauled_into_the_light_is_followed_to_where_it_stops() -> None:
+    def scene(k: int) -> tuple[Masks, Sequence[float], Sequence[tuple[float, float]]]:
+        way = 0.5 * min(max(k - 15, 0), 60)
+        light = 80 + 2 * min(max(k - 15, 0), 60)
+        masks = [disc(80 + way, 60, 16), bar(0, round(66 + way), 56, 64)]
+        return masks, [light, 100], [(80 + way, 60), (66 + way, 60)]
+
+    before = [disc(80, 60, 16), bar(0, 58, 56, 64)], [80.0, 100.0], [(80.0, 60.0), (58.0, 60.0)]
+    all_ = followed(lambda k: before if k < 15 else scene(k), 110)
+    satellite = body_at(all_[0], before[0][0]).key
+    last = next(b for b in all_[-1] if b.key == satellite)
+    assert alike(last.visible, scene(109)[0][0] & ~scene(109)[0][1]) > 0.8
+    # It is remembered as it looks now, not as it looked when it was last alone.
+    assert abs(float(last.look.tone[last.look.mask].mean()) - 200) < 20
+
+
 def test_what_comes_off_for_a_moment_is_a_part() -> None:
     """A shadow runs across a body, and for some frames parts an end of it from the rest."""
 
