@@ -193,20 +193,8 @@ class MotionSegmenter:
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
         regions = self._shadows.step(frame, scene, regions, static=self._static.active)
-        regions = self._sky.step(
-            frame, regions, self._ground_shift(scene), self._least(scene), self._ids
-        )
+        regions = self._sky.step(frame, scene, regions, self._ids, self.settings)
         return select_regions(regions, directives)
-
-    def _ground_shift(self, scene: FrameMeasurements) -> tuple[float, float]:
-        """From the middle of the image to where the ground there was one frame before, frame pixels."""
-        height, width = scene.image.shape
-        x, y = scene.measured[0].background.models[-1].shift((width / 2, height / 2))
-        return x / scene.image.scale, y / scene.image.scale
-
-    def _least(self, scene: FrameMeasurements) -> float:
-        """Least area of a region, frame pixels."""
-        return min_region_area(scene, self.settings) / scene.image.scale**2
 
     @property
     def _asks(self) -> bool:

@@ -26,7 +26,7 @@ Slices = tuple[slice, slice]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class BodyLook:
     """How a body looked when it was last seen alone, or whole.
 
     Attributes:
@@ -63,7 +63,7 @@ class SkyBody:
     """
 
     key: int
-    look: Look
+    look: BodyLook
     corner: Corner
     visible: Mask
     seen: float
@@ -108,7 +108,7 @@ class SkyBody:
         wobble = float(np.sqrt(np.mean(np.sum((places - times @ course) ** 2, axis=1))))
         return float(np.hypot(*course[1])) > max(DRIFT * diagonal, STEADY * wobble)
 
-    def looking(self, look: Look, ground: Point, now: float, *, alone: bool) -> SkyBody:
+    def looking(self, look: BodyLook, ground: Point, now: float, *, alone: bool) -> SkyBody:
         """The body in the next frame, when it looks like this.
 
         Args:
@@ -140,13 +140,13 @@ class SkyBody:
         return replace(known, settled=settled, whole=self.whole or (self.alone and not self.cut))
 
 
-def sides_of(look: Look, shape: tuple[int, ...]) -> Sides:
+def sides_of(look: BodyLook, shape: tuple[int, ...]) -> Sides:
     """Whether a look touches the left, upper, right and lower border of the image."""
     (x, y), (h, w) = look.corner, look.mask.shape
     return x <= 0, y <= 0, x + w >= shape[1], y + h >= shape[0]
 
 
-def _anchor(look: Look, corner: Corner, sides: Sides) -> Point:
+def _anchor(look: BodyLook, corner: Corner, sides: Sides) -> Point:
     """A point that moves as the body does: its centre, or its ends in view while the border cuts it."""
     sums = cv2.moments(look.mask.view(np.uint8), binaryImage=True)
     (h, w), (left, top, right, bottom) = look.mask.shape, sides
@@ -164,7 +164,7 @@ def _speed(path: Path) -> Point | None:
     return (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
 
 
-def look_at(mask: Mask, tone: NDArray[np.uint8]) -> Look:
+def look_at(mask: Mask, tone: NDArray[np.uint8]) -> BodyLook:
     """How a body looks.
 
     Args:
@@ -173,12 +173,12 @@ def look_at(mask: Mask, tone: NDArray[np.uint8]) -> Look:
     """
     x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
-    return Look(mask[part].copy(), tone[part].copy(), (x, y))
+    return BodyLook(mask[part].copy(), tone[part].copy(), (x, y))
 
 
 def renewed(
-    look: Look, corner: Corner, visible: Mask, tone: NDArray[np.uint8], bright: Mask
-) -> Look:
+    look: BodyLook, corner: Corner, visible: Mask, tone: NDArray[np.uint8], bright: Mask
+) -> BodyLook:
     """How a body looks when a part of it may be hidden: there as it looked before.
 
     Args:
@@ -196,7 +196,7 @@ def renewed(
     return look_at((pasted(look, corner, shape) & bright) | visible, both)
 
 
-def pasted(look: Look, corner: Corner, shape: tuple[int, int]) -> Mask:
+def pasted(look: BodyLook, corner: Corner, shape: tuple[int, int]) -> Mask:
     """The mask of a look in the image, when its box has this corner; (H, W) bool."""
     out = np.zeros(shape, bool)
     inside, part = overlap(look, corner, shape)
@@ -204,7 +204,7 @@ def pasted(look: Look, corner: Corner, shape: tuple[int, int]) -> Mask:
     return out
 
 
-def overlap(look: Look, corner: Corner, shape: tuple[int, int]) -> tuple[Slices, Slices]:
+def overlap(look: BodyLook, corner: Corner, shape: tuple[int, int]) -> tuple[Slices, Slices]:
     """The part of the image that the box of a look covers, and the same part of the box."""
     (x, y), (h, w) = corner, look.mask.shape
     left, top = min(max(x, 0), shape[1]), min(max(y, 0), shape[0])

@@ -9,7 +9,9 @@ from visup.percepts.motion.dark_sky.body import Point
 from visup.percepts.motion.dark_sky.reporting import bodies_with_ids, members_of, regions_of
 from visup.percepts.motion.dark_sky.sky import bright_components, brightness
 from visup.percepts.motion.dark_sky.tracking import Bodies, SkyFrame, follow
+from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
+from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_region_area
 
 
 class DarkSkySegmenter:
@@ -26,12 +28,38 @@ class DarkSkySegmenter:
     def step(
         self,
         frame: Frame,
+        scene: FrameMeasurements,
+        regions: tuple[Region, ...],
+        ids: IdAllocator,
+        settings: MotionSettings,
+    ) -> tuple[Region, ...]:
+        """The regions of one frame; as they are while there is no dark sky.
+
+        Args:
+            frame: The next frame.
+            scene: The frame as measured.
+            regions: Moving regions.
+            ids: Gives new ids.
+            settings: Give the least area.
+
+        Returns:
+            The regions, by id.
+        """
+        height, width = scene.image.shape
+        x, y = scene.measured[0].background.models[-1].shift((width / 2, height / 2))
+        shift = x / scene.image.scale, y / scene.image.scale
+        least = min_region_area(scene, settings) / scene.image.scale**2
+        return self.outlined(frame, regions, shift, least, ids)
+
+    def outlined(
+        self,
+        frame: Frame,
         regions: tuple[Region, ...],
         shift: Point,
         least: float,
         ids: IdAllocator,
     ) -> tuple[Region, ...]:
-        """The regions of one frame; as they are while there is no dark sky.
+        """The regions of one frame, as `step` returns them.
 
         Args:
             frame: The next frame.

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.dark_sky.body import Corner, Look, SkyBody, Slices, overlap
+from visup.percepts.motion.dark_sky.body import BodyLook, Corner, SkyBody, Slices, overlap
 from visup.percepts.motion.dark_sky.sky import Mask
 
 Tones = NDArray[np.uint8]
@@ -63,7 +63,7 @@ def placed(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
     return ((x - REACH + at[0], y - REACH + at[1]) if fits else (x, y)), fits
 
 
-def _within(look: Look, corner: Corner, shape: tuple[int, ...]) -> tuple[Look, Corner]:
+def _within(look: BodyLook, corner: Corner, shape: tuple[int, ...]) -> tuple[BodyLook, Corner]:
     """The part of a look that stays in the image wherever it is looked for, and where it begins."""
     x, y = corner
     h, w = look.mask.shape
@@ -71,7 +71,7 @@ def _within(look: Look, corner: Corner, shape: tuple[int, ...]) -> tuple[Look, C
     right, bottom = min(w, shape[1] - REACH - x), min(h, shape[0] - REACH - y)
     part = np.s_[top : max(bottom, top), left : max(right, left)]
     tone, mask = np.ascontiguousarray(look.tone[part]), np.ascontiguousarray(look.mask[part])
-    return Look(mask, tone, look.corner), (left, top)
+    return BodyLook(mask, tone, look.corner), (left, top)
 
 
 def split(
@@ -94,7 +94,7 @@ def split(
     x, y, w, h = cv2.boundingRect(union.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
     places = [
-        _Place(b, (at[0] - x, at[1] - y), union[part])
+        _PlacedLook(b, (at[0] - x, at[1] - y), union[part])
         for b, at in zip(bodies, corners, strict=True)
     ]
     fronts = [frozenset(_behind(p, places, tone[part])) for p in places]
@@ -108,7 +108,7 @@ def split(
     return tuple(Share(m, f) for m, f in zip(masks, fronts, strict=True))
 
 
-class _Place:
+class _PlacedLook:
     """Where the look of a body lies in a part of the image.
 
     Attributes:
@@ -130,12 +130,12 @@ class _Place:
         return float(gap[where[inside]].mean())
 
 
-def _behind(one: _Place, places: Sequence[_Place], tone: Tones) -> list[int]:
+def _behind(one: _PlacedLook, places: Sequence[_PlacedLook], tone: Tones) -> list[int]:
     """Keys of the bodies behind one."""
     return [o.body.key for o in places if o is not one and _covers(one, o, tone)]
 
 
-def _covers(one: _Place, other: _Place, tone: Tones) -> bool:
+def _covers(one: _PlacedLook, other: _PlacedLook, tone: Tones) -> bool:
     """Whether one body is in front of another: where both lie, it is more like the image; else as before."""
     before, after = other.body.key in one.body.covers, one.body.key in other.body.covers
     both = one.mask & other.mask

@@ -25,9 +25,9 @@ from visup.percepts.motion.dark_sky.splitting import Share, placed, split
 SHARED = 0.25  # share of the smaller of a body and a component from which they belong together
 GROWS = 1.5  # growth of an area from one frame to the next from which something else has joined
 VISIBLE = 0.5  # share of its look that must be visible for it to be looked at anew beside others
+MOVED = 3  # way, along either axis, pixels, after which it is
+LARGER = 1.03  # growth of its area after which it is
 LEAST_SEEN = 0.05  # share of its look that must be visible for a body not to be hidden
-MOVED = 3  # pixels, along either axis, from which it is
-LARGER = 1.03  # the same, as a growth of its area
 PART = 0.5  # area, as a share of that of a body, up to which what has just come off may be a part of it
 COMING_S = 2.0  # age of a body up to which it has just come into view, seconds
 SAME_WAY = 0.5  # difference of velocities, as a share of the greater, up to which two move alike

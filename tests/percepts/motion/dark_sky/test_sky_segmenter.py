@@ -41,7 +41,7 @@ class Run:
     ) -> tuple[Region, ...]:
         frame = Frame(self.k, self.k / FPS, np.repeat(tone[..., None], 3, axis=2))
         self.k += 1
-        return self.segmenter.step(frame, tuple(regions), shift, 40.0, self.ids)
+        return self.segmenter.outlined(frame, tuple(regions), shift, 40.0, self.ids)
 
 
 def test_fragments_become_one_region_with_the_outline_of_the_body() -> None:
