@@ -18,10 +18,8 @@ from visup.percepts.motion.tracks.id_allocator import IdAllocator
 OVER = 0.5  # share of a region's bright pixels that are a body's, from which it is this body
 BRIGHT = 0.3  # share of a region that must be brighter than the sky
 COVERED = 0.6  # share of a body cut by the border that regions must cover: else it is a ground
-SIGMA = (
-    1.0  # standard deviation of the velocity of a body without a moving region, pixels per second
-)
-CONFIDENCE = 0.9  # confidence in the same
+SIGMA = 1.0  # standard deviation of a velocity measured on the way of a body, pixels per second
+CONFIDENCE = 0.9  # confidence in a body without a moving region
 
 Regions = tuple[Region, ...]
 
@@ -40,11 +38,11 @@ def bodies_with_ids(
     used = {b.id for b in bodies}
     out = []
     for body, regions in zip(bodies, members, strict=True):
-        free = sorted(r.id for r in regions if r.id not in used)
-        asked = bool(regions) or body.drifted(diagonal)
-        number = body.id or (free[0] if free else ids.new() if asked else 0)
-        used.add(number)
-        out.append(replace(body, id=number))
+        if body.id == 0 and (regions or body.drifted(diagonal)):
+            free = [r.id for r in regions if r.id not in used]
+            body = replace(body, id=min(free, default=0) or ids.new())
+            used.add(body.id)
+        out.append(body)
     return tuple(out)
 
 
