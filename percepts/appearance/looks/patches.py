@@ -8,6 +8,7 @@ found like that in no other place, it is there.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -37,20 +38,38 @@ _SPECK = np.ones((3, 3), np.uint8)
 _GAP = np.ones((5, 5), np.uint8)
 
 
-def only_patch(scene: Scene, it: Appearance, unit: float) -> tuple[PatchPose, float] | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPatch:
+    """A patch with a thing's colours.
+
+    Attributes:
+        pose: Pose of the thing.
+        share: How well the colours agree, 0 to 1.
+        blob: Its pixels.
+    """
+
+    pose: PatchPose
+    share: float
+    blob: Blob
+
+
+def only_patch(
+    scene: Scene, it: Appearance, unit: float, where: NDArray[np.bool_] | None = None
+) -> FoundPatch | None:
     """The only patch of the picture with a thing's colours and about its size, if there is one.
 
     Args:
         scene: The frame.
         it: The thing, as it was taught.
         unit: Working pixels per pixel of its taught patch.
+        where: (h, w) bool, of any size: parts of the picture that may hold it; None for all.
 
     Returns:
-        Its pose, and how well its colours agree, 0 to 1.
+        The patch; None where there is none, or more than one.
     """
     least, most = SIDES
     found: list[tuple[float, Blob]] = []
-    for blob in _patches(scene, it):
+    for blob in _patches(scene, it, where):
         if least < float(np.sqrt(blob.area)) / (2 * it.radius * unit) < most:
             excess, alike = body_colours(scene, it, blob)
             found.append((max(excess, 0.0) * alike, blob))
@@ -58,7 +77,8 @@ def only_patch(scene: Scene, it: Appearance, unit: float) -> tuple[PatchPose, fl
     rival = found[1][0] if len(found) > 1 else 0.0
     if not found or rival * APART > found[0][0] or not looks_alike(scene, it, found[0][1]):
         return None
-    return _pose_of(found[0][1], it, unit, scene.size), float(np.sqrt(found[0][0]))
+    best, blob = found[0]
+    return FoundPatch(_pose_of(blob, it, unit, scene.size), float(np.sqrt(best)), blob)
 
 
 def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
@@ -67,9 +87,13 @@ def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
     return excess > EXCESS and alike > ALIKE
 
 
-def _patches(scene: Scene, it: Appearance) -> Iterator[Blob]:
+def _patches(
+    scene: Scene, it: Appearance, where: NDArray[np.bool_] | None
+) -> Iterator[Blob]:
     """The connected patches of a thing's own colours, without specks and narrow gaps."""
     own = (it.colours.odds(colour_bins(scene.lab[0])) > OWN).astype(np.uint8)
+    if where is not None:
+        own &= cv2.resize(where.view(np.uint8), scene.size, interpolation=cv2.INTER_NEAREST)
     opened = cv2.morphologyEx(own, cv2.MORPH_OPEN, _SPECK)
     closed = cv2.morphologyEx(opened, cv2.MORPH_CLOSE, _GAP)
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(closed)

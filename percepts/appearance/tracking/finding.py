@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.bodies import MovingBody, body_colours
-from visup.percepts.appearance.looks.patches import only_patch
+from visup.percepts.appearance.looks.patches import FoundPatch, only_patch
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
@@ -43,6 +43,7 @@ class ThingPlace:
         looks: Appearance there.
         match: Its match.
         score: Score of the match, with the bonus of the position.
+        seen: Its visible pixels, where they are known.
     """
 
     name: str
@@ -50,20 +51,28 @@ class ThingPlace:
     looks: Appearance
     match: Match
     score: float
+    seen: Blob | None = None
+
+    def pixels(self, scene: Scene) -> Blob | None:
+        """The pixels that it covers: the visible ones, or all those of the pose; None when out of view."""
+        return self.seen or footprint(scene, self.match.pose, self.looks)
 
 
-def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
+def candidates(
+    scene: Scene, view: ViewModel, number: int, where: NDArray[np.bool_] | None = None
+) -> list[ThingPlace]:
     """Positions that match an object clearly better than others do.
 
     Args:
         scene: The frame.
         view: The taught view.
         number: Its number.
+        where: (h, w) bool, of any size: parts of the picture that may hold it; None for all.
     """
     it, home = view.appearance, home_of(scene, view)
     unit = home.scale
     poses = [PatchPose(0, 0, unit * s) for s in SIZES] + [PatchPose(0, 0, unit, a) for a in TURNS]
-    matches = [verify(scene, it, home), *search(scene, it, poses)]
+    matches = [verify(scene, it, home), *search(scene, it, poses, where=where)]
     near = 6 * unit
     return [
         ThingPlace(view.name, number, it, m, m.score + AT_HOME * (m.pose.apart(home, 10) < near))
@@ -141,28 +150,39 @@ def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPla
         number: Its number.
     """
     it, unit = view.appearance, home_of(scene, view).scale
-    found = only_patch(scene, it, unit)
-    if found is None:
-        return []
-    pose, share = found
-    return [ThingPlace(view.name, number, it, Match(pose, share, share), share)]
+    return _patch_places(view.name, number, it, only_patch(scene, it, unit))
 
 
-def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
+def lost_places(
+    scene: Scene, track: ThingTrack, where: NDArray[np.bool_] | None = None
+) -> list[ThingPlace]:
     """Positions that match an object's last appearance.
 
     Args:
         scene: The frame.
         track: The track of a hidden object.
+        where: (h, w) bool, of any size: parts of the picture that may hold it; None for all.
     """
     it, last = track.looks, track.pose
     if it is None or last is None:
         return []
     poses = [PatchPose(0, 0, last.scale * s, last.angle) for s in RECENT_SIZES]
-    found = _outstanding(search(scene, it, poses), it)
+    found = _outstanding(search(scene, it, poses, where=where), it)
     if not found:
-        found = _gathered(scene, it, last)
-    return [ThingPlace(track.name, track.number, it, m, m.score) for m in found]
+        found = _gathered(scene, it, last, where)
+    places = [ThingPlace(track.name, track.number, it, m, m.score) for m in found]
+    if found or where is None:
+        return places
+    return _patch_places(track.name, track.number, it, only_patch(scene, it, last.scale, where))
+
+
+def _patch_places(
+    name: str, number: int, it: Appearance, found: FoundPatch | None
+) -> list[ThingPlace]:
+    if found is None:
+        return []
+    match = Match(found.pose, found.share, found.share)
+    return [ThingPlace(name, number, it, match, found.share, found.blob)]
 
 
 def _gathered(
@@ -201,7 +221,7 @@ def assigned(
     for it in sorted(found, key=lambda c: -c.score):
         if it.name in out:
             continue
-        blob = footprint(scene, it.match.pose, it.looks)
+        blob = it.pixels(scene)
         if blob is None or any(overlap(blob, b) > TAKEN for b in full):
             continue
         out[it.name] = it

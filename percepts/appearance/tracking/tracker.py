@@ -15,6 +15,7 @@ from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
+from visup.percepts.appearance.tracking.background_memory import BackgroundMemory, holds
 from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
 from visup.percepts.appearance.tracking.change import ChangeMap
 from visup.percepts.appearance.tracking.finding import (
@@ -79,6 +80,7 @@ class ThingTracker:
         self.tracks = tuple(ThingTrack(n, self._numbers(n)[0]) for n in names)
         self.scene: Scene | None = None
         self._change = ChangeMap()
+        self._background = BackgroundMemory()
         self._count = 0
         self._static = True
         self._camera: Doubles | None = STILL
@@ -134,8 +136,10 @@ class ThingTracker:
             self._camera, self._scenery = STILL, CameraTrack()
             self.tracks = tuple(_forgotten(t) for t in self.tracks)
         self._change.update(scene, STILL if self._camera is None else self._camera)
+        self._background.move(self._camera)
         self._find(scene, bodies)
         self._share_pixels(scene, same)
+        self._background.update(scene, self.tracks)
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
         return self.tracks
 
@@ -198,15 +202,28 @@ class ThingTracker:
         self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
 
     def _searched(self, scene: Scene, due: Sequence[ThingTrack]) -> list[ThingPlace]:
-        """Places of objects in the whole picture, and in what has changed recently."""
-        names = {t.name for t in due}
-        found = [c for k, v in self._views_of(names) for c in candidates(scene, v, k)]
-        found += [c for t in due for c in lost_places(scene, t)]
-        lately = self._change.lately(scene)
-        if lately is not None:
-            left = self._views_of(names - {f.name for f in found})
-            found += [c for k, v in left for c in moving_places(scene, v, k, lately)]
+        """Places of objects in the whole picture, and in what has changed recently.
+
+        What looks as it did while an object was seen elsewhere is left out.
+        """
+        found: list[ThingPlace] = []
+        for t in due:
+            found += self._searched_for(scene, t, self._background.changed(scene, t.name))
         return found
+
+    def _searched_for(
+        self, scene: Scene, track: ThingTrack, changed: Mask | None
+    ) -> list[ThingPlace]:
+        views = self._views_of({track.name})
+        found = [c for k, v in views for c in candidates(scene, v, k, changed)]
+        found += lost_places(scene, track, changed)
+        lately = self._change.lately(scene)
+        if lately is not None and not found:
+            found = [c for k, v in views for c in moving_places(scene, v, k, lately)]
+        if changed is None:
+            return found
+        places = [(f, f.pixels(scene)) for f in found]
+        return [f for f, place in places if place is not None and holds(changed, place)]
 
     def _moving(
         self, scene: Scene, bodies: Sequence[MovingBody], names: Collection[str]

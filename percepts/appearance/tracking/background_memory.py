@@ -1,0 +1,163 @@
+"""What the picture looked like while an object was seen elsewhere: there it is background.
+
+A dark gripper that is lost looks like any dark corner of the room, and a wall that an arm uncovers may look
+like what the arm carries. Where a place looks as it did while the object was somewhere else, it is not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.pose import Doubles
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.tracking.points import STILL
+from visup.percepts.appearance.tracking.track import IN_VIEW, ThingTrack
+
+Bytes = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+COARSER = 4
+"""Working pixels per pixel of a kept picture."""
+
+FIRST_EVERY_S = 0.5
+"""Interval between kept pictures, doubled whenever there are too many."""
+
+MOST_KEPT = 8
+
+NOISE = 10
+"""Largest difference of any channel that noise makes, levels of 8-bit Lab."""
+
+CHANGED = 0.2
+"""Least share of a place that has changed, if the object is there."""
+
+_SAME = np.eye(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptPicture:
+    """The picture at one moment, and where each object was seen in it.
+
+    Attributes:
+        lab: (h, w, 3) uint8, CIE Lab, a quarter of the working size.
+        covered: Name -> (h, w) bool, where it was seen, or near.
+        motion: (3, 3) similarity from its working pixels to those of the last frame.
+    """
+
+    lab: Bytes
+    covered: Mapping[str, Mask]
+    motion: Doubles
+
+    def moved(self, camera: Doubles) -> KeptPicture:
+        """The same one frame later, by the (2, 3) similarity of the picture between them."""
+        return replace(self, motion=np.vstack((camera, (0.0, 0.0, 1.0))) @ self.motion)
+
+
+class BackgroundMemory:
+    """Pictures of the last minutes, moved with the camera; one per video.
+
+    They are forgotten where its motion is unknown. An error of the motion makes a place look changed, so that
+    nothing is known about it.
+    """
+
+    def __init__(self) -> None:
+        self._kept: tuple[KeptPicture, ...] = ()
+        self._every = FIRST_EVERY_S
+        self._due = -np.inf
+
+    def update(self, scene: Scene, tracks: Iterable[ThingTrack]) -> None:
+        """Keep a frame, if it is time.
+
+        Args:
+            scene: The frame.
+            tracks: The objects in it.
+        """
+        if scene.time < self._due:
+            return
+        seen = {
+            t.name: _covered(scene, t.visible)
+            for t in tracks
+            if t.visible is not None and t.state in IN_VIEW and t.seen == scene.time
+        }
+        self._kept = (*self._kept, KeptPicture(_small(scene), seen, _SAME))
+        if len(self._kept) > MOST_KEPT:
+            self._kept, self._every = self._kept[::2], 2 * self._every
+        self._due = scene.time + self._every - 1e-6
+
+    def move(self, camera: Doubles | None) -> None:
+        """Follow the camera into the next frame.
+
+        Args:
+            camera: (2, 3) similarity of the picture, working pixels; None if unknown.
+        """
+        if camera is None:
+            self._kept, self._every, self._due = (), FIRST_EVERY_S, -np.inf
+        elif camera is not STILL:
+            self._kept = tuple(k.moved(camera) for k in self._kept)
+
+    def changed(self, scene: Scene, name: str) -> Mask | None:
+        """Where the picture does not look as it did while an object was seen elsewhere.
+
+        Args:
+            scene: The frame.
+            name: Name of the object.
+
+        Returns:
+            (h, w) bool, a quarter of the working size: the parts that may hold it; None where nothing is known.
+        """
+        kept = [k for k in self._kept if name in k.covered]
+        if not kept:
+            return None
+        now = _small(scene)
+        new = np.ones(now.shape[:2], dtype=bool)
+        for k in kept:
+            new &= ~_unchanged(now, k, name)
+        return new
+
+
+def holds(changed: Mask, place: Blob) -> bool:
+    """Whether enough of a place has changed for an object to be there.
+
+    Args:
+        changed: (h, w) bool, a quarter of the working size.
+        place: The pixels that it would cover.
+    """
+    left, top, right, bottom = place.window
+    whole = np.asarray(cv2.resize(place.mask.view(np.uint8), (right - left, bottom - top)))
+    ys, xs = np.nonzero(whole)
+    rows = np.clip((ys + top) // COARSER, 0, changed.shape[0] - 1)
+    columns = np.clip((xs + left) // COARSER, 0, changed.shape[1] - 1)
+    return bool(len(ys) and np.mean(changed[rows, columns]) > CHANGED)
+
+
+def _small(scene: Scene) -> Bytes:
+    size = tuple(max(1, n // COARSER) for n in scene.size)
+    return np.asarray(cv2.resize(scene.lab[0], size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _covered(scene: Scene, blob: Blob) -> Mask:
+    """(h, w) bool: the pixels of a kept picture that an object touches, and those beside."""
+    left, top, right, bottom = blob.window
+    whole = np.zeros(scene.size[::-1], dtype=np.uint8)
+    whole[top:bottom, left:right] = blob.mask
+    size = tuple(max(1, n // COARSER) for n in scene.size)
+    small = cv2.resize(255 * whole, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8))) > 0
+
+
+def _unchanged(now: Bytes, kept: KeptPicture, name: str) -> Mask:
+    """(h, w) bool: what looks as in a kept picture, away from where an object was seen in it."""
+    known = (~kept.covered[name]).view(np.uint8)
+    before = kept.lab
+    if not np.array_equal(kept.motion, _SAME):
+        motion, size = kept.motion[:2].copy(), (now.shape[1], now.shape[0])
+        motion[:, 2] /= COARSER
+        before = cv2.warpAffine(before, motion, size, flags=cv2.INTER_LINEAR)
+        known = cv2.warpAffine(known, motion, size, flags=cv2.INTER_NEAREST)
+    off = cv2.absdiff(now, before).max(axis=2)
+    return np.asarray((off <= NOISE) & (np.asarray(known) > 0))
