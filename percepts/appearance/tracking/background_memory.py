@@ -63,10 +63,13 @@ class BackgroundMemory:
 
     They are forgotten where its motion is unknown. An error of the motion makes a place look changed, so that
     nothing is known about it.
+
+    Attributes:
+        kept: The pictures, oldest first; the first one stays.
     """
 
     def __init__(self) -> None:
-        self._kept: tuple[KeptPicture, ...] = ()
+        self.kept: tuple[KeptPicture, ...] = ()
         self._every = FIRST_EVERY_S
         self._due = -np.inf
 
@@ -84,9 +87,9 @@ class BackgroundMemory:
             for t in tracks
             if t.visible is not None and t.state in IN_VIEW and t.seen == scene.time
         }
-        self._kept = (*self._kept, KeptPicture(_small(scene), seen, _SAME))
-        if len(self._kept) > MOST_KEPT:
-            self._kept, self._every = self._kept[::2], 2 * self._every
+        self.kept = (*self.kept, KeptPicture(_small(scene), seen, _SAME))
+        if len(self.kept) > MOST_KEPT:
+            self.kept, self._every = self.kept[::2], 2 * self._every
         self._due = scene.time + self._every - 1e-6
 
     def move(self, camera: Doubles | None) -> None:
@@ -96,9 +99,9 @@ class BackgroundMemory:
             camera: (2, 3) similarity of the picture, working pixels; None if unknown.
         """
         if camera is None:
-            self._kept, self._every, self._due = (), FIRST_EVERY_S, -np.inf
+            self.kept, self._every, self._due = (), FIRST_EVERY_S, -np.inf
         elif camera is not STILL:
-            self._kept = tuple(k.moved(camera) for k in self._kept)
+            self.kept = tuple(k.moved(camera) for k in self.kept)
 
     def changed(self, scene: Scene, name: str) -> Mask | None:
         """Where the picture does not look as it did while an object was seen elsewhere.
@@ -110,7 +113,7 @@ class BackgroundMemory:
         Returns:
             (h, w) bool, a quarter of the working size: the parts that may hold it; None where nothing is known.
         """
-        kept = [k for k in self._kept if name in k.covered]
+        kept = [k for k in self.kept if name in k.covered]
         if not kept:
             return None
         now = _small(scene)

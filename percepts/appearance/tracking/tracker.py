@@ -214,6 +214,8 @@ class ThingTracker:
     def _searched_for(
         self, scene: Scene, track: ThingTrack, changed: Mask | None
     ) -> list[ThingPlace]:
+        if changed is not None and not changed.any():
+            return []
         views = self._views_of({track.name})
         found = [c for k, v in views for c in candidates(scene, v, k, changed)]
         found += lost_places(scene, track, changed)
