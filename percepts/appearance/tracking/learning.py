@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.colours import learn_colours
-from visup.percepts.appearance.looks.pose import Window, cut_patch
+from visup.percepts.appearance.looks.pose import PatchPose, Window, cut_patch
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, learned_filter, surroundings
 from visup.percepts.appearance.tracking.track import RestMemory, State, ThingTrack
@@ -44,9 +44,9 @@ def learned(
     if it is None or pose is None or not (sure or track.colours >= SURE_COLOURS):
         return track
     lab = scene.patch(pose, it.shape)
-    seen = _in_patch(blob.window, blob.mask, track, scene)
+    seen = _in_patch(blob.window, blob.mask, pose, it.shape, scene)
     # Pixels won by another object say nothing about the shape.
-    taken = _in_patch(claim[0], claim[1] > 0, track, scene) - seen
+    taken = _in_patch(claim[0], claim[1] > 0, pose, it.shape, scene) - seen
     rate = np.where(seen > it.mask, GROW_RATE, SHRINK_RATE) * np.clip(1 - taken, 0, 1)
     # The shape is pulled back to the taught one, or it would spread over what it touches.
     back = ANCHOR * (taught.mask - it.mask)
@@ -62,14 +62,28 @@ def learned(
     )
 
 
-def _in_patch(window: Window, mask: NDArray[np.bool_], track: ThingTrack, scene: Scene) -> Floats:
-    """(h, w) float32: a mask of the picture in the object's patch."""
-    assert track.looks is not None
-    assert track.pose is not None
+def relearned(it: Appearance, pose: PatchPose, blob: Blob, scene: Scene) -> Appearance:
+    """The appearance of an object that looks new, but for its colours: it has turned, or is in another light.
+
+    Args:
+        it: Its appearance so far.
+        pose: Its pose.
+        blob: Its pixels.
+        scene: The frame.
+    """
+    lab = scene.patch(pose, it.shape)
+    mask = _in_patch(blob.window, blob.mask, pose, it.shape, scene)
+    return Appearance(lab, mask, it.colours, learned_filter(lab, mask, it.colours))
+
+
+def _in_patch(
+    window: Window, mask: NDArray[np.bool_], pose: PatchPose, shape: tuple[int, ...], scene: Scene
+) -> Floats:
+    """(h, w) float32: a mask of the picture in the patch of an object at a pose."""
     left, top, right, bottom = window
     whole = np.zeros(scene.size[::-1], dtype=np.float32)
     whole[top:bottom, left:right] = mask
-    return np.asarray(cut_patch(whole, track.pose, track.looks.shape), dtype=np.float32)
+    return np.asarray(cut_patch(whole, pose, shape), dtype=np.float32)
 
 
 def rested(track: ThingTrack, scene: Scene, first: bool) -> ThingTrack:

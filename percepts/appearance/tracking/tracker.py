@@ -35,7 +35,7 @@ from visup.percepts.appearance.tracking.following import (
     followed,
     noted,
 )
-from visup.percepts.appearance.tracking.learning import learned, rested
+from visup.percepts.appearance.tracking.learning import learned, relearned, rested
 from visup.percepts.appearance.tracking.look_alikes import look_alikes, settled
 from visup.percepts.appearance.tracking.points import (
     NO_POINTS,
@@ -283,18 +283,21 @@ class ThingTracker:
 def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTrack:
     if place is None:
         return track
+    looks, pose = place.looks, place.match.pose
+    if place.seen is not None and track.id:
+        looks = relearned(looks, pose, place.seen, scene)
     new = replace(
         track,
         number=place.number,
         state=State.MOVING,
-        looks=place.looks,
+        looks=looks,
         rest=None,
         path=(),
         proven=track.proven or place.match.score > SURE,
         peak=place.match.peak,
         explained=place.match.explained,
     )
-    return noted(new, scene.time, place.match.pose)
+    return noted(new, scene.time, pose)
 
 
 def _forgotten(track: ThingTrack) -> ThingTrack:
