@@ -87,9 +87,7 @@ def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
     return excess > EXCESS and alike > ALIKE
 
 
-def _patches(
-    scene: Scene, it: Appearance, where: NDArray[np.bool_] | None
-) -> Iterator[Blob]:
+def _patches(scene: Scene, it: Appearance, where: NDArray[np.bool_] | None) -> Iterator[Blob]:
     """The connected patches of a thing's own colours, without specks and narrow gaps."""
     own = (it.colours.odds(colour_bins(scene.lab[0])) > OWN).astype(np.uint8)
     if where is not None:

@@ -111,7 +111,7 @@ class BackgroundMemory:
             name: Name of the object.
 
         Returns:
-            (h, w) bool, a quarter of the working size: the parts that may hold it; None where nothing is known.
+            (h, w) bool, a quarter of the working size: the parts that may hold it; None where none is known.
         """
         kept = [k for k in self.kept if name in k.covered]
         if not kept:

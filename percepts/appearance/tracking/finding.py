@@ -14,6 +14,7 @@ from visup.percepts.appearance.looks.patches import FoundPatch, only_patch
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
+from visup.percepts.appearance.tracking.background_memory import holds
 from visup.percepts.appearance.tracking.detection import colour_peaks, search
 from visup.percepts.appearance.tracking.track import ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
@@ -56,6 +57,34 @@ class ThingPlace:
     def pixels(self, scene: Scene) -> Blob | None:
         """The pixels that it covers: the visible ones, or all those of the pose; None when out of view."""
         return self.seen or footprint(scene, self.match.pose, self.looks)
+
+
+def searched(
+    scene: Scene,
+    track: ThingTrack,
+    views: Sequence[tuple[int, ViewModel]],
+    changed: NDArray[np.bool_] | None,
+    lately: NDArray[np.bool_] | None,
+) -> list[ThingPlace]:
+    """Places of an object that is not in view, in the whole picture.
+
+    Args:
+        scene: The frame.
+        track: Its track.
+        views: Its taught views, each with its number.
+        changed: (h, w) bool, as from `BackgroundMemory`: the parts that may hold it; None for all.
+        lately: (h, w) bool, of any size: what has changed recently; None where nothing has.
+    """
+    if changed is not None and not changed.any():
+        return []
+    found = [c for k, v in views for c in candidates(scene, v, k, changed)]
+    found += lost_places(scene, track, changed)
+    if lately is not None and not found:
+        found = [c for k, v in views for c in moving_places(scene, v, k, lately)]
+    if changed is None:
+        return found
+    places = [(f, f.pixels(scene)) for f in found]
+    return [f for f, place in places if place is not None and holds(changed, place)]
 
 
 def candidates(

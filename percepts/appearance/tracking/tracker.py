@@ -15,7 +15,7 @@ from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
-from visup.percepts.appearance.tracking.background_memory import BackgroundMemory, holds
+from visup.percepts.appearance.tracking.background_memory import BackgroundMemory
 from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
 from visup.percepts.appearance.tracking.change import ChangeMap
 from visup.percepts.appearance.tracking.finding import (
@@ -23,11 +23,9 @@ from visup.percepts.appearance.tracking.finding import (
     ThingPlace,
     assigned,
     body_places,
-    candidates,
     coloured_places,
     footprint,
-    lost_places,
-    moving_places,
+    searched,
 )
 from visup.percepts.appearance.tracking.following import (
     AS_IT_WAS,
@@ -206,26 +204,12 @@ class ThingTracker:
 
         What looks as it did while an object was seen elsewhere is left out.
         """
+        lately = self._change.lately(scene)
         found: list[ThingPlace] = []
         for t in due:
-            found += self._searched_for(scene, t, self._background.changed(scene, t.name))
+            views, changed = self._views_of({t.name}), self._background.changed(scene, t.name)
+            found += searched(scene, t, views, changed, lately)
         return found
-
-    def _searched_for(
-        self, scene: Scene, track: ThingTrack, changed: Mask | None
-    ) -> list[ThingPlace]:
-        if changed is not None and not changed.any():
-            return []
-        views = self._views_of({track.name})
-        found = [c for k, v in views for c in candidates(scene, v, k, changed)]
-        found += lost_places(scene, track, changed)
-        lately = self._change.lately(scene)
-        if lately is not None and not found:
-            found = [c for k, v in views for c in moving_places(scene, v, k, lately)]
-        if changed is None:
-            return found
-        places = [(f, f.pixels(scene)) for f in found]
-        return [f for f, place in places if place is not None and holds(changed, place)]
 
     def _moving(
         self, scene: Scene, bodies: Sequence[MovingBody], names: Collection[str]

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import cv2
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.percepts.appearance.scenes import HEIGHT, SIZES, WIDTH, Image, picture, shown, table, thing
-from visup.agent import Frame, Observation
+from tests.percepts.appearance.scenes import (
+    HEIGHT,
+    SIZES,
+    WIDTH,
+    Image,
+    picture,
+    shown,
+    table,
+    thing,
+)
+from visup.agent import Frame, Observation, Region
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.pose import Doubles
@@ -26,6 +37,7 @@ from visup.percepts.appearance.tracking.track import State, ThingTrack
 SIZE = WIDTH, HEIGHT
 WIDE, HIGH = SIZES["tool"]
 PLACES = st.tuples(st.integers(0, WIDTH - WIDE), st.integers(0, HEIGHT - HIGH))
+LEFT_AT = 140, 60
 APART = 2 * COARSER
 """Pixels around a thing that count as its own, and of which nothing is known."""
 
@@ -148,14 +160,42 @@ def test_the_first_picture_is_kept_and_few_are(count: int) -> None:
     assert memory.kept[0].covered["tool"][80 // COARSER, 30 // COARSER]
 
 
-def test_an_equal_thing_that_was_there_all_the_time_does_not_take_the_name_of_what_has_left() -> None:
-    behaviour = AppearanceBehaviour(shown({"tool": (140, 60)}, "tool"))
-    told: list[set[float]] = []
-    for k in range(45):
-        x = 140 + max(0, k - 8) * 8
-        image = picture({"tray": (20, 110), "tool": (x, 60)} if x < WIDTH else {"tray": (20, 110)})[0]
-        image[20 : 20 + HIGH, 40 : 40 + WIDE] = thing("tool")
+def told(images: Iterable[Image]) -> list[list[Region]]:
+    """The regions of a taught tool, frame by frame."""
+    behaviour = AppearanceBehaviour(shown({"tool": LEFT_AT}, "tool"))
+    out = []
+    for k, image in enumerate(images):
         found = behaviour.perceive(Frame(k, k / 15, image), Observation(k, k / 15, SIZE), ())
-        told.append({p.value.bbox[0] for p in found if p.kind == "region"})
-    assert told[0]
-    assert told[-1] == set()
+        out.append([p.value for p in found if p.kind == "region"])
+    return out
+
+
+def leaves(frames: int) -> Iterator[Image]:
+    """A tool slides out of the picture, in which an equal one hangs on the wall."""
+    for k in range(frames):
+        x = LEFT_AT[0] + max(0, k - 8) * 8
+        image = picture({"tray": (20, 110)} | ({"tool": (x, 60)} if x < WIDTH else {}))[0]
+        image[20 : 20 + HIGH, 40 : 40 + WIDE] = thing("tool")
+        yield image
+
+
+def test_an_equal_thing_that_was_there_all_the_time_does_not_take_the_name_of_what_has_left() -> (
+    None
+):
+    regions = told(leaves(45))
+    assert regions[0]
+    assert not regions[-1]
+
+
+def test_what_comes_back_turned_is_found_by_its_colours_and_followed() -> None:
+    """Its taught view does not match, and in the whole picture its colours are nothing special."""
+    back, lying = list(leaves(45)), np.rot90(thing("tool"))
+    for k in range(30):
+        image = back[44].copy()
+        image[130 : 130 + WIDE, 120 + k : 120 + k + HIGH] = lying
+        back.append(image)
+    seen = told(back)[55:]
+    assert all(seen)
+    for k, (region,) in enumerate(seen, 10):
+        assert abs(region.centroid[0] - (120 + k + HIGH / 2)) < 6
+        assert abs(region.centroid[1] - (130 + WIDE / 2)) < 6
