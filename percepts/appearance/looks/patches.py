@@ -89,10 +89,11 @@ def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
 
 def _patches(scene: Scene, it: Appearance, where: NDArray[np.bool_] | None) -> Iterator[Blob]:
     """The connected patches of a thing's own colours, without specks and narrow gaps."""
-    own = (it.colours.odds(colour_bins(scene.lab[0])) > OWN).astype(np.uint8)
+    own = it.colours.odds(colour_bins(scene.lab[0])) > OWN
     if where is not None:
-        own &= cv2.resize(where.view(np.uint8), scene.size, interpolation=cv2.INTER_NEAREST)
-    opened = cv2.morphologyEx(own, cv2.MORPH_OPEN, _SPECK)
+        near = cv2.resize(where.view(np.uint8), scene.size, interpolation=cv2.INTER_NEAREST)
+        own &= np.asarray(near) > 0
+    opened = cv2.morphologyEx(own.view(np.uint8), cv2.MORPH_OPEN, _SPECK)
     closed = cv2.morphologyEx(opened, cv2.MORPH_CLOSE, _GAP)
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(closed)
     for k in range(1, count):

@@ -155,12 +155,16 @@ def _covered(scene: Scene, blob: Blob) -> Mask:
 
 def _unchanged(now: Bytes, kept: KeptPicture, name: str) -> Mask:
     """(h, w) bool: what looks as in a kept picture, away from where an object was seen in it."""
-    known = (~kept.covered[name]).view(np.uint8)
-    before = kept.lab
-    if not np.array_equal(kept.motion, _SAME):
-        motion, size = kept.motion[:2].copy(), (now.shape[1], now.shape[0])
-        motion[:, 2] /= COARSER
-        before = cv2.warpAffine(before, motion, size, flags=cv2.INTER_LINEAR)
-        known = cv2.warpAffine(known, motion, size, flags=cv2.INTER_NEAREST)
-    off = cv2.absdiff(now, before).max(axis=2)
-    return np.asarray((off <= NOISE) & (np.asarray(known) > 0))
+    before, known = _now(kept, kept.lab), _now(kept, (~kept.covered[name]).view(np.uint8))
+    return np.asarray((cv2.absdiff(now, before).max(axis=2) <= NOISE) & (known > 0))
+
+
+def _now(kept: KeptPicture, picture: Bytes) -> Bytes:
+    """A kept picture, or a mask in it, as the camera sees it now; 0 where it was out of view."""
+    if np.array_equal(kept.motion, _SAME):
+        return picture
+    motion = kept.motion[:2].copy()
+    motion[:, 2] /= COARSER
+    size = picture.shape[1], picture.shape[0]
+    how = cv2.INTER_LINEAR if picture.ndim == 3 else cv2.INTER_NEAREST
+    return np.asarray(cv2.warpAffine(picture, motion, size, flags=how), dtype=np.uint8)
