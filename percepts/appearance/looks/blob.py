@@ -26,3 +26,36 @@ class Blob:
     def area(self) -> int:
         """Pixels in the mask."""
         return int(np.count_nonzero(self.mask))
+
+
+def common_part(a: Blob, b: Blob) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
+    """Views of the masks of two blobs where their windows meet; None where they do not."""
+    left, top = max(a.window[0], b.window[0]), max(a.window[1], b.window[1])
+    right, bottom = min(a.window[2], b.window[2]), min(a.window[3], b.window[3])
+    if right <= left or bottom <= top:
+        return None
+    one, other = (
+        o.mask[top - o.window[1] : bottom - o.window[1], left - o.window[0] : right - o.window[0]]
+        for o in (a, b)
+    )
+    return one, other
+
+
+def overlap(a: Blob, b: Blob) -> float:
+    """Intersection of two blobs as a share of the smaller."""
+    part = common_part(a, b)
+    if part is None:
+        return 0.0
+    return float(np.count_nonzero(part[0] & part[1]) / max(min(a.area, b.area), 1))
+
+
+def without(a: Blob, b: Blob) -> Blob:
+    """What a blob has that another one has not; the blob itself where they do not meet."""
+    part = common_part(a, b)
+    if part is None or not (part[0] & part[1]).any():
+        return a
+    left = Blob(a.window, a.mask.copy())
+    part = common_part(left, b)
+    assert part is not None
+    part[0][part[1]] = False
+    return left

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.blob import Blob, overlap
 from visup.percepts.appearance.looks.bodies import MovingBody, body_colours
 from visup.percepts.appearance.looks.patches import FoundPatch, only_patch
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
@@ -31,6 +31,7 @@ TURNS = (-0.4, 0.4)
 BODY_ALIKE = 0.5  # least common share of the colours of a moving body and of an object
 BODY_SIZES = (0.5, 1.8)  # sides of a moving body that may be an object, in its own
 BODY_CUT = 0.25  # the least one of a body that the border cuts
+BEFORE = -0.5  # excess of an object's colours where something else lies before it
 TAKEN = 0.5  # share of a position covered by another object from which it is taken
 
 
@@ -236,14 +237,14 @@ def _outstanding(matches: Sequence[Match], it: Appearance, apart: float = APART)
 
 
 def assigned(
-    scene: Scene, found: Sequence[ThingPlace], taken: Sequence[Blob]
+    scene: Scene, found: Sequence[ThingPlace], taken: Sequence[tuple[Blob, Appearance]]
 ) -> dict[str, ThingPlace]:
     """Assign the best position to each object, at most one object to each.
 
     Args:
         scene: The frame.
         found: Candidates of all searched objects.
-        taken: Blobs of objects already located.
+        taken: Blobs of objects already located, and how those were taught.
     """
     out: dict[str, ThingPlace] = {}
     full = list(taken)
@@ -251,11 +252,20 @@ def assigned(
         if it.name in out:
             continue
         blob = it.pixels(scene)
-        if blob is None or any(overlap(blob, b) > TAKEN for b in full):
+        if blob is None or any(_belongs(scene, it, blob, *b) for b in full):
             continue
         out[it.name] = it
-        full.append(blob)
+        full.append((blob, it.looks))
     return out
+
+
+def _belongs(
+    scene: Scene, place: ThingPlace, blob: Blob, other: Blob, other_looks: Appearance
+) -> bool:
+    """Whether a position is that of another object: it lies within it, and is not put before it."""
+    if overlap(blob, other) <= TAKEN:
+        return False
+    return place.seen is None or body_colours(scene, other_looks, blob)[0] > BEFORE
 
 
 def footprint(scene: Scene, pose: PatchPose, it: Appearance) -> Blob | None:
@@ -264,16 +274,3 @@ def footprint(scene: Scene, pose: PatchPose, it: Appearance) -> Blob | None:
     if window is None:
         return None
     return Blob(window, np.greater(paint(it.mask, pose, window), 0.5))
-
-
-def overlap(a: Blob, b: Blob) -> float:
-    """Intersection of two blobs as a share of the smaller."""
-    left, top = max(a.window[0], b.window[0]), max(a.window[1], b.window[1])
-    right, bottom = min(a.window[2], b.window[2]), min(a.window[3], b.window[3])
-    if right <= left or bottom <= top:
-        return 0.0
-    both = [
-        o.mask[top - o.window[1] : bottom - o.window[1], left - o.window[0] : right - o.window[0]]
-        for o in (a, b)
-    ]
-    return float(np.count_nonzero(both[0] & both[1]) / max(min(a.area, b.area), 1))

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.blob import Blob, overlap
 from visup.percepts.appearance.looks.patches import looks_alike
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
 from visup.percepts.appearance.tracking.detection import search
-from visup.percepts.appearance.tracking.finding import SURE, footprint, overlap
+from visup.percepts.appearance.tracking.finding import SURE, footprint
 from visup.percepts.appearance.tracking.following import noted
 from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.blob import Blob
+from visup.percepts.appearance.looks.blob import Blob, without
 from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
@@ -193,11 +193,18 @@ class ThingTracker:
         new = {t.name for t in lost if not t.id}
         found += self._moving(scene, bodies, new - {f.name for f in found})
         found += self._coloured(scene, (new & {t.name for t in due}) - {f.name for f in found})
-        taken = [b for t in self.tracks if t.state in IN_VIEW for b in _occupied(t, scene)]
+        taken = [
+            (b, self.views[t.number].appearance)
+            for t in self.tracks
+            if t.state in IN_VIEW
+            for b in _occupied(t, scene)
+        ]
         placed = self._settled(assigned(scene, found, taken), scene)
         names = {t.name for t in due}
         asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
-        self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
+        before = [p.seen for p in placed.values() if p.seen is not None]
+        rest = (_uncovered(t, before) for t in asked)
+        self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in rest)
 
     def _searched(self, scene: Scene, due: Sequence[ThingTrack]) -> list[ThingPlace]:
         """Places of objects in the whole picture, and in what has changed recently.
@@ -282,6 +289,16 @@ def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTr
         explained=place.match.explained,
     )
     return noted(new, scene.time, pose)
+
+
+def _uncovered(track: ThingTrack, before: Sequence[Blob]) -> ThingTrack:
+    """A track whose rest memory has nothing of what was found to lie before it."""
+    if track.rest is None:
+        return track
+    blob = track.rest.blob
+    for other in before:
+        blob = without(blob, other)
+    return track if blob is track.rest.blob else replace(track, rest=replace(track.rest, blob=blob))
 
 
 def _forgotten(track: ThingTrack) -> ThingTrack:
