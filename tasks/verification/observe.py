@@ -30,6 +30,7 @@ from visup.tasks.verification.passing import (
     holds_on,
     moves_on,
     put_down,
+    still_meet,
     stopped_at,
     went_past,
     went_round,
@@ -176,6 +177,8 @@ class RelationLookup:
         if trend.name not in TRENDS:
             return False
         if action == "moving_together" and self.find("coupled", objects).truth is Truth.TRUE:
+            return True
+        if action == "coupled" and still_meet(self._mind, objects):
             return True
         met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
         return met or self.goes_round(trend.name, objects) or went_round(self._mind, trend)
