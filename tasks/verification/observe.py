@@ -29,6 +29,7 @@ from visup.tasks.verification.passing import (
     goes_round,
     holds_on,
     moves_on,
+    parted_at,
     put_down,
     still_meet,
     stopped_at,
@@ -146,6 +147,13 @@ class RelationLookup:
         recedes = action == "converging" and contrary is not None and contrary.name == "diverging"
         past = contrary if recedes and went_past(self._mind, objects) else None
         return None if past is None else past.since
+
+    def came_apart(self, objects: tuple[int, ...]) -> Relation | None:
+        """That two have been decoupled, if they are apart: what is left behind is carried no longer."""
+        at = parted_at(self._mind, objects)
+        apart = self._mind.truth("touching", *objects) is Truth.FALSE
+        apart = apart and self._mind.truth("moving_together", *objects) is not Truth.TRUE
+        return Relation("decoupled", objects, Truth.TRUE, at) if apart and at is not None else None
 
     def moves_on(self, objects: tuple[int, ...]) -> bool:
         """Whether neither of two whose outlines meet has slowed down at the other."""
@@ -286,6 +294,8 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
+    if contrary is None and meaning.name == "moving_together":
+        contrary = relations.came_apart(ids)
     if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
         contrary = None
     unreached = relations.unreached(meaning.name, ids, contrary)

@@ -192,6 +192,13 @@ def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
     return [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
 
 
+def parted_at(mind: Mind, objects: tuple[int, ...]) -> float | None:
+    """When two that are not coupled were decoupled, seconds; None if they never were."""
+    evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
+    coupled = mind.truth("coupled", *objects) is not Truth.FALSE
+    return None if evidence is None or coupled else evidence.decoupled_at
+
+
 def still_meet(mind: Mind, objects: tuple[int, ...]) -> bool:
     """Whether two are in contact and their outlines meet, whatever the extents of these do.
 
