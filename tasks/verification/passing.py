@@ -192,11 +192,18 @@ def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
     return [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
 
 
-def parted_at(mind: Mind, objects: tuple[int, ...]) -> float | None:
-    """When two that are not coupled were decoupled, seconds; None if they never were."""
+def came_apart(mind: Mind, objects: tuple[int, ...]) -> Relation | None:
+    """That two have been decoupled and are apart, or None: what is left behind is carried no longer.
+
+    It may well stay as near as it is: a gripper goes after what it has dropped.
+    """
     evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
-    coupled = mind.truth("coupled", *objects) is not Truth.FALSE
-    return None if evidence is None or coupled else evidence.decoupled_at
+    apart = {mind.truth(name, *objects) for name in ("touching", "coupled")} == {Truth.FALSE}
+    if evidence is None or evidence.decoupled_at is None or not apart:
+        return None
+    if mind.truth("moving_together", *objects) is Truth.TRUE:
+        return None
+    return Relation("decoupled", objects, Truth.TRUE, evidence.decoupled_at)
 
 
 def still_meet(mind: Mind, objects: tuple[int, ...]) -> bool:
