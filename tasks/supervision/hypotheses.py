@@ -50,9 +50,6 @@ class Progress(IntEnum):
 HOLD = "coupled"
 """The action by which one takes hold of another."""
 
-BELATED_S = 0.5
-"""Delay of relations, seconds: what begins this shortly before it is undone has not begun."""
-
 Standing = tuple[Progress, Status]
 """Position of a stage in the course, and its status."""
 
@@ -131,8 +128,7 @@ def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
     """
     monitor = leaf.payload
     same = set(leaf.step.actors) <= set(hold.actors) and monitor.fault is not None
-    undone = same and monitor.status in BAD and not monitor.late
-    return undone and monitor.fault_since < begun + BELATED_S
+    return same and monitor.status in BAD and not monitor.late and monitor.fault_since < begun
 
 
 def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:
