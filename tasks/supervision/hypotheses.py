@@ -6,6 +6,7 @@ stages. Its probability is kept by the task filter.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -45,6 +46,9 @@ class Progress(IntEnum):
     UNDER_WAY = 1
     BEHIND = 2
 
+
+HOLD = "coupled"
+"""The action by which one takes hold of another."""
 
 Standing = tuple[Progress, Status]
 """Position of a stage in the course, and its status."""
@@ -99,16 +103,32 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
     """Active stage -> its step with the worst status, in the order of the text.
 
-    What goes wrong before a stage has begun goes wrong in the stage that lasts until then.
+    What goes wrong before a stage has begun goes wrong in the stage that lasts until then. So does what
+    undoes a hold of which the next stage has seen nothing: a grasp that takes nothing along was none.
     """
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
         other = found.get(leaf.step.stage)
         if other is None or _worse(leaf, other):
             found[leaf.step.stage] = leaf
-    if not hypothesis.lasting:
+    if hypothesis.lasting:
+        return {hypothesis.lasting if _fails_unbegun(x) else s: x for s, x in found.items()}
+    last = hypothesis.backpointer
+    if last is None or last.step.action != HOLD:
         return found
-    return {hypothesis.lasting if _fails_unbegun(x) else s: x for s, x in found.items()}
+    begun = [x.payload.begun for x in leaves(hypothesis.state) if x.payload.begun is not None]
+    since = min(begun, default=math.inf)
+    return {last.step.stage if _undoes(x, last.step, since) else s: x for s, x in found.items()}
+
+
+def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
+    """Whether a step fails since the two that the step before coupled came apart before it had begun.
+
+    What happens between them after that (a second try, say) changes nothing.
+    """
+    monitor = leaf.payload
+    same = set(leaf.step.actors) <= set(hold.actors) and monitor.fault is not None
+    return same and monitor.status in BAD and not monitor.late and monitor.fault_since < begun
 
 
 def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:

@@ -34,6 +34,7 @@ class TaskMemory:
         akin: Unknown objects present from the start: the rest of a machine of which only a part is known is
             not unexpected.
         violated: The invariant about one object by which the task has failed, or empty.
+        forbidden: Whether a broken invariant interrupted it, which is final: its stages go on no further.
     """
 
     time: float
@@ -52,3 +53,4 @@ class TaskMemory:
     looks: tuple[PastLook, ...] = ()
     violated: str = ""
     akin: tuple[int, ...] = ()
+    forbidden: bool = False

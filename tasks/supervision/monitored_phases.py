@@ -39,6 +39,10 @@ Requirement = tuple[tuple[str, ...], tuple[str, ...]]
 """Actors, and the required relations between them."""
 
 
+CARRIES = ("moving_together", "coupled")
+"""Relations of a carrier to what it carries."""
+
+
 SupervisionFilter = TaskFilter[int, TaskHypothesis, Observe]
 """The task filter with the model of supervision."""
 
@@ -110,10 +114,11 @@ class MonitoredPhases:
         """Requirements at a node of the automaton: actors, and relations between them.
 
         For each active step the relations by which it holds and that it expects, for each possible next one
-        those by which it begins.
+        those by which it begins. Who carries something there comes there as well.
         """
         if node not in self._requirements:
-            self._requirements[node] = tuple(self._required(node))
+            asked = tuple(self._required(node))
+            self._requirements[node] = (*asked, *brought_along(asked))
         return self._requirements[node]
 
     def _required(self, node: int) -> Iterator[Requirement]:
@@ -251,3 +256,18 @@ class MonitoredPhases:
         steps = [x.step for x in leaves(hypothesis.state)]
         worked = min(observe(s).elapsed(s, finished, now) for s in steps)
         return worked > self.settings.regret_s
+
+
+def brought_along(asked: Sequence[Requirement]) -> Iterator[Requirement]:
+    """What follows for carriers: who carries something to a third one nears that one as well.
+
+    Args:
+        asked: The requirements of some steps.
+    """
+    pairs = [(actors, names) for actors, names in asked if len(actors) == 2]
+    carriers = [actors for actors, names in pairs if not set(CARRIES).isdisjoint(names)]
+    for (carried, place), names in pairs:
+        if "converging" in names:
+            for carrier in (a for pair in carriers if carried in pair for a in pair):
+                if carrier not in (carried, place):
+                    yield (carrier, place), ("converging",)

@@ -246,6 +246,10 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         violated = violation(model, broken, now, safety=False)
     belief = task_belief(model, snapshot, posterior, interrupted)
     belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
+    if memory.forbidden:
+        belief = replace(belief, stages=memory.belief.stages, current=memory.belief.current)
+    broke = interrupted != memory.interrupted and not strangers
+    broke = broke and interrupted == violation(model, broken, now, safety=True)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     one = machines(model.task, bindings)
     told = memory.belief.stages
@@ -269,6 +273,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         remembered(memory.looks, mind, start, kept) if _awaited(model, bindings) else (),
         violated,
         akin,
+        memory.forbidden or broke,
     )
 
 

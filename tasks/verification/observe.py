@@ -24,12 +24,14 @@ from visup.tasks.verification.observation import (
     Kept,
 )
 from visup.tasks.verification.passing import (
+    came_apart,
     gapes,
     goes_past,
     goes_round,
     holds_on,
     moves_on,
     put_down,
+    still_meet,
     stopped_at,
     went_past,
     went_round,
@@ -66,7 +68,7 @@ class RelationLookup:
         before: Kept = NOTHING_KEPT,
         rhythms: Mapping[str, Rhythm] = NO_RHYTHMS,
     ) -> None:
-        self._mind = mind
+        self.mind = mind
         self._evaluators = looks
         self._rhythms = rhythms
         self._previous_time = mind.time if before.time is None else before.time
@@ -96,11 +98,11 @@ class RelationLookup:
         return found
 
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
-        found = self._mind.relation(name, *objects)
+        found = self.mind.relation(name, *objects)
         if name == "touching" and found is not None and self.passes_by(objects):
             return replace(found, truth=Truth.UNKNOWN)
         if name == "touching" and found is not None and found.truth is Truth.TRUE:
-            found = replace(found, since=max(found.since, stopped_at(self._mind, objects)))
+            found = replace(found, since=max(found.since, stopped_at(self.mind, objects)))
         settled = found is not None and found.truth is not Truth.UNKNOWN
         if (
             found is not None
@@ -109,13 +111,13 @@ class RelationLookup:
         ):
             return found
         derive = DERIVED.get(name)
-        derived = derive(self._mind, self, objects) if derive else None
-        return derived or found or Relation(name, objects, Truth.UNKNOWN, self._mind.time)
+        derived = derive(self.mind, self, objects) if derive else None
+        return derived or found or Relation(name, objects, Truth.UNKNOWN, self.mind.time)
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
         """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
-        speed = kinematics(self._mind).pair("relative_speed", *objects)
-        slow = speed < ContactSettings().passing * image_diagonal(self._mind.frame_size)
+        speed = kinematics(self.mind).pair("relative_speed", *objects)
+        slow = speed < ContactSettings().passing * image_diagonal(self.mind.frame_size)
         rest = self.lasting(
             "rests", objects, Truth.UNKNOWN if math.isnan(speed) else truth_if(slow)
         )
@@ -124,13 +126,13 @@ class RelationLookup:
     def passes_by(self, objects: tuple[int, ...]) -> bool:
         """Whether outlines meet only because one of two passes the other, or is carried past it."""
         if objects not in self._passed_by:
-            meets = self._mind.truth("touching", *objects) is Truth.TRUE
-            self._passed_by[objects] = meets and goes_past(self._mind, objects, self._rests)
+            meets = self.mind.truth("touching", *objects) is Truth.TRUE
+            self._passed_by[objects] = meets and goes_past(self.mind, objects, self._rests)
         return self._passed_by[objects]
 
     def carried_past(self, objects: tuple[int, ...]) -> bool:
         """Whether outlines meet only because one of two is carried past the other."""
-        return bool(holds_on(self._mind, objects)) and self.passes_by(objects)
+        return bool(holds_on(self.mind, objects)) and self.passes_by(objects)
 
     def unreached(
         self, action: str, objects: tuple[int, ...], contrary: Relation | None
@@ -140,22 +142,18 @@ class RelationLookup:
         One has gone past the other, or what was carried has been put down.
         """
         ways = {"moving_together": (objects, objects[::-1]), "converging": (objects,)}
-        if any(put_down(self._mind, way) for way in ways.get(action, ())):
+        if any(put_down(self.mind, way) for way in ways.get(action, ())):
             return self.time
         recedes = action == "converging" and contrary is not None and contrary.name == "diverging"
-        past = contrary if recedes and went_past(self._mind, objects) else None
+        past = contrary if recedes and went_past(self.mind, objects) else None
         return None if past is None else past.since
-
-    def moves_on(self, objects: tuple[int, ...]) -> bool:
-        """Whether neither of two whose outlines meet has slowed down at the other."""
-        return moves_on(self._mind, objects)
 
     def begun(
         self, names: tuple[str, ...], objects: tuple[int, ...]
     ) -> tuple[Relation | None, Relation | None]:
         """The first true one of some relations, and a sudden trend among them; each may be None."""
         entry = self.first_true(names, objects)
-        if entry is not None and entry.name == "coupled" and gapes(self._mind, *objects):
+        if entry is not None and entry.name == "coupled" and gapes(self.mind, *objects):
             return None, None  # it is about to be doubted
         if entry is not None:
             return (None if self._sudden.ends(entry) else entry), None
@@ -164,7 +162,7 @@ class RelationLookup:
 
     def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend is rather one going round the other; False if unknown."""
-        return goes_round(self._mind, trend, objects)
+        return goes_round(self.mind, trend, objects)
 
     def explains_away(self, trend: Relation, action: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend contradicts an action only in appearance.
@@ -177,17 +175,19 @@ class RelationLookup:
             return False
         if action == "moving_together" and self.find("coupled", objects).truth is Truth.TRUE:
             return True
+        if action == "coupled" and still_meet(self.mind, objects):
+            return True
         met = action == "converging" and self.find("in_contact", objects).truth is Truth.TRUE
-        return met or self.goes_round(trend.name, objects) or went_round(self._mind, trend)
+        return met or self.goes_round(trend.name, objects) or went_round(self.mind, trend)
 
     @property
     def time(self) -> float:
         """Seconds of this moment."""
-        return self._mind.time
+        return self.mind.time
 
     @cached_property
     def _facts(self) -> Snapshot:
-        return Snapshot(self._mind)
+        return Snapshot(self.mind)
 
     def _evaluate(self, name: str, objects: tuple[int, ...]) -> Relation:
         key = (name, objects)
@@ -203,10 +203,10 @@ class RelationLookup:
         """
         key = f"{name} {objects}"
         self._queried.add(key)
-        since = self._before.get(key, self._mind.time)
+        since = self._before.get(key, self.mind.time)
         if truth is Truth.TRUE or (truth is Truth.UNKNOWN and key in self._before):
             self._after[key] = since
-        return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
+        return Relation(name, objects, truth, since if truth is Truth.TRUE else self.mind.time)
 
     def kept(self, pauses: PauseRecord, carry: bool) -> Kept:
         """The state of this moment, for the next.
@@ -251,7 +251,7 @@ class RelationLookup:
         Objects that are not coupled yet are `decoupled` in the derived sense, which is no failure.
         """
         for name in names:
-            relation = self._mind.relation(name, *objects)
+            relation = self.mind.relation(name, *objects)
             if name in self._evaluators or name in self._rhythms:
                 relation = self.find(name, objects)
             if relation is not None and relation.truth is Truth.TRUE:
@@ -283,6 +283,8 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
+    if contrary is None and meaning.name == "moving_together":
+        contrary = came_apart(relations.mind, ids)
     if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
         contrary = None
     unreached = relations.unreached(meaning.name, ids, contrary)
@@ -297,7 +299,7 @@ def observe(
         observed=relations.known(known, ids),
         sudden=sudden,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
-        moves_on=held_by is not None and held_by.name in CONTACTS and relations.moves_on(ids),
+        moves_on=held_by is not None and held_by.name in CONTACTS and moves_on(relations.mind, ids),
         unreached=unreached,
         carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
     )

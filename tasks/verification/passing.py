@@ -44,6 +44,9 @@ RESTED_S = 0.6
 LET_GO_GAP = 0.01
 """Gap of two coupled bodies from which on one has let go of the other, image diagonals."""
 
+MEETING_PX = 1.0
+"""Gap below which outlines meet, pixels."""
+
 
 def goes_past(
     mind: Mind, objects: tuple[int, ...], rests: Callable[[tuple[int, ...]], bool]
@@ -187,6 +190,30 @@ def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
     """The couplings of one of two bodies to a third one."""
     pair = set(objects)
     return [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
+
+
+def came_apart(mind: Mind, objects: tuple[int, ...]) -> Relation | None:
+    """That two have been decoupled and are apart, or None: what is left behind is carried no longer.
+
+    It may well stay as near as it is: a gripper goes after what it has dropped.
+    """
+    evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
+    apart = {mind.truth(name, *objects) for name in ("touching", "coupled")} == {Truth.FALSE}
+    if evidence is None or evidence.decoupled_at is None or not apart:
+        return None
+    if mind.truth("moving_together", *objects) is Truth.TRUE:
+        return None
+    return Relation("decoupled", objects, Truth.TRUE, evidence.decoupled_at)
+
+
+def still_meet(mind: Mind, objects: tuple[int, ...]) -> bool:
+    """Whether two are in contact and their outlines meet, whatever the extents of these do.
+
+    Fingers that close, and an arm that comes further into view, seem to recede from what they hold.
+    """
+    gap = gap_between(mind, objects)
+    touches = mind.truth("in_contact", *objects) is Truth.TRUE
+    return touches and gap is not None and gap < MEETING_PX
 
 
 def gapes(mind: Mind, a: int, b: int) -> bool:

@@ -73,7 +73,9 @@ def farther_than_others(window: SampleWindow) -> Marks:
 
 
 def reaching_out(window: SampleWindow, limit: float) -> Marks:
-    """Bodies whose outlines have just changed their extent, differently from the others.
+    """Bodies whose outlines have just advanced somewhere, unlike the others.
+
+    What moves advances on one side at least; what something else begins to cover only recedes.
 
     Args:
         window: The last samples.
@@ -89,9 +91,9 @@ def reaching_out(window: SampleWindow, limit: float) -> Marks:
     known = window.free[-1] & window.free[then]
     reach = window.steady_support
     change = np.where(known, reach[-1] - reach[then], np.nan)
-    apart = np.abs(change - _of_others(change))
+    farther = change - _of_others(change)
     with np.errstate(invalid="ignore"):
-        return np.asarray(((np.abs(change) > limit) & (apart > limit)).any(axis=1))
+        return np.asarray(((change > limit) & (farther > limit)).any(axis=1))
 
 
 def _of_others(values: Floats) -> Floats:

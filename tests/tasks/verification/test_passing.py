@@ -14,7 +14,7 @@ from tests.rules.scenes import box_region, seen
 from visup.agent import Coupling, Mind, Observation, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
-from visup.rules.coupling.evidence import COUPLING
+from visup.rules.coupling.evidence import COUPLING, CouplingEvidence
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.observe import RelationLookup, observe
@@ -128,6 +128,29 @@ def test_outlines_of_what_is_coupled_drift_and_it_moves_together(
     told = tuple(Relation(name, pair, truth, 1.0) for name, truth in facts)
     seen = observe(ACTIONS["moving_together"], pair, RelationLookup(Mind(time=2.0, relations=told)))
     assert (seen.contrary is not None) is against
+
+
+@pytest.mark.parametrize(
+    ("decoupled_at", "true", "left"),
+    [
+        (1.5, "", True),
+        (None, "", False),  # it was never held
+        (1.5, "touching", False),  # it has been put down where the gripper still is
+        (1.5, "coupled", False),  # it is held again
+        (1.5, "moving_together", False),
+    ],
+)
+def test_what_has_come_apart_is_carried_no_longer(
+    decoupled_at: float | None, true: str, left: bool
+) -> None:
+    pair = (GRIPPER, PART)
+    names = ("touching", "coupled", "moving_together", "diverging")
+    told = tuple(Relation(n, pair, Truth.TRUE if n == true else Truth.FALSE, 1.0) for n in names)
+    mind = Mind(time=2.0, relations=told)
+    mind = mind.remember(COUPLING, {pair: CouplingEvidence(decoupled_at=decoupled_at)})
+    contrary = observe(ACTIONS["moving_together"], pair, RelationLookup(mind)).contrary
+    assert (contrary.since if contrary else None) == (decoupled_at if left else None)
+    assert observe(ACTIONS["converging"], pair, RelationLookup(mind)).contrary is None
 
 
 def test_what_rests_does_not_go_past() -> None:

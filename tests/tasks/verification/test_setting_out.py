@@ -85,6 +85,12 @@ def test_a_part_that_reaches_out_is_enough() -> None:
     assert reaching_out(window(reach), LIMIT).tolist() == [True, False, False]
 
 
+def test_what_something_else_begins_to_cover_sets_out_nowhere() -> None:
+    reach = resting(3)
+    reach[6:, 0, 3:6] -= 15.0
+    assert not reaching_out(window(reach), LIMIT).any()
+
+
 def test_what_is_cut_by_the_border_tells_nothing() -> None:
     reach, free = resting(2), np.ones((len(TIMES), 2, FAN))
     reach[6:, 0, 3] += 10.0

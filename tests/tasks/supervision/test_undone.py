@@ -1,0 +1,119 @@
+"""What undoes a hold, what goes on after a broken invariant, and what is expected of those who carry."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, Script, Spell, task_of, watch
+from visup.agent import Expectation, Truth
+from visup.tasks.supervision.monitored_phases import brought_along
+
+THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
+MEETS = Spell("converging", 0.5, 2.0), Spell("touching", 2.0, 20.0)
+
+CAPTURE = """
+<t>        ::= <approach> <captured>
+<approach> ::= converging(arm, satellite)
+<captured> ::= coupled(arm, satellite)
+"""
+
+LIFT = """
+<t>     ::= <reach> <grasp> <lift>
+<reach> ::= converging(arm, satellite)
+<grasp> ::= coupled(arm, satellite)
+<lift>  ::= moving_together(arm, satellite) fails when apart(arm, satellite)
+"""
+
+CARRY = """
+actor dish is dish
+<t>     ::= <reach> <carry>
+<reach> ::= converging(arm, satellite)
+<carry> ::= moving_together(arm, satellite) & converging(satellite, dish)
+"""
+
+KEEP_OFF = f"actor dish is dish{CAPTURE}never touching(arm, dish)\n"
+
+
+def failing(script: Script, text: str) -> set[str]:
+    """The stages that are told to fail."""
+    events = watch(script, 14.0, text).events
+    return {str(e.data["stage"]) for e in events if e.kind == "stage_failing"}
+
+
+@pytest.mark.parametrize(
+    ("gap", "contact", "fails"),
+    [
+        (0.0, True, False),  # fingers close, and seem to recede
+        (5.0, True, True),
+        (0.0, False, True),  # it may pass in front
+        (math.nan, True, True),
+    ],
+)
+def test_who_is_in_contact_recedes_from_nobody(gap: float, contact: bool, fails: bool) -> None:
+    later = Truth.TRUE if contact else Truth.UNKNOWN
+    meets = Spell("in_contact", 2.0, 3.0), Spell("in_contact", 3.0, 20.0, truth=later)
+    spells = (*MEETS, *meets, Spell("diverging", 4.0, 9.0))
+    known = (*Script().known, "in_contact")
+    script = Script(spells, gaps=lambda now: gap, known=known)
+    assert failing(script, CAPTURE) == ({"captured"} if fails else set())
+
+
+@pytest.mark.parametrize(
+    ("moved_s", "again", "fails"),
+    [
+        (0.0, False, "grasp"),  # nothing was taken along
+        (1.5, False, "lift"),
+        (0.0, True, "grasp"),  # a second try is another grasp
+    ],
+)
+def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, fails: str) -> None:
+    held = Spell("touching", 2.0, 6.0), Spell("coupled", 2.5, 6.0)
+    spells = (Spell("converging", 0.5, 2.0), *held, Spell("diverging", 6.0, 9.0))
+    spells += (Spell("moving_together", 6.0 - moved_s, 6.0),) if moved_s else ()
+    spells += (Spell("converging", 9.0, 10.0), Spell("moving_together", 10.0, 10.5)) if again else ()
+    assert failing(Script(spells), LIFT) == {fails}
+
+
+def test_what_goes_wrong_with_another_one_undoes_no_grasp() -> None:
+    text = LIFT.split("<lift>  ::=")[0] + "<lift>  ::= converging(satellite, dish)\n"
+    text = f"actor dish is dish{text}"
+    goes = Spell("coupled", 2.5, 20.0), Spell("diverging", 5.0, 12.0, (SATELLITE, INTRUDER))
+    assert failing(Script((*MEETS, *goes), THREE, identities=IDENTITIES), text) == {"lift"}
+
+
+def started(script: Script) -> set[str]:
+    """The stages that are told to begin while the arm must keep off the dish."""
+    events = watch(script, 14.0, KEEP_OFF).events
+    return {str(e.data["stage"]) for e in events if e.kind == "stage_started"}
+
+
+def test_after_a_broken_invariant_no_stage_goes_on() -> None:
+    captured = Spell("converging", 0.5, 8.0), Spell("touching", 8.0, 20.0), Spell("coupled", 8.5, 20)
+    touches = Spell("touching", 4.0, 6.0, (ARM, INTRUDER))
+    alone = Script(captured, THREE, identities=IDENTITIES)
+    assert started(alone) == {"approach", "captured"}
+    assert started(Script((*captured, touches), THREE, identities=IDENTITIES)) == {"approach"}
+    # An alert may be false; what was seen of the stages is still told.
+    alarmed = Script(captured, THREE, identities=IDENTITIES, alerts=[("collision_course", 4.0, 6.0)])
+    assert started(alarmed) == {"approach", "captured"}
+
+
+def test_who_carries_something_there_is_expected_there() -> None:
+    moves = Spell("moving_together", 4.0, 12.0), Spell("coupled", 2.5, 20.0)
+    nears = Spell("converging", 5.0, 12.0, (SATELLITE, INTRUDER))
+    played = watch(Script((*MEETS, *moves, nears), THREE, identities=IDENTITIES), 10.0, CARRY)
+    comes = Expectation("converging", (ARM, INTRUDER))
+    assert comes in task_of(played, 8.0).expected
+    assert Expectation("converging", (SATELLITE, INTRUDER)) in task_of(played, 8.0).expected
+
+
+def test_only_carriers_come_along() -> None:
+    nears = (("part", "tray"), ("converging",))
+    assert list(brought_along([nears])) == []
+    assert list(brought_along([(("arm", "part"), ("touching",)), nears])) == []
+    for holder in (("arm", "part"), ("part", "arm")):
+        asked = [(holder, ("moving_together",)), nears]
+        assert list(brought_along(asked)) == [(("arm", "tray"), ("converging",))]
+    assert list(brought_along([(("tray", "part"), ("coupled",)), nears])) == []
