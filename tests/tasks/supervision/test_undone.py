@@ -70,9 +70,11 @@ def test_who_is_in_contact_recedes_from_nobody(gap: float, contact: bool, fails:
 )
 def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, fails: str) -> None:
     held = Spell("touching", 2.0, 6.0), Spell("coupled", 2.5, 6.0)
-    spells = (Spell("converging", 0.5, 2.0), *held, Spell("diverging", 6.0, 9.0))
+    spells: tuple[Spell, ...] = (Spell("converging", 0.5, 2.0), *held, Spell("diverging", 6.0, 9.0))
     spells += (Spell("moving_together", 6.0 - moved_s, 6.0),) if moved_s else ()
-    spells += (Spell("converging", 9.0, 10.0), Spell("moving_together", 10.0, 10.5)) if again else ()
+    spells += (
+        (Spell("converging", 9.0, 10.0), Spell("moving_together", 10.0, 10.5)) if again else ()
+    )
     assert failing(Script(spells), LIFT) == {fails}
 
 
@@ -90,13 +92,19 @@ def started(script: Script) -> set[str]:
 
 
 def test_after_a_broken_invariant_no_stage_goes_on() -> None:
-    captured = Spell("converging", 0.5, 8.0), Spell("touching", 8.0, 20.0), Spell("coupled", 8.5, 20)
+    captured = (
+        Spell("converging", 0.5, 8.0),
+        Spell("touching", 8.0, 20.0),
+        Spell("coupled", 8.5, 20),
+    )
     touches = Spell("touching", 4.0, 6.0, (ARM, INTRUDER))
     alone = Script(captured, THREE, identities=IDENTITIES)
     assert started(alone) == {"approach", "captured"}
     assert started(Script((*captured, touches), THREE, identities=IDENTITIES)) == {"approach"}
     # An alert may be false; what was seen of the stages is still told.
-    alarmed = Script(captured, THREE, identities=IDENTITIES, alerts=[("collision_course", 4.0, 6.0)])
+    alarmed = Script(
+        captured, THREE, identities=IDENTITIES, alerts=[("collision_course", 4.0, 6.0)]
+    )
     assert started(alarmed) == {"approach", "captured"}
 
 
