@@ -14,7 +14,7 @@ from visup.percepts.appearance.looks.patches import FoundPatch, only_patch
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
-from visup.percepts.appearance.tracking.background_memory import holds
+from visup.percepts.appearance.scenery.background_memory import holds
 from visup.percepts.appearance.tracking.detection import colour_peaks, search
 from visup.percepts.appearance.tracking.track import ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from visup.percepts.appearance.looks.pose import Doubles, PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
+from visup.percepts.appearance.scenery.points import STILL, PointMotion, similarity_of
 from visup.percepts.appearance.tracking.learning import PATH_S
-from visup.percepts.appearance.tracking.points import STILL, PointMotion, similarity_of
 from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,

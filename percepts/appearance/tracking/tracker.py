@@ -15,9 +15,15 @@ from visup.percepts.appearance.looks.bodies import MovingBody
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
-from visup.percepts.appearance.tracking.background_memory import BackgroundMemory
-from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
-from visup.percepts.appearance.tracking.change import ChangeMap
+from visup.percepts.appearance.scenery.background_memory import BackgroundMemory
+from visup.percepts.appearance.scenery.camera import CameraTrack, followed_camera
+from visup.percepts.appearance.scenery.change import ChangeMap
+from visup.percepts.appearance.scenery.points import (
+    NO_POINTS,
+    STILL,
+    PointMotion,
+    follow_points,
+)
 from visup.percepts.appearance.tracking.finding import (
     SURE,
     ThingPlace,
@@ -35,12 +41,6 @@ from visup.percepts.appearance.tracking.following import (
 )
 from visup.percepts.appearance.tracking.learning import learned, relearned, rested
 from visup.percepts.appearance.tracking.look_alikes import look_alikes, settled
-from visup.percepts.appearance.tracking.points import (
-    NO_POINTS,
-    STILL,
-    PointMotion,
-    follow_points,
-)
 from visup.percepts.appearance.tracking.recalling import recalled
 from visup.percepts.appearance.tracking.segmentation import (
     Claim,
@@ -137,7 +137,7 @@ class ThingTracker:
         self._background.move(self._camera)
         self._find(scene, bodies)
         self._share_pixels(scene, same)
-        self._background.update(scene, self.tracks)
+        self._background.update(scene, _seen_in(self.tracks, scene))
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
         return self.tracks
 
@@ -321,6 +321,12 @@ def _claim(track: ThingTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim |
     assert track.pose is not None
     assert track.looks is not None
     return thing_scores(scene, track.pose, track.looks)
+
+
+def _seen_in(tracks: Sequence[ThingTrack], scene: Scene) -> dict[str, Blob]:
+    """The visible pixels of the objects that are seen in a frame, by name."""
+    seen = (t for t in tracks if t.state in IN_VIEW and t.seen == scene.time)
+    return {t.name: t.visible for t in seen if t.visible is not None}
 
 
 def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> Mask:

@@ -24,15 +24,14 @@ from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene, prepare_scene
-from visup.percepts.appearance.tracking.background_memory import (
+from visup.percepts.appearance.scenery.background_memory import (
     COARSER,
     FIRST_EVERY_S,
     MOST_KEPT,
     BackgroundMemory,
     holds,
 )
-from visup.percepts.appearance.tracking.points import STILL
-from visup.percepts.appearance.tracking.track import State, ThingTrack
+from visup.percepts.appearance.scenery.points import STILL
 
 SIZE = WIDTH, HEIGHT
 WIDE, HIGH = SIZES["tool"]
@@ -59,16 +58,12 @@ def with_tools(*tools: tuple[int, int]) -> Image:
     return image
 
 
-def track(at: tuple[int, int], time: float) -> ThingTrack:
-    return ThingTrack("tool", 0, 1, State.MOVING, visible=blob(at), seen=time)
-
-
 def seen_at(*places: tuple[int, int], beside: tuple[tuple[int, int], ...] = ()) -> BackgroundMemory:
     """A memory of a tool at one place after the other, and of equal tools beside it all the time."""
     memory = BackgroundMemory()
     for k, at in enumerate(places):
         time = k * FIRST_EVERY_S
-        memory.update(scene(time, *beside, at), [track(at, time)])
+        memory.update(scene(time, *beside, at), {"tool": blob(at)})
     return memory
 
 
@@ -114,7 +109,7 @@ def test_what_is_uncovered_is_known_from_before_it_was_covered() -> None:
         if k > 1:
             image[50:140, 0:80] = 200
         time = k * FIRST_EVERY_S
-        memory.update(prepare_scene(image, time), [track(was, time)])
+        memory.update(prepare_scene(image, time), {"tool": blob(was)})
     changed = memory.changed(scene(9.0, wall), "tool")
     assert changed is not None
     assert not holds(changed, blob(wall))
@@ -155,7 +150,7 @@ def test_the_first_picture_is_kept_and_few_are(count: int) -> None:
     for k in range(count):
         time = k * FIRST_EVERY_S
         where = (20, 60) if k == 0 else (150, 60)
-        memory.update(prepare_scene(image, time), [track(where, time)])
+        memory.update(prepare_scene(image, time), {"tool": blob(where)})
     assert len(memory.kept) <= MOST_KEPT
     assert memory.kept[0].covered["tool"][80 // COARSER, 30 // COARSER]
 

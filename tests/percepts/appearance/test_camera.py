@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from visup.agent import CameraMotion
 from visup.percepts.appearance.looks.scene import prepare_scene
-from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
-from visup.percepts.appearance.tracking.points import STILL
+from visup.percepts.appearance.scenery.camera import CameraTrack, followed_camera
+from visup.percepts.appearance.scenery.points import STILL
 
 Image = NDArray[np.uint8]
 FPS, WIDTH, HEIGHT = 25.0, 240, 180

@@ -13,10 +13,10 @@ from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import prepare_scene
 from visup.percepts.appearance.looks.thing_model import view_models
 from visup.percepts.appearance.output.explaining import unexplained
+from visup.percepts.appearance.scenery.change import ChangeMap
+from visup.percepts.appearance.scenery.points import STILL
 from visup.percepts.appearance.tracking._rest_check_jit import like_before
-from visup.percepts.appearance.tracking.change import ChangeMap
 from visup.percepts.appearance.tracking.finding import candidates
-from visup.percepts.appearance.tracking.points import STILL
 from visup.percepts.appearance.tracking.verification import verify
 from visup.percepts.motion.outlines.region_outline import describe_mask
 

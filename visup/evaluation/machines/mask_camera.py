@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from visup.agent import CameraMotion, Directive, Frame, Observation, Percept
 from visup.agent.contract.behaviour import Contract
 from visup.percepts.appearance.looks.scene import Scene, prepare_scene
-from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
+from visup.percepts.appearance.scenery.camera import CameraTrack, followed_camera
 
 
 class SceneCamera:

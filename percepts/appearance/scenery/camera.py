@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.tracking.points import (
+from visup.percepts.appearance.scenery.points import (
     NO_POINTS,
     STILL,
     follow_points,

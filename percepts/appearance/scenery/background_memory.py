@@ -6,7 +6,7 @@ like what the arm carries. Where a place looks as it did while the object was so
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from visup.percepts.appearance.looks.blob import Blob
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.tracking.points import STILL
-from visup.percepts.appearance.tracking.track import IN_VIEW, ThingTrack
+from visup.percepts.appearance.scenery.points import STILL
 
 Bytes = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -73,21 +72,17 @@ class BackgroundMemory:
         self._every = FIRST_EVERY_S
         self._due = -np.inf
 
-    def update(self, scene: Scene, tracks: Iterable[ThingTrack]) -> None:
+    def update(self, scene: Scene, seen: Mapping[str, Blob]) -> None:
         """Keep a frame, if it is time.
 
         Args:
             scene: The frame.
-            tracks: The objects in it.
+            seen: The visible pixels of each object that is seen in it, by name.
         """
         if scene.time < self._due:
             return
-        seen = {
-            t.name: _covered(scene, t.visible)
-            for t in tracks
-            if t.visible is not None and t.state in IN_VIEW and t.seen == scene.time
-        }
-        self.kept = (*self.kept, KeptPicture(_small(scene), seen, _SAME))
+        covered = {name: _covered(scene, blob) for name, blob in seen.items()}
+        self.kept = (*self.kept, KeptPicture(_small(scene), covered, _SAME))
         if len(self.kept) > MOST_KEPT:
             self.kept, self._every = self.kept[::2], 2 * self._every
         self._due = scene.time + self._every - 1e-6

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.tracking.points import STILL
+from visup.percepts.appearance.scenery.points import STILL
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
