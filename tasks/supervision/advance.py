@@ -122,16 +122,15 @@ class Advance:
         known = [s for s in since if s is not None]
         return max(known, default=None) if len(known) == len(since) else None
 
-    def _goes_on(self, transition: OpenTransition) -> bool:
-        """Whether the steps that a transition completes have lasted as long as required and still hold."""
-        return any(
-            x.step.hold_s is not None and self.observe(x.step).holds is Truth.TRUE
-            for x in transition.left
-        )
+    def _going_on(self, transition: OpenTransition) -> list[TaskStep]:
+        """The steps that a transition completes which have lasted as long as required and still hold."""
+        lasting = (x.step for x in transition.left if x.step.hold_s is not None)
+        return [s for s in lasting if self.observe(s).holds is Truth.TRUE]
 
     def _goes_round(self, transition: OpenTransition) -> bool:
-        """Whether the observed beginning is only an effect of moving around an object to stay near."""
-        return self._goes_on(transition) and any(self.observe(s).round for s in transition.entered)
+        """Whether the observed beginning is only an effect of moving around an object to stay near it."""
+        near = [set(s.actors) for s in self._going_on(transition)]
+        return any(set(s.actors) in near and self.observe(s).round for s in transition.entered)
 
     def _support(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, ways: int
@@ -148,7 +147,7 @@ class Advance:
         # off. A holding action does.
         if opens and (ways == 1 or all(self._holds(s) for s in transition.entered)):
             return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
-        if finished and not self._goes_on(transition):
+        if finished and not self._going_on(transition):
             return Support.OVER
         # A failing step is not passed unseen.
         fails = any(x.payload.status in BAD for x in transition.left)
