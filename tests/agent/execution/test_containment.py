@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -187,7 +188,10 @@ def test_memory_that_is_kept_is_noticed() -> None:
     kept: list[Any] = []
 
     def hoard(frame: Frame, observation: Observation) -> int:
-        kept.append(np.ones(8 * 2**20, np.uint8))
+        # Pages of its own: the allocator may hand out memory that earlier tests have left resident.
+        block = np.frombuffer(mmap.mmap(-1, 8 * 2**20), np.uint8)
+        block[:] = 1
+        kept.append(block)
         return frame.index
 
     told = reports(Plug(hoard, memory_mb=30.0), Limits(), 12)
