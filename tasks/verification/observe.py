@@ -59,6 +59,9 @@ class RelationLookup:
         looks: Evaluators of facts that are no plain relations of the mind (see `task_vocabulary`).
         before: The state of the previous moment.
         rhythms: Periodic facts, by key.
+
+    Attributes:
+        mind: As given.
     """
 
     def __init__(
