@@ -55,13 +55,10 @@ class RelationLookup:
     """All relations of a mind at one moment, by name and objects.
 
     Args:
-        mind: The mind.
+        mind: The mind; also an attribute.
         looks: Evaluators of facts that are no plain relations of the mind (see `task_vocabulary`).
         before: The state of the previous moment.
         rhythms: Periodic facts, by key.
-
-    Attributes:
-        mind: As given.
     """
 
     def __init__(
