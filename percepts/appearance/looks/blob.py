@@ -51,11 +51,9 @@ def overlap(a: Blob, b: Blob) -> float:
 
 def without(a: Blob, b: Blob) -> Blob:
     """What a blob has that another one has not; the blob itself where they do not meet."""
-    part = common_part(a, b)
-    if part is None or not (part[0] & part[1]).any():
-        return a
     left = Blob(a.window, a.mask.copy())
     part = common_part(left, b)
-    assert part is not None
+    if part is None or not (part[0] & part[1]).any():
+        return a
     part[0][part[1]] = False
     return left

@@ -125,9 +125,8 @@ def holds(changed: Mask, place: Blob) -> bool:
         changed: (h, w) bool, a quarter of the working size.
         place: The pixels that it would cover.
     """
-    left, top, right, bottom = place.window
-    whole = np.asarray(cv2.resize(place.mask.view(np.uint8), (right - left, bottom - top)))
-    ys, xs = np.nonzero(whole)
+    left, top, _, _ = place.window
+    ys, xs = np.nonzero(place.mask)
     rows = np.clip((ys + top) // COARSER, 0, changed.shape[0] - 1)
     columns = np.clip((xs + left) // COARSER, 0, changed.shape[1] - 1)
     return bool(len(ys) and np.mean(changed[rows, columns]) > CHANGED)

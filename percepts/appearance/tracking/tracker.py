@@ -132,6 +132,7 @@ class ThingTracker:
             self._follow(old, scene, same)
         else:
             self._camera, self._scenery = STILL, CameraTrack()
+            self._background = BackgroundMemory()
             self.tracks = tuple(_forgotten(t) for t in self.tracks)
         self._change.update(scene, STILL if self._camera is None else self._camera)
         self._background.move(self._camera)

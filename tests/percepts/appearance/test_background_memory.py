@@ -194,3 +194,10 @@ def test_what_comes_back_turned_is_found_by_its_colours_and_followed() -> None:
     for k, (region,) in enumerate(seen, 10):
         assert abs(region.centroid[0] - (120 + k + HIGH / 2)) < 6
         assert abs(region.centroid[1] - (130 + WIDE / 2)) < 6
+
+
+def test_what_was_seen_in_pictures_of_another_size_is_forgotten() -> None:
+    """A camera changes its resolution while the tool is away."""
+    away = list(leaves(45))
+    smaller = [np.asarray(cv2.resize(away[-1], (WIDTH // 2, HEIGHT // 2)), np.uint8)] * 6
+    assert len(told([*away, *smaller])) == len(away) + len(smaller)
