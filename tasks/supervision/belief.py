@@ -207,7 +207,8 @@ def _stage_belief(
         why = paused_by(pause, model.task, model.actions)
         return StageBelief(stage, Status.PAUSED, pause.spans[-1][0], monitor.confidence, why)
     why = evidence(leaf.step, meaning, monitor, now, model.actions)
-    return StageBelief(stage, monitor.status, monitor.since, monitor.confidence, why)
+    begun = monitor.begun is not None
+    return StageBelief(stage, monitor.status, monitor.since, monitor.confidence, why, begun)
 
 
 def _pause(hypothesis: TaskHypothesis, stage: str, snapshot: TaskSnapshot) -> Pause | None:

@@ -285,9 +285,9 @@ def observe(
     contrary = relations.first_given(meaning.contrary, ids)
     if contrary is None and meaning.name == "moving_together":
         contrary = came_apart(relations.mind, ids)
+    unreached = relations.unreached(meaning.name, ids, contrary)
     if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
         contrary = None
-    unreached = relations.unreached(meaning.name, ids, contrary)
     known = (*meaning.helps, *meaning.contrary)
     entry, sudden = relations.begun(meaning.begins, ids)
     return ActionObservation(
