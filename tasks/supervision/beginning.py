@@ -42,7 +42,12 @@ def _begun(before: StageBelief, now: StageBelief, stirs: bool) -> bool:
     if now.status is Status.PAUSED:
         return before.begun
     anew = before.status is Status.DONE and now.status is Status.ACTIVE
-    return stirs or now.begun or (before.begun and not anew) or now.status not in (Status.ACTIVE, Status.UNKNOWN)
+    return (
+        stirs
+        or now.begun
+        or (before.begun and not anew)
+        or now.status not in (Status.ACTIVE, Status.UNKNOWN)
+    )
 
 
 def stage_onsets(

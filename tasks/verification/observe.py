@@ -144,9 +144,9 @@ class RelationLookup:
         ways = {"moving_together": (objects, objects[::-1]), "converging": (objects,)}
         if any(put_down(self.mind, way) for way in ways.get(action, ())):
             return self.time
-        recedes = action == "converging" and contrary is not None and contrary.name == "diverging"
-        past = contrary if recedes and went_past(self.mind, objects) else None
-        return None if past is None else past.since
+        if contrary is None or (action, contrary.name) != ("converging", "diverging"):
+            return None
+        return contrary.since if went_past(self.mind, contrary) else None
 
     def begun(
         self, names: tuple[str, ...], objects: tuple[int, ...]

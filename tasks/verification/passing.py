@@ -81,13 +81,17 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
     return unsettled and not holds_on(mind, objects)
 
 
-def went_past(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether one of two has just gone past the other and moves on, rather than turned back before it.
+def went_past(mind: Mind, recession: Relation) -> bool:
+    """Whether one of two that recede has just gone past the other and moves on, rather than turned back.
 
-    Then their relative path of the last second or so is straight, and its nearest point lies well within it.
-    What is carried past something may be on a detour.
+    Then their relative path of the last second or so is straight, its nearest point lies well within it,
+    and they have receded since then: an outline that leaps later, as parts of a body go out of view, is no
+    passage. What is carried past something may be on a detour.
     """
+    objects = recession.objects
     if len(objects) != 2 or holds_on(mind, objects):
+        return False
+    if recession.since < sample_window(mind).times[0]:
         return False
     diagonal = image_diagonal(mind.frame_size)
     path = _centres(mind, objects[0]) - _centres(mind, objects[1])
