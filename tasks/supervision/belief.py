@@ -126,6 +126,30 @@ def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) 
     )
 
 
+def disordered_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) -> TaskBelief:
+    """The belief about a task whose order is broken: the stage that was to come first is failing.
+
+    Its stages go on only once that has been undone.
+
+    Args:
+        belief: The belief from the hypotheses.
+        before: The previous belief.
+        why: How the order is broken.
+        now: Seconds.
+    """
+    if belief.verdict in (*LOST, Verdict.SUCCEEDED):
+        return belief
+    if before.evidence == why:
+        return replace(belief, stages=before.stages, current=before.current, evidence=why)
+    stages = tuple(
+        replace(s, status=Status.FAILING, since=now, evidence=why, confidence=belief.confidence)
+        if s.stage == belief.current and s.status not in BAD
+        else s
+        for s in belief.stages
+    )
+    return replace(belief, verdict=Verdict.IN_PROGRESS, stages=stages, evidence=why)
+
+
 def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
     """The stages of a task that has not begun."""
     return tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(model.task))

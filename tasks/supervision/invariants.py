@@ -1,20 +1,27 @@
-"""Invariants: conditions that must never or always hold, during stages or a whole task."""
+"""Invariants: conditions that must never or always hold, during stages or a whole task; and its order."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from visup.agent import AlertCondition, Event, Mind, Severity, TaskBelief, Truth, Verdict
-from visup.tasks.automaton.states import leaves
+from visup.tasks.automaton.backpointers import behind
+from visup.tasks.automaton.out_of_turn import later_steps, out_of_turn
+from visup.tasks.automaton.prognosis import begun_by
+from visup.tasks.automaton.states import TaskStep, leaves
 from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Invariant
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.supervision.events import played
-from visup.tasks.supervision.memory import TaskMemory
+from visup.tasks.supervision.hypotheses import TaskHypotheses
+from visup.tasks.supervision.memory import Disorder, TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.supervision.sentences import verdict_sentence
+from visup.tasks.supervision.sentences import before_its_turn, verdict_sentence
 from visup.tasks.supervision.snapshot import TaskSnapshot
+
+MOST_LATER = 40
+"""Most later steps of a task that are watched for being done before their turn, the nearest ones."""
 
 
 def broken_since(
@@ -89,6 +96,71 @@ def _told(model: MonitoredPhases, belief: TaskBelief, reason: str) -> str:
     if belief.verdict is Verdict.SUCCEEDED:  # success is final
         return f"Task `{model.task.name}` has succeeded, but {reason}."
     return f"Task `{model.task.name}`: {reason}."
+
+
+def disorder(
+    model: MonitoredPhases,
+    snapshot: TaskSnapshot,
+    posterior: TaskHypotheses | None,
+    before: Disorder | None,
+) -> Disorder | None:
+    """A later step that is done before what must come first, until it has been undone; or None.
+
+    Only steps count that end once they have held, of actors of whom nothing was required before: what a
+    stage has left behind may go on, and may come back.
+
+    Args:
+        model: The task.
+        snapshot: The present observation.
+        posterior: The hypotheses; None while the task has not begun.
+        before: What was out of order in the previous step.
+    """
+    if before is not None and snapshot.observe(before.step).holds is not Truth.FALSE:
+        return before
+    if posterior is None or posterior.likeliest.finished is not None:
+        return None
+    hypothesis = posterior.likeliest
+    active = {x.step: x.payload for x in leaves(hypothesis.state)}
+    required = {frozenset(s.actors) for s in (*active, *_next(model, hypothesis.node))}
+    required |= {frozenset(b.step.actors) for b in behind(hypothesis.backpointer)}
+    entered = min(m.entered for m in active.values())
+    later = later_steps(model.automaton, hypothesis.node)[:MOST_LATER]
+    new = (s for s in later if frozenset(s.actors) not in required)
+
+    def lacks(step: TaskStep) -> bool:
+        if model.actions[step.action].lasts or (step in active and active[step].held):
+            return False
+        return snapshot.observe(step).holds is Truth.FALSE
+
+    done = (s for s in new if _done_since(model, snapshot, s, entered))
+    found = out_of_turn(model.automaton, hypothesis.node, done, lacks)
+    if found is None:
+        return None
+    step, first = found
+    held_by = snapshot.observe(step).held_by
+    assert held_by is not None
+    why = before_its_turn(step, model.actions[step.action], held_by.since, first.stage)
+    return Disorder(step, why)
+
+
+def _next(model: MonitoredPhases, node: int) -> Iterator[TaskStep]:
+    """The steps that may come next."""
+    for transition in model.automaton.transitions(node):
+        yield from begun_by(model.automaton, transition)
+
+
+def _done_since(
+    model: MonitoredPhases, snapshot: TaskSnapshot, step: TaskStep, entered: float
+) -> bool:
+    """Whether a step that ends by itself holds since some time after another, for as long as it should."""
+    meaning = model.actions[step.action]
+    if meaning.lasts or meaning.measures or step.already or step.is_told:
+        return False
+    held_by = snapshot.observe(step).held_by
+    if held_by is None or held_by.since <= entered:
+        return False
+    must = meaning.hold_s if step.hold_s is None else max(meaning.hold_s, step.hold_s)
+    return snapshot.mind.time - held_by.since >= must
 
 
 def patience(model: MonitoredPhases, invariant: Invariant) -> float:

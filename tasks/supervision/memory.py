@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from visup.agent import TaskBelief
+from visup.tasks.automaton.states import TaskStep
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.replay import PastLook
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity
 from visup.tasks.verification.observation import NOTHING_KEPT, Kept
+
+
+class Disorder(NamedTuple):
+    """A step that was done before its turn, and the reason in one clause."""
+
+    step: TaskStep
+    why: str
 
 
 @dataclass(frozen=True)
@@ -34,6 +43,7 @@ class TaskMemory:
         akin: Unknown objects present from the start: the rest of a machine of which only a part is known is
             not unexpected.
         violated: The invariant about one object by which the task has failed, or empty.
+        disorder: What was done before its turn and has not been undone, or None.
         forbidden: Whether a broken invariant interrupted it, which is final: its stages go on no further.
     """
 
@@ -54,3 +64,4 @@ class TaskMemory:
     violated: str = ""
     akin: tuple[int, ...] = ()
     forbidden: bool = False
+    disorder: Disorder | None = None

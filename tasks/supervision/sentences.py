@@ -220,6 +220,15 @@ def _too_soon(step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor) -
     )
 
 
+def before_its_turn(step: TaskStep, meaning: ActionDefinition, since: float, first: str) -> str:
+    """Why the order is broken: one clause."""
+    have = "has" if len(step.actors) < 2 else "have"
+    return (
+        f"{names(step.actors)} {have} been {meaning.text} since {since:.1f} s, "
+        f"before the turn of stage `{step.stage}`: stage `{first}` must be done first"
+    )
+
+
 def paused_by(pause: Pause, task: Task, actions: Words) -> str:
     """The reason for a pause and its beginning: one clause."""
     condition = pause.condition.condition

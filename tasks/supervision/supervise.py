@@ -39,6 +39,7 @@ from visup.tasks.casting.matching import (
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.beginning import is_first, stage_onsets, stirring, with_begun
 from visup.tasks.supervision.belief import (
+    disordered_belief,
     failed_belief,
     pending_stages,
     suppressed,
@@ -53,6 +54,7 @@ from visup.tasks.supervision.events import (
 )
 from visup.tasks.supervision.invariants import (
     broken_since,
+    disorder,
     invariant_concerns,
     invariant_events,
     violation,
@@ -246,6 +248,9 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         violated = violation(model, broken, now, safety=False)
     belief = task_belief(model, snapshot, posterior, interrupted)
     belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
+    disordered = disorder(model, snapshot, posterior, memory.disorder)
+    if disordered and not violated:
+        belief = disordered_belief(belief, memory.belief, disordered.why, now)
     if memory.forbidden:
         belief = replace(belief, stages=memory.belief.stages, current=memory.belief.current)
     broke = interrupted != memory.interrupted and not strangers
@@ -274,6 +279,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         violated,
         akin,
         memory.forbidden or broke,
+        disordered,
     )
 
 

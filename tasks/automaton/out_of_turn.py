@@ -1,0 +1,61 @@
+"""Steps that are done before what must come before them: a cap put on a base that still lacks its block.
+
+The course alone does not tell: what it passes on the way to a step may simply not have been seen. So a step
+is out of turn only if every way to it leads through a step that is known not to hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from visup.tasks.automaton.automaton import END, Automaton
+from visup.tasks.automaton.states import TaskStep
+
+MOST_NODES = 200
+"""Most nodes that are searched: of a task with very many states only the next ones are judged."""
+
+
+def later_steps(automaton: Automaton, node: int) -> tuple[TaskStep, ...]:
+    """The steps of the states that can be reached from a node, each once, the nearest first."""
+    return tuple(dict.fromkeys(_reached(automaton, node, lambda _: True)))
+
+
+def out_of_turn(
+    automaton: Automaton, node: int, steps: Iterator[TaskStep], lacks: Callable[[TaskStep], bool]
+) -> tuple[TaskStep, TaskStep] | None:
+    """The first of some steps to which every way leads through one that is lacking.
+
+    Args:
+        automaton: The states of the course.
+        node: The present one.
+        steps: Steps that hold now.
+        lacks: Whether a step is known not to hold, and has not held in its turn.
+
+    Returns:
+        That step, and the first lacking one on the way; None if there is no such step.
+    """
+    held = list(steps)
+    if not held:
+        return None
+    allowed = set(_reached(automaton, node, lambda s: not lacks(s)))
+    found = next((s for s in held if s not in allowed), None)
+    lacking = (s for s in later_steps(automaton, node) if lacks(s))
+    return None if found is None else (found, next(lacking))
+
+
+def _reached(
+    automaton: Automaton, node: int, passes: Callable[[TaskStep], bool]
+) -> Iterator[TaskStep]:
+    """The steps of a node, and of all that follow it by completing only steps that can be passed."""
+    found = {node: None}
+    ahead = [node]
+    for current in ahead:
+        steps = automaton.steps(current)
+        yield from steps
+        if len(found) >= MOST_NODES:
+            continue
+        for transition in automaton.transitions(current):
+            free = all(passes(steps[i]) for i in transition.left)
+            if free and transition.target != END and transition.target not in found:
+                found[transition.target] = None
+                ahead.append(transition.target)
