@@ -13,6 +13,7 @@ from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Invariant
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
+from visup.tasks.supervision.advance import BEFORE_S
 from visup.tasks.supervision.events import played
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.memory import Disorder, TaskMemory
@@ -157,9 +158,9 @@ def _done_since(
     if meaning.lasts or meaning.measures or step.already or step.is_told:
         return False
     held_by = snapshot.observe(step).held_by
-    if held_by is None or held_by.since <= entered:
+    if held_by is None or held_by.since <= entered + BEFORE_S:
         return False
-    must = meaning.hold_s if step.hold_s is None else max(meaning.hold_s, step.hold_s)
+    must = max(meaning.hold_s, step.hold_s or 0.0, model.settings.contrary_early_s)
     return snapshot.mind.time - held_by.since >= must
 
 
