@@ -91,12 +91,10 @@ def went_past(mind: Mind, recession: Relation) -> bool:
     objects = recession.objects
     if len(objects) != 2 or holds_on(mind, objects):
         return False
-    if recession.since < sample_window(mind).times[0]:
-        return False
-    diagonal = image_diagonal(mind.frame_size)
+    diagonal, times = image_diagonal(mind.frame_size), sample_window(mind).times
     path = _centres(mind, objects[0]) - _centres(mind, objects[1])
     path = path[~np.isnan(path).any(axis=1)]
-    if len(path) < LEAST_SAMPLES:
+    if len(path) < LEAST_SAMPLES or recession.since < times[0]:
         return False
     thirds = path[[0, len(path) // 3, 2 * len(path) // 3, -1]]
     walked = np.hypot(*np.diff(thirds, axis=0).T)
