@@ -6,7 +6,7 @@ is out of turn only if every way to it leads through a step that is known not to
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.states import TaskStep
@@ -15,19 +15,22 @@ MOST_NODES = 200
 """Most nodes that are searched: of a task with very many states only the next ones are judged."""
 
 
-def later_steps(automaton: Automaton, node: int) -> tuple[TaskStep, ...]:
-    """The steps of the states that can be reached from a node, each once, the nearest first."""
-    return tuple(dict.fromkeys(_reached(automaton, node, lambda _: True)))
+def later_steps(automaton: Automaton, nodes: Iterable[int]) -> tuple[TaskStep, ...]:
+    """The steps of some nodes and of all that can be reached from them, each once, the nearest first."""
+    return tuple(dict.fromkeys(_reached(automaton, nodes, lambda _: True)))
 
 
 def out_of_turn(
-    automaton: Automaton, node: int, steps: Iterator[TaskStep], lacks: Callable[[TaskStep], bool]
+    automaton: Automaton,
+    nodes: Collection[int],
+    steps: Iterable[TaskStep],
+    lacks: Callable[[TaskStep], bool],
 ) -> tuple[TaskStep, TaskStep] | None:
     """The first of some steps to which every way leads through one that is lacking.
 
     Args:
         automaton: The states of the course.
-        node: The present one.
+        nodes: Those that may be the present one.
         steps: Steps that hold now.
         lacks: Whether a step is known not to hold, and has not held in its turn.
 
@@ -37,18 +40,18 @@ def out_of_turn(
     held = list(steps)
     if not held:
         return None
-    allowed = set(_reached(automaton, node, lambda s: not lacks(s)))
+    allowed = set(_reached(automaton, nodes, lambda s: not lacks(s)))
     found = next((s for s in held if s not in allowed), None)
-    lacking = (s for s in later_steps(automaton, node) if lacks(s))
+    lacking = (s for s in later_steps(automaton, nodes) if lacks(s))
     return None if found is None else (found, next(lacking))
 
 
 def _reached(
-    automaton: Automaton, node: int, passes: Callable[[TaskStep], bool]
+    automaton: Automaton, nodes: Iterable[int], passes: Callable[[TaskStep], bool]
 ) -> Iterator[TaskStep]:
-    """The steps of a node, and of all that follow it by completing only steps that can be passed."""
-    found = {node: None}
-    ahead = [node]
+    """The steps of some nodes, and of all that follow by completing only steps that can be passed."""
+    ahead = list(nodes)
+    found = set(ahead)
     for current in ahead:
         steps = automaton.steps(current)
         yield from steps
@@ -57,5 +60,5 @@ def _reached(
         for transition in automaton.transitions(current):
             free = all(passes(steps[i]) for i in transition.left)
             if free and transition.target != END and transition.target not in found:
-                found[transition.target] = None
+                found.add(transition.target)
                 ahead.append(transition.target)

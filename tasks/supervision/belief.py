@@ -21,12 +21,14 @@ from visup.tasks.automaton.states import leaves
 from visup.tasks.grammar.structure import stage_names
 from visup.tasks.grammar.templates import called
 from visup.tasks.supervision.hypotheses import (
+    NEAR,
     NOT_BEGUN,
     WORST_FIRST,
     Progress,
     Standing,
     TaskHypotheses,
     TaskHypothesis,
+    likely,
     standings,
     under_way,
 )
@@ -37,7 +39,6 @@ from visup.tasks.supervision.task_inference import TaskActivity
 from visup.tasks.verification.pauses import Pause
 from visup.tasks.verification.step_monitor import BAD
 
-NEAR = 0.01  # hypotheses at least this likely relative to the best contribute to the expectations
 DIGITS = 9  # probabilities that differ by less are equal
 # Of two equally likely next stages neither is reported to have begun: a waiting stage is reported only if
 # that is more likely than pending after rounding to this many digits.
@@ -79,7 +80,7 @@ def task_belief(
     if current is not None and verdict is not Verdict.FAILED:
         probability = _under_way(posterior)[current]
     why = _why(verdict, teller, stages, current)
-    near = _near(posterior)
+    near = likely(posterior)
     told = Verdict.INTERRUPTED if interrupted else verdict
     return TaskBelief(
         name,
@@ -139,15 +140,16 @@ def disordered_belief(belief: TaskBelief, before: TaskBelief, why: str, now: flo
     """
     if belief.verdict in (*LOST, Verdict.SUCCEEDED):
         return belief
+    belief = replace(belief, verdict=Verdict.IN_PROGRESS, evidence=why)
     if before.evidence == why:
-        return replace(belief, stages=before.stages, current=before.current, evidence=why)
+        return replace(belief, stages=before.stages, current=before.current)
     stages = tuple(
         replace(s, status=Status.FAILING, since=now, evidence=why, confidence=belief.confidence)
         if s.stage == belief.current and s.status not in BAD
         else s
         for s in belief.stages
     )
-    return replace(belief, verdict=Verdict.IN_PROGRESS, stages=stages, evidence=why)
+    return replace(belief, stages=stages)
 
 
 def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
@@ -299,15 +301,6 @@ def _current(posterior: TaskHypotheses) -> str:
     steps = next(found for h in hypotheses if (found := under_way(h)).keys() & tied)
     here = {stage: leaf for stage, leaf in steps.items() if stage in tied}
     return min(here, key=lambda s: WORST_FIRST.index(here[s].payload.status))
-
-
-def _near(posterior: TaskHypotheses) -> TaskHypotheses:
-    """The hypotheses that are not much less likely than the best, renormalised."""
-    least = NEAR * posterior.hypotheses[posterior.best].mass
-    near = {k: w for k, w in posterior.hypotheses.items() if w.mass >= least}
-    whole = sum(w.mass for w in near.values())
-    shares = {k: replace(w, mass=w.mass / whole) for k, w in near.items()}
-    return replace(posterior, hypotheses=shares)
 
 
 def _prospects(

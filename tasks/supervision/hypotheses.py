@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from visup.agent import StageBelief, Status
+from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import Backpointer
 from visup.tasks.automaton.entries import Meetings, StepEntries
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
@@ -96,6 +97,9 @@ class TaskHypothesis:
         return any(p.status is Status.FAILED for p in self.past)
 
 
+NEAR = 0.01
+"""Hypotheses at least this likely, relative to the best, contribute to what is expected."""
+
 TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 """The hypotheses about a task by the number of their state, with their probabilities."""
 
@@ -161,3 +165,12 @@ def standings(hypothesis: TaskHypothesis) -> Mapping[str, Standing]:
         status = leaf.payload.status
         found[stage] = (Progress.BEHIND, Status.DONE) if done else (Progress.UNDER_WAY, status)
     return found
+
+
+def likely(posterior: TaskHypotheses) -> TaskHypotheses:
+    """The hypotheses that are not much less likely than the best, renormalised."""
+    least = NEAR * posterior.hypotheses[posterior.best].mass
+    near = {k: w for k, w in posterior.hypotheses.items() if w.mass >= least}
+    whole = sum(w.mass for w in near.values())
+    shares = {k: replace(w, mass=w.mass / whole) for k, w in near.items()}
+    return replace(posterior, hypotheses=shares)

@@ -15,7 +15,7 @@ from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.supervision.advance import BEFORE_S
 from visup.tasks.supervision.events import played
-from visup.tasks.supervision.hypotheses import TaskHypotheses
+from visup.tasks.supervision.hypotheses import TaskHypotheses, likely
 from visup.tasks.supervision.memory import Disorder, TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.sentences import before_its_turn, verdict_sentence
@@ -120,12 +120,14 @@ def disorder(
         return before
     if posterior is None or posterior.likeliest.finished is not None:
         return None
-    hypothesis = posterior.likeliest
-    active = {x.step: x.payload for x in leaves(hypothesis.state)}
-    required = {frozenset(s.actors) for s in (*active, *_next(model, hypothesis.node))}
-    required |= {frozenset(b.step.actors) for b in behind(hypothesis.backpointer)}
+    nodes = tuple(likely(posterior).hypotheses)
+    hypotheses = [posterior.hypotheses[n].value for n in nodes]
+    active = {x.step: x.payload for h in hypotheses for x in leaves(h.state)}
+    required = {frozenset(s.actors) for s in active}
+    required |= {frozenset(s.actors) for n in nodes for s in _next(model, n)}
+    required |= {frozenset(b.step.actors) for h in hypotheses for b in behind(h.backpointer)}
     entered = min(m.entered for m in active.values())
-    later = later_steps(model.automaton, hypothesis.node)[:MOST_LATER]
+    later = later_steps(model.automaton, nodes)[:MOST_LATER]
     new = (s for s in later if frozenset(s.actors) not in required)
 
     def lacks(step: TaskStep) -> bool:
@@ -134,7 +136,7 @@ def disorder(
         return snapshot.observe(step).holds is Truth.FALSE
 
     done = (s for s in new if _done_since(model, snapshot, s, entered))
-    found = out_of_turn(model.automaton, hypothesis.node, done, lacks)
+    found = out_of_turn(model.automaton, nodes, done, lacks)
     if found is None:
         return None
     step, first = found

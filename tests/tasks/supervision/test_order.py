@@ -47,6 +47,64 @@ def test_what_was_so_before_its_turn_is_not_done_in_it(since: float) -> None:
     assert any("before stage `b` began" in e.text for e in played.events)
 
 
+THREE = (
+    "<t> ::= <a> <b> <c>\n<a> ::= touching(leg_1, top)\n<b> ::= {}touching(leg_2, top)\n"
+    "<c> ::= {}touching(leg_3, top)"
+)
+
+
+def told_early(played: Played, since: float) -> list[str]:
+    """The stages that are told to fail within 4 s since a later one was done."""
+    events = (e for e in played.events if e.kind == "stage_failing" and e.time < since + 4.0)
+    return [str(e.data["stage"]) for e in events if "before the turn of" in e.text]
+
+
+def test_the_last_part_that_is_put_on_first_is_told_at_once() -> None:
+    played = watched(THREE.format("", ""), scene((4, 4.0)), 12.0)
+    assert told_early(played, 4.0) == ["a"]
+    assert finish(task_of(played)) is Verdict.FAILED
+    (told,) = (e.text for e in played.events if e.kind == "stage_failing")
+    assert "`c`" in told
+    assert "stage `a` must be done first" in told
+
+
+@pytest.mark.parametrize(
+    ("extra", "here"),
+    [
+        (("", "already "), HERE),  # it may have been so before
+        (("", ""), {k: v for k, v in HERE.items() if k != LEGS[0]}),  # nobody knows about the first
+    ],
+)
+def test_what_may_be_so_is_not_told_to_be_out_of_order(
+    extra: tuple[str, str], here: dict[int, tuple[float, float]]
+) -> None:
+    script = replace(scene((4, 4.0)), objects=here)
+    assert told_early(watched(THREE.format(*extra), script, 12.0), 4.0) == []
+
+
+@pytest.mark.parametrize(("until", "told"), [(5.5, False), (8.0, True)])
+def test_what_is_undone_is_done_again_in_its_turn(until: float, told: bool) -> None:
+    spells = (
+        Spell("touching", 4.0, until, (TOP, 4)),
+        Spell("touching", 10.0, 1e9, (TOP, 2)),
+        Spell("touching", 14.0, 1e9, (TOP, 3)),
+        Spell("touching", 18.0, 1e9, (TOP, 4)),
+    )
+    played = watched(THREE.format("", ""), Script(spells, objects=HERE, identities=NAMES))
+    assert bool(told_early(played, 4.0)) is told
+    assert finish(task_of(played)) is Verdict.SUCCEEDED
+
+
+def test_what_is_not_undone_stays_out_of_order_though_the_rest_is_done() -> None:
+    played = watched(THREE.format("", ""), scene((4, 4.0), (2, 10.0), (3, 14.0)))
+    assert finish(task_of(played)) is Verdict.FAILED
+    assert told_early(played, 4.0) == ["a"]
+
+
+def test_what_was_so_when_the_task_began_is_no_work_of_the_task() -> None:
+    assert told_early(watched(THREE.format("", ""), scene((4, 0.0)), 12.0), 0.0) == []
+
+
 @pytest.mark.parametrize("since", [0.0, 2.0, 6.0])
 def test_already_takes_what_was_so_before(since: float) -> None:
     assert verdict(TWO.format("already "), scene((2, 10.0), (3, since))) is Verdict.SUCCEEDED
