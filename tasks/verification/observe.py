@@ -155,8 +155,6 @@ class RelationLookup:
         entry = self.first_true(names, objects)
         if entry is not None and entry.name == "coupled" and gapes(self.mind, *objects):
             return None, None  # it is about to be doubted
-        if entry is not None and entry.name == "diverging" and still_meet(self.mind, objects):
-            return None, None
         if entry is not None:
             return (None if self._sudden.ends(entry) else entry), None
         sudden = self._sudden.first(names, objects)

@@ -63,7 +63,7 @@ def test_who_goes_past_fails_to_dock_and_who_turns_back_to_approach(
 
 def alongside(now: float) -> Mask:
     """A vehicle that passes along a long charger without reaching it, and bears off slowly."""
-    x = eased(now, (0.5, 10.0), (8.0, 420.0))
+    x = eased(now, (0.5, 10.0), (9.0, 440.0))
     y = eased(now, (0.5, 40.0), (4.0, 80.0), (7.5, 50.0))
     return drawn({CHARGER: (120, 150, 240, 40), VEHICLE: (x, y, 50, 40)})
 
@@ -72,7 +72,7 @@ def test_who_passes_along_what_it_should_reach_has_begun_to_dock_and_fails_there
     tmp_path: Path,
 ) -> None:
     roles = {"vehicle": VEHICLE, "charger": CHARGER}
-    events = watched(tmp_path, CHARGE, alongside, roles, 8.0)
+    events = watched(tmp_path, CHARGE, alongside, roles, 9.0)
     begun = first(events, "stage_started", "docked")
     assert begun == pytest.approx(4.5, abs=0.7)  # it is nearest at 4 s
     assert first(events, "stage_done", "approach") == begun
