@@ -108,7 +108,8 @@ def disorder(
     """A later step that is done before what must come first, until it has been undone; or None.
 
     Only steps count that end once they have held, of actors of whom nothing was required before: what a
-    stage has left behind may go on, and may come back.
+    stage has left behind may go on, and may come back. And they must be work: that two are apart, as a later
+    stage requires, is so before anything is done.
 
     Args:
         model: The task.
@@ -126,7 +127,7 @@ def disorder(
     required = {frozenset(s.actors) for s in active}
     required |= {frozenset(s.actors) for n in nodes for s in _next(model, n)}
     required |= {frozenset(b.step.actors) for h in hypotheses for b in behind(h.backpointer)}
-    entered = min(m.entered for m in active.values())
+    entered = min(x.payload.entered for x in leaves(posterior.likeliest.state))
     later = later_steps(model.automaton, nodes)[:MOST_LATER]
     new = (s for s in later if frozenset(s.actors) not in required)
 
@@ -157,7 +158,7 @@ def _done_since(
 ) -> bool:
     """Whether a step that ends by itself holds since some time after another, for as long as it should."""
     meaning = model.actions[step.action]
-    if meaning.lasts or meaning.measures or step.already or step.is_told:
+    if meaning.lasts or meaning.measures or meaning.undoes or step.already or step.is_told:
         return False
     held_by = snapshot.observe(step).held_by
     if held_by is None or held_by.since <= entered + BEFORE_S:
