@@ -25,6 +25,7 @@ from visup.percepts.appearance.tracking.track import ThingTrack
 from visup.percepts.appearance.tracking.tracker import ThingTracker
 from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
 from visup.percepts.motion.outlines.region_outline import RegionOutline
+from visup.percepts.taught.light import relit
 from visup.percepts.taught.view import TaughtView
 
 SAME = 0.4  # overlap (IoU) from which a moving region is a newly detected object
@@ -48,17 +49,21 @@ class AppearanceBehaviour:
     def __init__(
         self, taught: Sequence[TaughtView] = (), motion: MotionBehaviour | None = None
     ) -> None:
+        self._taught = tuple(taught)
         self._motion = motion or MotionBehaviour()
         self._tracker = ThingTracker(view_models(taught))
+        self._relit: tuple[tuple[int, TaughtView], ...] | None = None
         self._drawn: dict[str, tuple[Blob, RegionOutline | None]] = {}
 
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
-        return {"motion": self._motion.save(), "tracker": self._tracker.save()}
+        tracker = self._tracker.save()
+        return {"motion": self._motion.save(), "tracker": tracker, "relit": self._relit}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a behaviour with the same settings."""
         self._motion.load(state["motion"])
+        self._see_in_light(state["relit"])
         self._tracker.load(state["tracker"])
 
     def missed(self, observation: Observation) -> None:
@@ -83,6 +88,8 @@ class AppearanceBehaviour:
         moving = [p.value for p in self._motion.perceive(frame, observation, directives)]
         if not image_is_sound(observation):
             return []
+        if self._relit is None:
+            self._see_in_light(tuple(relit(self._taught, frame.image)))
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
         bodies = [moving_body(r, scene) for r in moving] if self._tracker.seeks_new else []
@@ -107,6 +114,18 @@ class AppearanceBehaviour:
             *(self._named(frame, t, r) for t, r in things),
         ]
 
+    def _see_in_light(self, views: tuple[tuple[int, TaughtView], ...] | None) -> None:
+        """Seek the taught objects by their views in the light of the video, too."""
+        self._relit = views
+        if views:
+            self._tracker = ThingTracker(view_models([*self._taught, *(v for _, v in views)]))
+
+    def _view_number(self, track: ThingTrack) -> int:
+        """Number, from 0, of the taught view that an object matches, among those of its name."""
+        origins = [*range(len(self._taught)), *(k for k, _ in self._relit or ())]
+        mine = [k for k, v in enumerate(self._taught) if v.name == track.name]
+        return mine.index(origins[track.number])
+
     def _outline(self, track: ThingTrack, scene: Scene) -> RegionOutline | None:
         """The visible outline of an object; redrawn only when it has changed."""
         known = self._drawn.get(track.name)
@@ -128,6 +147,6 @@ class AppearanceBehaviour:
 
     def _named(self, frame: Frame, track: ThingTrack, region: Region) -> Percept:
         sure = confidence(track)
-        number = self._tracker.view_number(track)
+        number = self._view_number(track)
         it = Hypothesis(region_id=region.id, name=track.name, view=number, similarity=sure)
         return self._percept(frame, "hypothesis", it, sure)

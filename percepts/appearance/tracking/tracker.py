@@ -142,10 +142,6 @@ class ThingTracker:
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
         return self.tracks
 
-    def view_number(self, track: ThingTrack) -> int:
-        """Number, from 0, of the view that an object matches, among those of its name."""
-        return self._numbers(track.name).index(track.number)
-
     def _numbers(self, name: str) -> list[int]:
         return [k for k, v in enumerate(self.views) if v.name == name]
 

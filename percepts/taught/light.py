@@ -1,0 +1,66 @@
+"""Other light: taught views as they would look in the light of the present picture.
+
+A lamp that is dimmed, or a cloud, changes all colours of a place alike, and with them each bin of a colour
+histogram. By how much, the taught picture tells beside the present one. That may show another place, or the
+same from another side, so that what is estimated is only likely: views in that light are added to the taught
+ones, and replace none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.taught.view import TaughtView
+
+CELLS = (32, 24)
+"""Cells of a picture, across and down."""
+
+LEAST_CHANGE = 0.18
+"""Least change of the light that matters, as a natural logarithm: by more than a step of the histograms."""
+
+
+def relit(
+    views: Sequence[TaughtView], picture: NDArray[np.uint8]
+) -> Iterator[tuple[int, TaughtView]]:
+    """The taught views in the light of a picture, as far as that differs from the light of theirs.
+
+    Args:
+        views: The taught views.
+        picture: (H, W), (H, W, 1) or (H, W, 3) uint8, BGR, of any size.
+
+    Yields:
+        The number of a view, and that view in the light of the picture.
+    """
+    if picture.ndim == 2 or picture.shape[2] == 1:
+        picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    for number, view in enumerate(views):
+        gain = light_change(view.scene, picture)
+        if np.abs(np.log(gain)).max() >= LEAST_CHANGE:
+            image = np.clip(np.rint(view.image * gain), 0, 255).astype(np.uint8)
+            yield number, replace(view, image=image)
+
+
+def light_change(then: NDArray[np.uint8], now: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """The change of light from one picture to another.
+
+    Args:
+        then: (H, W, 3) uint8, BGR.
+        now: The same, of any size.
+
+    Returns:
+        (3,) factors of blue, green and red: medians over the cells of the picture.
+    """
+    change = (_cells(now) - _cells(then)).reshape(-1, 3)
+    return np.asarray(np.exp(np.median(change, axis=0)))
+
+
+def _cells(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """(24, 32, 3) logarithms of the mean colours of the cells of a picture."""
+    small = cv2.resize(picture, CELLS, interpolation=cv2.INTER_AREA)
+    logarithms: NDArray[np.float64] = np.log(np.asarray(small, dtype=np.float64) + 1.0)
+    return logarithms
