@@ -29,10 +29,15 @@ START: Places = {"tray": (150, 110), "part": (40, 60)}
 
 
 def look(
-    behaviour: AppearanceBehaviour, number: int, places: Places, health: Health | None = None
+    behaviour: AppearanceBehaviour,
+    number: int,
+    places: Places,
+    health: Health | None = None,
+    light: float = 1.0,
 ) -> dict[str, Region]:
     """The named regions of one frame."""
     image, _ = picture(places, seed=number)
+    image = (image * light).astype(np.uint8)
     frame = Frame(number, number / FPS, image)
     reports: tuple[Report, ...] = ()
     if health is not None:
@@ -64,6 +69,31 @@ def carried(steps: int) -> list[Places]:
         out.append({"tray": (150, 110), "part": (x, y), "tool": (x + 4, y - 48)})
     end = {"tray": (150, 110), "part": (170, 115)}
     return [*out, *[end | {"tool": (174, 67 - 6 * k)} for k in range(8)], *[end] * 4]
+
+
+@pytest.mark.parametrize("light", [0.4, 0.6])
+def test_things_are_found_in_other_light_by_the_views_that_were_taught(light: float) -> None:
+    elsewhere = shown({"tray": (20, 20), "part": (180, 120)}, "tray", "part", "part")
+    behaviour = AppearanceBehaviour(elsewhere)
+    for number in range(4):
+        seen = look(behaviour, number, START, light=light)
+        assert {n for n in seen if iou(seen[n], START, n) > 0.8} == {"tray", "part"}
+    # A behaviour that goes on from there knows the same views, and their light.
+    other = AppearanceBehaviour(elsewhere)
+    other.load(load_state(dump_state(behaviour.save())))
+    again = look(other, 4, START, light=light)
+    assert again.keys() == seen.keys()
+    assert all(h.view in (0, 1) for h in names_of(other, 5, START, light))
+
+
+def names_of(
+    behaviour: AppearanceBehaviour, number: int, places: Places, light: float
+) -> list[Hypothesis]:
+    """The hypotheses of one frame."""
+    image = (picture(places, seed=number)[0] * light).astype(np.uint8)
+    frame = Frame(number, number / FPS, image)
+    percepts = behaviour.perceive(frame, Observation(number, frame.time, frame.size, ()), ())
+    return [p.value for p in percepts if isinstance(p.value, Hypothesis)]
 
 
 def test_things_at_rest_are_named_and_keep_exactly_their_mask() -> None:
