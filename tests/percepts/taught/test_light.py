@@ -15,7 +15,7 @@ MOVED = {"tray": (150, 110), "part": (170, 20), "tool": (100, 90)}
 
 
 def dimmed(image: Image, light: tuple[float, ...]) -> Image:
-    return np.clip(image * np.asarray(light), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(image * np.asarray(light), 0, 255), dtype=np.uint8)
 
 
 @given(st.tuples(*[st.floats(0.3, 1.2)] * 3))

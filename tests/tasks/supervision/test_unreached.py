@@ -78,6 +78,7 @@ def test_who_passes_along_what_it_should_reach_has_begun_to_dock_and_fails_there
     assert first(events, "stage_done", "approach") == begun
     fails = first(events, "stage_failing", "docked")
     assert fails is not None
+    assert begun is not None
     assert fails >= begun
     assert first(events, "stage_failing", "approach") is None
 
