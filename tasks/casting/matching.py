@@ -165,12 +165,12 @@ def unexplained(
     by themselves, and a task need not name whoever handles them.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
-    held = {i for c in mind.couplings if bound.intersection(c.objects) for i in c.objects}
+    held = handlers(mind, bindings, settings)
     bindings = [replace(b, object_id=None) if b.guessed else b for b in bindings]
     if task is not None:
         bound.update(bystanders(task, mind, bindings, settings))
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
-    others = [o for o in others if o.id not in held or o.strength >= settings.familiar]
+    others = [o for o in others if o.id not in held]
     if task is not None and task.bystanders:
         # Identification takes a while, and until then it may be one of them.
         others = [o for o in others if mind.time - o.first_seen >= settings.acquainted_s]
@@ -191,6 +191,19 @@ def unexplained(
     rows = [fits(Role(task, a, mind, playing), (), strange) for a in awaited]
     free = [all(row[j] < settings.bind_at for row in rows) for j in range(len(strange))]
     return tuple(o.id for o, is_free in zip(strange, free, strict=True) if is_free)
+
+
+def handlers(
+    mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
+) -> tuple[int, ...]:
+    """Ids of unknown objects that hold an actor, or are held by one: who handles it, or the rest of it."""
+    bound = {b.object_id for b in bindings if b.object_id is not None}
+    held = {i for c in mind.couplings if bound.intersection(c.objects) for i in c.objects} - bound
+    return tuple(sorted(i for i in held if _unknown(mind, i, settings)))
+
+
+def _unknown(mind: Mind, number: int, settings: TaskSettings) -> bool:
+    return number in mind.objects and mind.objects[number].strength < settings.familiar
 
 
 def scenery(

@@ -40,8 +40,8 @@ class TaskMemory:
         gain: Latest evidence per second that it is in progress.
         inferred: Time of the last inference of whether it is in progress, seconds.
         looks: Observations while an actor is missing, to be replayed once it is found.
-        akin: Unknown objects present from the start: the rest of a machine of which only a part is known is
-            not unexpected.
+        akin: Unknown objects present from the start, or that once held an actor: the rest of a machine of
+            which only a part is known, or who works there, is not unexpected.
         violated: The invariant about one object by which the task has failed, or empty.
         disorder: What was done before its turn and has not been undone, or None.
         forbidden: Whether a broken invariant interrupted it, which is final: its stages go on no further.

@@ -31,6 +31,7 @@ from visup.tasks.automaton.states import leaves
 from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.casting.matching import (
     bystanders,
+    handlers,
     machines,
     match,
     scenery,
@@ -235,7 +236,8 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     if start is not None and posterior is not None:
         gain = model.gain(posterior.likeliest, snapshot.observe)
     broken = broken_since(model, snapshot, memory)
-    akin = tuple(sorted({*memory.akin, *scenery(mind, bindings, settings)}))
+    known = {*scenery(mind, bindings, settings), *handlers(mind, bindings, settings)}
+    akin = tuple(sorted(known.union(memory.akin)))
     strange = tuple(s for s in _strange(model, snapshot, memory) if s[0] not in akin)
     interrupted, strangers = memory.interrupted, memory.strangers
     let_be = bystanders(model.task, mind, bindings, settings)

@@ -6,9 +6,22 @@ import math
 
 import pytest
 
-from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, Script, Spell, task_of, watch
-from visup.agent import Expectation, Truth
+from tests.tasks.scripted import (
+    ARM,
+    IDENTITIES,
+    INTRUDER,
+    SATELLITE,
+    Script,
+    Spell,
+    play,
+    task_of,
+    watch,
+)
+from visup.agent import Coupling, Expectation, Mind, Observation, Outcome, Truth
+from visup.agent.model.fast_replace import replace
+from visup.tasks import parse_task
 from visup.tasks.supervision.monitored_phases import brought_along
+from visup.tasks.supervision.supervise import task_reasoner
 
 THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
 MEETS = Spell("converging", 0.5, 2.0), Spell("touching", 2.0, 20.0)
@@ -125,3 +138,28 @@ def test_only_carriers_come_along() -> None:
         asked = [(holder, ("moving_together",)), nears]
         assert list(brought_along(asked)) == [(("arm", "tray"), ("converging",))]
     assert list(brought_along([(("tray", "part"), ("coupled",)), nears])) == []
+
+
+@pytest.mark.parametrize(
+    ("held", "name", "strange"),
+    [
+        ((), "", True),
+        ((ARM, INTRUDER), "", False),  # the rest of the arm, or who hands it something
+        ((ARM, INTRUDER), "dish", True),  # a known thing that plays no part
+        ((INTRUDER, 9), "", True),  # it holds something else
+    ],
+)
+def test_an_unknown_that_once_held_an_actor_stays_explained(
+    held: tuple[int, int] | tuple[()], name: str, strange: bool
+) -> None:
+    reasoner = task_reasoner([parse_task(CAPTURE)])
+
+    def think(before: Mind, observation: Observation) -> Outcome:
+        couplings = (Coupling(held, 3.0),) if held and 3.0 <= before.time < 5.0 else ()
+        return reasoner(replace(before, couplings=couplings), observation)
+
+    names = {k: v for k, v in IDENTITIES.items() if k != INTRUDER} | (
+        {INTRUDER: {name: 0.9}} if name else {}
+    )
+    script = Script(MEETS, objects=THREE | {INTRUDER: (2.0, 1e9)}, identities=names)
+    assert (INTRUDER in task_of(play(think, script, 8.0)).unexplained) is strange
