@@ -82,7 +82,7 @@ def test_things_are_found_in_other_light_by_the_views_that_were_taught(light: fl
     other = AppearanceBehaviour(elsewhere)
     other.load(load_state(dump_state(behaviour.save())))
     again = look(other, 4, START, light=light)
-    assert again.keys() == seen.keys()
+    assert {n: r.id for n, r in again.items()} == {n: r.id for n, r in seen.items()}
     assert all(h.view in (0, 1) for h in names_of(other, 5, START, light))
 
 

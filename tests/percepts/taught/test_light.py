@@ -24,6 +24,12 @@ def test_the_change_of_light_is_found_though_things_move(light: tuple[float, ...
     assert found == pytest.approx(light, rel=0.06)
 
 
+def test_what_fills_a_third_of_the_picture_changes_no_light() -> None:
+    image = picture(START)[0].copy()
+    image[:, :70] = 5
+    assert light_change(picture(START)[0], image) == pytest.approx((1.0, 1.0, 1.0), abs=0.05)
+
+
 @pytest.mark.parametrize("light", [(1.0, 1.0, 1.0), (0.9, 0.95, 1.0)])
 def test_in_almost_the_same_light_there_is_no_other_view(light: tuple[float, ...]) -> None:
     assert not list(relit(shown(START, "part", "tray"), dimmed(picture(MOVED)[0], light)))

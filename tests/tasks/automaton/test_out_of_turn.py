@@ -52,6 +52,7 @@ def test_in_a_row_the_first_that_is_held_behind_a_lacking_one(
         ("any order (<a>, <b>) <c>", "c", "b", ("c", "b")),
         ("<a> <b>+ <c>", "c", "b", ("c", "b")),
         ("<a> <b>* <c>", "c", "b", None),
+        ("(<a> & <b>) <c>", "c", "b", ("c", "b")),  # one of two that go on side by side
         ("<a> <b> <c>", "c", "", None),
         ("<a> <b> <c>", "", "ab", None),
     ],

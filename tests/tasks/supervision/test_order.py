@@ -99,6 +99,28 @@ def test_what_is_not_undone_stays_out_of_order_though_the_rest_is_done() -> None
     played = watched(THREE.format("", ""), scene((4, 4.0), (2, 10.0), (3, 14.0)))
     assert finish(task_of(played)) is Verdict.FAILED
     assert told_early(played, 4.0) == ["a"]
+    # Nor does it help that what was lacking is done by and by.
+    before = watched(THREE.format("", ""), scene((4, 4.0), (2, 10.0), (3, 14.0)), 16.0)
+    assert finish(task_of(before)) is Verdict.FAILED
+    assert not any(e.kind == "stage_done" for e in before.events)
+
+
+@pytest.mark.parametrize(
+    ("last", "spells"),
+    [
+        # It is so before anything is done.
+        ("apart(leg_3, top)", (Spell("touching", 0.0, 4.0, (TOP, 4)),)),
+        # What the first stage has left behind goes on.
+        ("coupled(leg_1, top)", (Spell("coupled", 6.0, 1e9, (TOP, 2)),)),
+    ],
+)
+def test_what_is_no_work_or_goes_on_is_not_out_of_order(
+    last: str, spells: tuple[Spell, ...]
+) -> None:
+    text = THREE.format("", "").replace("touching(leg_3, top)", last)
+    spells += (Spell("touching", 2.0, 1e9, (TOP, 2)),) if "coupled" in last else ()
+    played = watched(text, Script(spells, objects=HERE, identities=NAMES), 12.0)
+    assert not any("before the turn of" in e.text for e in played.events)
 
 
 def test_what_was_so_when_the_task_began_is_no_work_of_the_task() -> None:
