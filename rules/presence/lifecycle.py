@@ -18,7 +18,7 @@ from enum import StrEnum
 
 from visup.agent import ObjectBelief, Presence
 from visup.agent.model.fast_replace import replace
-from visup.rules.presence.object_tracks import ObjectTrack
+from visup.rules.presence.object_tracks import ObjectTrack, came_to
 from visup.rules.presence.step_context import StepContext
 
 EXIT_CONFIDENCE = 0.9
@@ -77,6 +77,8 @@ def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief |
     """Hide an object behind another, or behind something unknown."""
     _go(context, belief, Presence.HIDDEN, lost=False)
     if occluder is not None and occluder.confirmed:
+        if came_to(context.of[belief.id], occluder.region):
+            context.put(context.mind.objects[belief.id], vanished_into=occluder.id)
         context.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, occluder.id)
     else:
         context.tell("occlusion", "{0} {is} hidden.", belief.id)
@@ -98,14 +100,14 @@ def leave(context: StepContext, belief: ObjectBelief) -> None:
 
 def _go(context: StepContext, belief: ObjectBelief, where: Presence, *, lost: bool) -> None:
     gone = replace(belief, presence=where)
-    context.put(gone, lost=lost, partial_since=None, clear_since=None)
+    context.put(gone, lost=lost, partial_since=None, clear_since=None, vanished_into=None)
 
 
 def reappear(context: StepContext, belief: ObjectBelief) -> None:
     """Make an object visible again, wherever it was."""
     before = state_of(belief, context.of[belief.id])
     seen = replace(belief, presence=Presence.SEEN)
-    context.put(seen, lost=False, clear_since=None, partial_since=None)
+    context.put(seen, lost=False, clear_since=None, partial_since=None, vanished_into=None)
     if before is LifecycleState.LEFT:
         context.tell("entry", "{0} {comes} back into the field of view.", belief.id)
     elif before is LifecycleState.LOST:

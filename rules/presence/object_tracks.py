@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import exp
+from math import exp, hypot, sqrt
 from types import MappingProxyType
 
 from visup.agent import Mind, Region
@@ -18,6 +18,12 @@ from visup.rules.geometry.regions import Box, box_intersection, expanded, shared
 
 EXIT_HORIZON_S = 6.0
 """An object that is leaving is out of view within this time, seconds."""
+
+CAME_SHARE = 0.25
+"""By how much of its own size an object that comes to another nears it within a second."""
+
+LEAST_SIGHTINGS = 3
+"""Fewest sightings in which that is seen."""
 
 TimedCentroid = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
@@ -48,6 +54,7 @@ class ObjectTrack:
             the older one.
         lost: Whether it is hidden without an explanation.
         first_box: Its box when first seen.
+        vanished_into: The object that has hidden it since it came there, or None.
     """
 
     region: Region
@@ -69,6 +76,7 @@ class ObjectTrack:
     changed_at: float = -1.0
     lost: bool = False
     first_box: Box = (0, 0, 0, 0)
+    vanished_into: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,3 +286,16 @@ def _velocity(
     along = sum([(t - middle) * x for t, x, _ in centroids])
     down = sum([(t - middle) * y for t, _, y in centroids])
     return along / lever, down / lever
+
+
+def came_to(track: ObjectTrack, other: Region) -> bool:
+    """Whether an object came nearer to another's centre while it was last seen in full, and was going on.
+
+    The last second is compared, in which the camera has hardly moved.
+    """
+    if len(track.centroids) < LEAST_SIGHTINGS:
+        return False
+    x, y = other.centroid
+    (_, *first), *_, (_, *last) = track.centroids
+    nearer = hypot(first[0] - x, first[1] - y) - hypot(last[0] - x, last[1] - y)
+    return nearer > CAME_SHARE * sqrt(track.reference_area)

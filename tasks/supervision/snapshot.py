@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from visup.agent import Binding, Mind, Truth
+from visup.agent import Binding, Mind, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
@@ -11,7 +11,7 @@ from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.verification.observation import NOTHING_KEPT, ActionObservation, Kept
 from visup.tasks.verification.observe import RelationLookup
 from visup.tasks.verification.observe import observe as observe_action
-from visup.tasks.verification.passing import gap_between
+from visup.tasks.verification.passing import gap_between, vanished_into
 from visup.tasks.verification.stage_conditions import ConditionEvaluator
 
 
@@ -61,11 +61,25 @@ class TaskSnapshot:
     def _judge(self, step: TaskStep) -> ActionObservation:
         """The observation of a step, with the conditions of its own if it has any."""
         if not step.conditions:
-            return self._look(step.action, step.actors).settled
+            return self._required(step)
         if self.pauses.now(step.pauses) is not None:
             return ActionObservation(paused=True, pauses=self.pauses)
-        seen = replace(self._look(step.action, step.actors).settled, pauses=self.pauses)
+        seen = replace(self._required(step), pauses=self.pauses)
         return self._conditions.apply(step, seen)
+
+    def _required(self, step: TaskStep) -> ActionObservation:
+        """The observation of a required action: what came to a body that hides it now is in contact with it."""
+        seen = self._look(step.action, step.actors).settled
+        if seen.holds is not Truth.UNKNOWN or "touching" not in self._actions[step.action].holds:
+            return seen
+        objects = self.objects(step.actors)
+        since = vanished_into(self.mind, objects)
+        if since is None:
+            return seen
+        contact = Relation("touching", objects, Truth.TRUE, since)
+        return replace(
+            seen, holds=Truth.TRUE, held_by=contact, helps=contact, entry=contact, observed=True
+        )
 
     def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
         """Whether a condition holds, and has for the required time."""

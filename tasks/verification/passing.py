@@ -16,6 +16,7 @@ from visup.agent import Mind, Relation, Truth
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING, smaller_size
 from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
+from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.relations.samples import SampleWindow
 
@@ -180,6 +181,21 @@ def _centres(mind: Mind, body: int) -> Floats:
     support = window.steady_support[:, window.ids.index(body)]
     centres: Floats = 2.0 / len(DIRECTIONS) * support @ DIRECTIONS
     return centres
+
+
+def vanished_into(mind: Mind, objects: tuple[int, ...]) -> float | None:
+    """Since when one of two has been hidden by the other, to which it came: a parcel in a bin; or None.
+
+    *Approximation*: it may also have gone behind it. So this counts where a stage requires the contact, and
+    never against a task.
+    """
+    if len(objects) != 2:
+        return None
+    tracks = presence_memory(mind).of
+    for body, other in (objects, objects[::-1]):
+        if body in tracks and tracks[body].vanished_into == other:
+            return tracks[body].seen_at
+    return None
 
 
 def stopped_at(mind: Mind, objects: tuple[int, ...]) -> float:
