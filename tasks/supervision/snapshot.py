@@ -68,7 +68,7 @@ class TaskSnapshot:
         return self._conditions.apply(step, seen)
 
     def _required(self, step: TaskStep) -> ActionObservation:
-        """The observation of a required action: what came to a body that hides it now is in contact with it."""
+        """The observation of a required action; what came to a body that hides it now touches it."""
         seen = self._look(step.action, step.actors).settled
         if seen.holds is not Truth.UNKNOWN or "touching" not in self._actions[step.action].holds:
             return seen

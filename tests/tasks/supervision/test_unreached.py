@@ -120,3 +120,27 @@ def test_what_is_put_down_elsewhere_is_not_placed_and_what_is_dropped_not_carrie
     )
     assert first(events, "stage_failing", fails) is not None
     assert first(events, "stage_failing", not_fails) is None
+
+
+SORT = """
+<sort>   ::= <ride> <binned>
+<ride>   ::= converging(parcel, bin)
+<binned> ::= touching(parcel, bin) for 1 s
+"""
+
+
+def riding(now: float, *, stops: bool) -> Mask:
+    """A parcel that falls into a bin, in which it is hidden; or rests beside it, and is taken away."""
+    x, y = (200.0 if stops else 290.0), eased(now, (0.5, 10.0), (3.0, 150.0))
+    parcel = {1: (x, y, 40.0, 30.0)} if now < 5.0 else {}
+    return drawn({**parcel, 2: (250, 125, 120, 80)})
+
+
+@pytest.mark.parametrize(("stops", "binned"), [(False, True), (True, False)])
+def test_what_vanishes_into_where_it_came_has_got_there(
+    tmp_path: Path, stops: bool, binned: bool
+) -> None:
+    roles = {"parcel": 1, "bin": 2}
+    events = watched(tmp_path, SORT, lambda now: riding(now, stops=stops), roles, 8.0)
+    assert (first(events, "stage_started", "binned") is not None) is binned
+    assert any(e.kind == "verdict" and "succeeded" in e.text for e in events) is binned

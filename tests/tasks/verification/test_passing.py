@@ -11,7 +11,7 @@ import pytest
 
 from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
-from visup.agent import Coupling, Mind, Observation, Relation, Truth
+from visup.agent import Coupling, Mind, Observation, Presence, Region, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING, CouplingEvidence
@@ -23,6 +23,7 @@ from visup.tasks.verification.passing import (
     moves_on,
     put_down,
     stopped_at,
+    vanished_into,
     went_past,
     went_round,
 )
@@ -217,3 +218,28 @@ def test_a_contact_in_passing_neither_holds_nor_begins_in_a_stage() -> None:
     assert passing.holds is Truth.UNKNOWN
     assert (passing.held_by, passing.helps, passing.entry) == (None, None, None)
     assert passing.observed
+
+
+def falling(index: int, *, down: float) -> list[Region | None]:
+    """A small body that falls behind the upper edge of a large one, or rests there while it is covered."""
+    top = 60.0 + down * min(index, 50)
+    shown = min(40.0, 200.0 - top) if down else 40.0 - 0.8 * min(index, 50)
+    return [
+        box_region(TARGET, (280, 200, 160, 120)),
+        box_region(PART, (340, top if down else 160, 40, shown)) if shown > 3 else None,
+    ]
+
+
+@pytest.mark.parametrize(("down", "into"), [(2.9, True), (0.0, False)])
+def test_what_came_to_a_body_that_hides_it_has_vanished_into_it(down: float, into: bool) -> None:
+    thoughts = reason(seen(i, falling(i, down=down)) for i in range(100))
+    mind = thoughts[-1].mind
+    assert mind.objects[PART].presence is Presence.HIDDEN
+    for pair in ((PART, TARGET), (TARGET, PART)):
+        assert (vanished_into(mind, pair) is not None) is into
+        # An invariant does not take it for a contact.
+        assert RelationLookup(mind).find("touching", pair).truth is not Truth.TRUE
+    assert vanished_into(mind, (PART,)) is None
+    back = reason(seen(i, falling(min(i, 110 - i), down=down)) for i in range(110))[-1].mind
+    assert back.objects[PART].presence is Presence.SEEN
+    assert vanished_into(back, (PART, TARGET)) is None
