@@ -11,10 +11,12 @@ import pytest
 
 from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
-from visup.agent import Coupling, Mind, Observation, Presence, Region, Relation, Truth
+from visup.agent import Coupling, Mind, ObjectBelief, Observation, Presence, Region, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.contact import OutlineContact
 from visup.rules.coupling.evidence import COUPLING, CouplingEvidence
+from visup.rules.presence.lifecycle import occlude
+from visup.rules.presence.object_tracks import ObjectTrack, came_to
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.observe import RelationLookup, observe
@@ -221,12 +223,13 @@ def test_a_contact_in_passing_neither_holds_nor_begins_in_a_stage() -> None:
 
 
 def falling(index: int, *, down: float) -> list[Region | None]:
-    """A small body that falls behind the upper edge of a large one, or rests there while it is covered."""
-    top = 60.0 + down * min(index, 50)
-    shown = min(40.0, 200.0 - top) if down else 40.0 - 0.8 * min(index, 50)
+    """A small body that falls behind the upper edge of a large one; or rests, and is covered from above."""
+    covered = 0.0 if down else 4.0 * min(max(index - 40, 0), 10)
+    top = 60.0 + down * min(index, 50) if down else 155.0 + covered
+    shown = min(40.0, 200.0 - top) if down else 40.0 - covered
     return [
         box_region(TARGET, (280, 200, 160, 120)),
-        box_region(PART, (340, top if down else 160, 40, shown)) if shown > 3 else None,
+        box_region(PART, (340, top, 40, shown)) if shown > 3 else None,
     ]
 
 
@@ -243,3 +246,36 @@ def test_what_came_to_a_body_that_hides_it_has_vanished_into_it(down: float, int
     back = reason(seen(i, falling(min(i, 110 - i), down=down)) for i in range(110))[-1].mind
     assert back.objects[PART].presence is Presence.SEEN
     assert vanished_into(back, (PART, TARGET)) is None
+
+
+@pytest.mark.parametrize(
+    ("path", "came"),
+    [
+        ([(0.0, 300.0, 100.0), (0.5, 330.0, 150.0), (1.0, 360.0, 180.0)], True),
+        ([(0.0, 360.0, 180.0), (0.5, 360.0, 180.5), (1.0, 360.0, 181.0)], False),  # it rests
+        ([(0.0, 360.0, 180.0), (0.5, 330.0, 150.0), (1.0, 300.0, 100.0)], False),  # it goes away
+        ([(0.0, 300.0, 100.0), (1.0, 360.0, 180.0)], False),  # seen too shortly
+    ],
+)
+def test_only_what_comes_to_a_body_vanishes_into_it(
+    path: list[tuple[float, float, float]], came: bool
+) -> None:
+    body, other = (
+        ObjectBelief(i, region, Presence.SEEN, 0.0, 1.0, confirmed=True)
+        for i, region in ((PART, box_region(PART, (340, 160, 40, 40))), (TARGET, LARGE))
+        if region is not None
+    )
+    track = ObjectTrack(body.region, 1.0, 0.0, centroids=tuple(path), reference_area=1600.0)
+    assert came_to(track, other.region) is came
+    told: dict[str, Any] = {}
+    context = SimpleNamespace(
+        of={PART: track},
+        mind=SimpleNamespace(objects={PART: body}),
+        put=lambda belief, **fields: told.update(fields),
+        tell=lambda *words: None,
+    )
+    occlude(context, body, other)  # type: ignore[arg-type]
+    assert told["vanished_into"] == (TARGET if came else None)
+
+
+LARGE = box_region(TARGET, (280, 200, 160, 120))
