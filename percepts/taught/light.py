@@ -23,6 +23,9 @@ CELLS = (32, 24)
 LEAST_CHANGE = 0.18
 """Least change of the light that matters, as a natural logarithm: by more than a step of the histograms."""
 
+MOST_CHANGE = 1.1
+"""Greatest change that is one of light, to a third or threefold; a video that fades in begins in the dark."""
+
 
 def relit(
     views: Sequence[TaughtView], picture: NDArray[np.uint8]
@@ -40,7 +43,7 @@ def relit(
         picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     for number, view in enumerate(views):
         gain = light_change(view.scene, picture)
-        if np.abs(np.log(gain)).max() >= LEAST_CHANGE:
+        if LEAST_CHANGE <= np.abs(np.log(gain)).max() <= MOST_CHANGE:
             image = np.clip(np.rint(view.image * gain), 0, 255).astype(np.uint8)
             yield number, replace(view, image=image)
 

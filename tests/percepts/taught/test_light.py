@@ -55,6 +55,6 @@ def test_a_picture_without_colours_tells_how_light_it_is() -> None:
         assert number == 0
 
 
-def test_a_black_picture_makes_black_views() -> None:
-    ((_, view),) = relit(shown(START, "part"), np.zeros((60, 80, 3), np.uint8))
-    assert view.image.max() < 3
+@pytest.mark.parametrize(("light", "views"), [(0.4, 1), (0.2, 0), (0.0, 0)])
+def test_a_picture_in_the_dark_tells_nothing_of_the_light(light: float, views: int) -> None:
+    assert len(list(relit(shown(START, "part"), dimmed(picture(START)[0], (light,) * 3)))) == views
