@@ -75,11 +75,11 @@ def demote(context: StepContext, belief: ObjectBelief) -> None:
 
 def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief | None) -> None:
     """Hide an object behind another, or behind something unknown."""
-    _go(context, belief, Presence.HIDDEN, lost=False)
-    if occluder is not None and occluder.confirmed:
-        if came_to(context.of[belief.id], occluder.region):
-            context.put(context.mind.objects[belief.id], vanished_into=occluder.id)
-        context.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, occluder.id)
+    known = occluder if occluder is not None and occluder.confirmed else None
+    came = known is not None and came_to(context.of[belief.id], known.region)
+    _go(context, belief, Presence.HIDDEN, lost=False, into=known.id if known and came else None)
+    if known is not None:
+        context.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, known.id)
     else:
         context.tell("occlusion", "{0} {is} hidden.", belief.id)
 
@@ -98,9 +98,16 @@ def leave(context: StepContext, belief: ObjectBelief) -> None:
     context.tell("exit", template, belief.id, confidence=EXIT_CONFIDENCE)
 
 
-def _go(context: StepContext, belief: ObjectBelief, where: Presence, *, lost: bool) -> None:
+def _go(
+    context: StepContext,
+    belief: ObjectBelief,
+    where: Presence,
+    *,
+    lost: bool,
+    into: int | None = None,
+) -> None:
     gone = replace(belief, presence=where)
-    context.put(gone, lost=lost, partial_since=None, clear_since=None, vanished_into=None)
+    context.put(gone, lost=lost, partial_since=None, clear_since=None, vanished_into=into)
 
 
 def reappear(context: StepContext, belief: ObjectBelief) -> None:

@@ -289,9 +289,9 @@ def _velocity(
 
 
 def came_to(track: ObjectTrack, other: Region) -> bool:
-    """Whether an object came nearer to another's centre while it was last seen in full, and was going on.
+    """Whether an object came nearer to another's centre in the last second in which it was seen in full.
 
-    The last second is compared, in which the camera has hardly moved.
+    The camera is taken to have hardly moved in that time.
     """
     if len(track.centroids) < LEAST_SIGHTINGS:
         return False

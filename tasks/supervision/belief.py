@@ -127,7 +127,7 @@ def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) 
     )
 
 
-def disordered_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) -> TaskBelief:
+def out_of_order_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) -> TaskBelief:
     """The belief about a task whose order is broken: the stage that was to come first is failing.
 
     Its stages go on only once that has been undone.

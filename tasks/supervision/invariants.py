@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from visup.agent import AlertCondition, Event, Mind, Severity, TaskBelief, Truth, Verdict
 from visup.tasks.automaton.backpointers import behind
-from visup.tasks.automaton.out_of_turn import later_steps, out_of_turn
+from visup.tasks.automaton.out_of_turn import out_of_turn
 from visup.tasks.automaton.prognosis import begun_by
 from visup.tasks.automaton.states import TaskStep, leaves
 from visup.tasks.grammar.conditions import action_of, facts_of
@@ -16,13 +16,10 @@ from visup.tasks.grammar.units import value
 from visup.tasks.supervision.advance import BEFORE_S
 from visup.tasks.supervision.events import played
 from visup.tasks.supervision.hypotheses import TaskHypotheses, likely
-from visup.tasks.supervision.memory import Disorder, TaskMemory
+from visup.tasks.supervision.memory import OrderViolation, TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.sentences import before_its_turn, verdict_sentence
 from visup.tasks.supervision.snapshot import TaskSnapshot
-
-MOST_LATER = 40
-"""Most later steps of a task that are watched for being done before their turn, the nearest ones."""
 
 
 def broken_since(
@@ -99,12 +96,12 @@ def _told(model: MonitoredPhases, belief: TaskBelief, reason: str) -> str:
     return f"Task `{model.task.name}`: {reason}."
 
 
-def disorder(
+def order_violation(
     model: MonitoredPhases,
     snapshot: TaskSnapshot,
     posterior: TaskHypotheses | None,
-    before: Disorder | None,
-) -> Disorder | None:
+    before: OrderViolation | None,
+) -> OrderViolation | None:
     """A later step that is done before what must come first, until it has been undone; or None.
 
     Only steps count that end once they have held, of actors of whom nothing was required before: what a
@@ -122,21 +119,23 @@ def disorder(
     if posterior is None or posterior.likeliest.finished is not None:
         return None
     nodes = tuple(likely(posterior).hypotheses)
+    entered = min(x.payload.entered for x in leaves(posterior.likeliest.state))
+    later = dict.fromkeys(s for n in nodes for s in model.later(n))
+    done = [s for s in later if _done_since(model, snapshot, s, entered)]
+    if not done:
+        return None
     hypotheses = [posterior.hypotheses[n].value for n in nodes]
     active = {x.step: x.payload for h in hypotheses for x in leaves(h.state)}
     required = {frozenset(s.actors) for s in active}
     required |= {frozenset(s.actors) for n in nodes for s in _next(model, n)}
     required |= {frozenset(b.step.actors) for h in hypotheses for b in behind(h.backpointer)}
-    entered = min(x.payload.entered for x in leaves(posterior.likeliest.state))
-    later = later_steps(model.automaton, nodes)[:MOST_LATER]
-    new = (s for s in later if frozenset(s.actors) not in required)
+    done = [s for s in done if frozenset(s.actors) not in required]
 
     def lacks(step: TaskStep) -> bool:
         if model.actions[step.action].lasts or (step in active and active[step].held):
             return False
         return snapshot.observe(step).holds is Truth.FALSE
 
-    done = (s for s in new if _done_since(model, snapshot, s, entered))
     found = out_of_turn(model.automaton, nodes, done, lacks)
     if found is None:
         return None
@@ -144,7 +143,7 @@ def disorder(
     held_by = snapshot.observe(step).held_by
     assert held_by is not None
     why = before_its_turn(step, model.actions[step.action], held_by.since, first.stage)
-    return Disorder(step, why)
+    return OrderViolation(step, why)
 
 
 def _next(model: MonitoredPhases, node: int) -> Iterator[TaskStep]:
@@ -156,14 +155,13 @@ def _next(model: MonitoredPhases, node: int) -> Iterator[TaskStep]:
 def _done_since(
     model: MonitoredPhases, snapshot: TaskSnapshot, step: TaskStep, entered: float
 ) -> bool:
-    """Whether a step that ends by itself holds since some time after another, for as long as it should."""
-    meaning = model.actions[step.action]
-    if meaning.lasts or meaning.measures or meaning.undoes or step.already or step.is_told:
-        return False
+    """Whether a step holds since some time after another, for as long as it should."""
     held_by = snapshot.observe(step).held_by
     if held_by is None or held_by.since <= entered + BEFORE_S:
         return False
-    must = max(meaning.hold_s, step.hold_s or 0.0, model.settings.contrary_early_s)
+    must = max(
+        model.actions[step.action].hold_s, step.hold_s or 0.0, model.settings.contrary_early_s
+    )
     return snapshot.mind.time - held_by.since >= must
 
 

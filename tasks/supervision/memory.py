@@ -13,7 +13,7 @@ from visup.tasks.supervision.task_inference import ALONE, TaskActivity
 from visup.tasks.verification.observation import NOTHING_KEPT, Kept
 
 
-class Disorder(NamedTuple):
+class OrderViolation(NamedTuple):
     """A step that was done before its turn, and the reason in one clause."""
 
     step: TaskStep
@@ -43,7 +43,7 @@ class TaskMemory:
         akin: Unknown objects present from the start, or that once held an actor: the rest of a machine of
             which only a part is known, or who works there, is not unexpected.
         violated: The invariant about one object by which the task has failed, or empty.
-        disorder: What was done before its turn and has not been undone, or None.
+        order_violation: What was done before its turn and has not been undone, or None.
         forbidden: Whether a broken invariant interrupted it, which is final: its stages go on no further.
     """
 
@@ -64,4 +64,4 @@ class TaskMemory:
     violated: str = ""
     akin: tuple[int, ...] = ()
     forbidden: bool = False
-    disorder: Disorder | None = None
+    order_violation: OrderViolation | None = None

@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 
 from visup.agent import Relation, Status
 from visup.agent.model.fast_replace import replace
@@ -19,6 +20,7 @@ from visup.tasks.actions.rhythm import Rhythm
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.backpointers import behind
+from visup.tasks.automaton.out_of_turn import later_steps
 from visup.tasks.automaton.prognosis import Prognosis, begun_by
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, StageHmm
 from visup.tasks.automaton.states import TaskStep, leaves, with_leaves
@@ -38,6 +40,9 @@ LEAST = 1e-13  # hypotheses with less mass are dropped
 Requirement = tuple[tuple[str, ...], tuple[str, ...]]
 """Actors, and the required relations between them."""
 
+
+MOST_LATER = 40
+"""Most later steps of a node that are watched for being done before their turn, the nearest ones."""
 
 CARRIES = ("moving_together", "coupled")
 """Relations of a carrier to what it carries."""
@@ -120,6 +125,26 @@ class MonitoredPhases:
             asked = tuple(self._required(node))
             self._requirements[node] = (*asked, *brought_along(asked))
         return self._requirements[node]
+
+    @cached_property
+    def _later(self) -> dict[int, tuple[TaskStep, ...]]:
+        return {}
+
+    def later(self, node: int) -> tuple[TaskStep, ...]:
+        """The next steps after a node that would be out of turn if they were done now, at most `MOST_LATER`.
+
+        These end once they have held, and require something: that two are apart is so before anything is
+        done. What may have been so before its turn is none.
+        """
+        if node not in self._later:
+            found = (s for s in later_steps(self.automaton, (node,)) if self._is_work(s))
+            self._later[node] = tuple(islice(found, MOST_LATER))
+        return self._later[node]
+
+    def _is_work(self, step: TaskStep) -> bool:
+        meaning = self.actions[step.action]
+        other = meaning.lasts or meaning.measures or meaning.undoes
+        return not (other or step.already or step.is_told)
 
     def _required(self, node: int) -> Iterator[Requirement]:
         for step in self.automaton.steps(node):

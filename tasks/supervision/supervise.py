@@ -40,8 +40,8 @@ from visup.tasks.casting.matching import (
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.beginning import is_first, stage_onsets, stirring, with_begun
 from visup.tasks.supervision.belief import (
-    disordered_belief,
     failed_belief,
+    out_of_order_belief,
     pending_stages,
     suppressed,
     task_belief,
@@ -55,9 +55,9 @@ from visup.tasks.supervision.events import (
 )
 from visup.tasks.supervision.invariants import (
     broken_since,
-    disorder,
     invariant_concerns,
     invariant_events,
+    order_violation,
     violation,
 )
 from visup.tasks.supervision.memory import TaskMemory
@@ -250,9 +250,9 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         violated = violation(model, broken, now, safety=False)
     belief = task_belief(model, snapshot, posterior, interrupted)
     belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
-    disordered = disorder(model, snapshot, posterior, memory.disorder)
-    if disordered and not violated:
-        belief = disordered_belief(belief, memory.belief, disordered.why, now)
+    misplaced = order_violation(model, snapshot, posterior, memory.order_violation)
+    if misplaced and not violated:
+        belief = out_of_order_belief(belief, memory.belief, misplaced.why, now)
     if memory.forbidden:
         belief = replace(belief, stages=memory.belief.stages, current=memory.belief.current)
     broke = interrupted != memory.interrupted and not strangers
@@ -281,7 +281,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         violated,
         akin,
         memory.forbidden or broke,
-        disordered,
+        misplaced,
     )
 
 
