@@ -2,14 +2,15 @@
 
 Touching in the picture is not touching. The continuation decides: a body in contact comes to rest at the
 other, takes it along, or bounces back; one that goes on as fast as it came passes in front of the other, or
-behind it.
-
+behind it. What is carried, and comes down past the foot of the other, is in front of it: what stands on
+another body, or in it, has its foot above the foot of that, seen from anywhere above the ground.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from visup.agent.model.fast_replace import replace
 
@@ -28,6 +29,8 @@ class ContactSettings:
         unknown_s: How long outlines must meet to have settled while their motion is unknown.
         doubt_share: Distance passed across the other, in sizes of the smaller one, from which one is
             assumed in front of the other or behind it.
+        below_share: How far the foot of what is carried must be below that of the other to be in front of
+            it, as a share of its height.
     """
 
     passing: float = 0.0125
@@ -38,6 +41,21 @@ class ContactSettings:
     settled_s: float = 0.15
     unknown_s: float = 0.5
     doubt_share: float = 0.4
+    below_share: float = 0.25
+
+
+class Feet(NamedTuple):
+    """The lowest points of two bodies in the image, y in pixels.
+
+    Attributes:
+        carried: Of the one that is carried.
+        other: Of the other one.
+        height: Height of the carried one, pixels.
+    """
+
+    carried: float
+    other: float
+    height: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +71,9 @@ class OutlineContact:
         known: Whether their relative motion is known, or was at most `unknown_s` ago.
         known_at: When it was last known, or when they met.
         fastest: Their greatest relative speed since, pixels per second.
+        highest: The highest foot of the one that is carried since they meet, y in pixels.
+        ground: The lowest foot of the other since then; what covers it hides its foot.
+        in_front: Whether what is carried has come down past that: it is in front of the other.
     """
 
     met_at: float
@@ -63,6 +84,9 @@ class OutlineContact:
     known: bool = False
     known_at: float = 0.0
     fastest: float = 0.0
+    highest: float = math.inf
+    ground: float = -math.inf
+    in_front: bool = False
 
 
 def updated_contact(
@@ -74,6 +98,7 @@ def updated_contact(
     *,
     sigma: float = math.inf,
     thrown_back: bool = False,
+    feet: Feet | None = None,
 ) -> OutlineContact:
     """Update the contact of two bodies whose outlines meet.
 
@@ -85,6 +110,7 @@ def updated_contact(
         settings: Settings.
         sigma: Standard deviation of the speed, pixels per second.
         thrown_back: Whether they separate on the side on which they met, which implies contact.
+        feet: Of the two, if a third body carries one of them.
     """
     now, dt = moment
     contact = before or OutlineContact(now, changed_at=now, known_at=now)
@@ -100,6 +126,10 @@ def updated_contact(
             contact = replace(contact, passing=passing, changed_at=now, known=True)
         path = contact.path + speed * dt if passing else 0.0
         contact = replace(contact, path=path) if path != contact.path else contact
+    if feet is not None:
+        contact = _with_feet(contact, feet, settings)
+    if contact.in_front:
+        return replace(contact, settled_since=None)
     if thrown_back:
         since = contact.met_at if contact.settled_since is None else contact.settled_since
         return replace(contact, settled_since=since, passing=False, path=0.0)
@@ -110,3 +140,10 @@ def updated_contact(
     if contact.settled_since is None and lasted >= least - 1e-6:
         return replace(contact, settled_since=now)
     return contact
+
+
+def _with_feet(contact: OutlineContact, feet: Feet, settings: ContactSettings) -> OutlineContact:
+    """The contact after a look at the feet of both."""
+    highest, ground = min(contact.highest, feet.carried), max(contact.ground, feet.other)
+    below = feet.carried > ground + settings.below_share * feet.height
+    return replace(contact, highest=highest, ground=ground, in_front=below and highest <= ground)

@@ -12,7 +12,7 @@ import numpy as np
 from visup.agent import Column, Coupling, Mind, Presence, Region, RelationTable
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
-from visup.rules.coupling.contact import ContactSettings, OutlineContact
+from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact
 from visup.rules.coupling.relative_motion import RelativeTrack
 from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.reasoner import kinematics
@@ -163,7 +163,8 @@ def coupling_cells(
         contact = evidence[seen.pair].contact
         if contact is not None:
             settled = contact.settled_since
-            state[1, k] = UNKNOWN_CODE if settled is None else 1
+            unsettled = 0 if contact.in_front else UNKNOWN_CODE
+            state[1, k] = unsettled if settled is None else 1
             since[1, k] = contact.met_at if settled is None else min(settled, contact.changed_at)
             state[2, k] = _in_front(contact, seen.pair, mind)
             since[2, k] = contact.changed_at
@@ -180,6 +181,8 @@ def coupling_cells(
 
 def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
     """Whether one of two has passed so far across the other that they cannot be in contact."""
+    if contact.in_front:
+        return True
     return contact.passing and contact.path > ContactSettings().doubt_share * smaller_size(
         pair, mind
     )
@@ -204,6 +207,19 @@ def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | N
     if Presence.HIDDEN in (first.presence, second.presence):
         return None
     return first.region, second.region
+
+
+def feet_of(seen: PairObservation, mind: Mind) -> Feet | None:
+    """The feet of two bodies one of which a third one carries; None if none does, or they are not seen."""
+    others = (c.objects for c in mind.couplings if c.objects != seen.pair)
+    held = {i for objects in others if not mind.one_machine(*objects) for i in objects}
+    carried = held.intersection(seen.pair)
+    regions = pair_regions(seen, mind)
+    if len(carried) != 1 or regions is None or seen.host is not None:
+        return None
+    one, other = regions if seen.pair[0] in carried else regions[::-1]
+    (_, y, _, height), (_, top, _, size) = one.bbox, other.bbox
+    return Feet(float(y + height), float(top + size), float(height))
 
 
 def regions_apart(pair: Pair, mind: Mind) -> tuple[Region, Region]:

@@ -45,6 +45,7 @@ from visup.rules.coupling.evidence import (
     PairObservation,
     common_speed,
     coupling_cells,
+    feet_of,
     observed_pairs,
     pair_regions,
     regions_apart,
@@ -279,8 +280,9 @@ class CouplingReasoner(ExplainableReasoner):
         least = s.doubt_share * smaller_size(seen.pair, mind)
         back = seen.diverging == YES and crossed < least
         sigma = math.inf if found is None else found.speed_sigma
+        feet = feet_of(seen, mind)
         return updated_contact(
-            before.contact, speed, limit, moment, s, sigma=sigma, thrown_back=back
+            before.contact, speed, limit, moment, s, sigma=sigma, thrown_back=back, feet=feet
         )
 
     def _leaves(
@@ -316,6 +318,8 @@ class CouplingReasoner(ExplainableReasoner):
         s, track = self.settings, evidence.relative_track
         watched = track is not None and track.path_end == mind.time
         yield Condition("both are seen near each other", watched)
+        front = evidence.contact is not None and evidence.contact.in_front
+        yield Condition("neither has come down in front of the other", not front)
         text = "log odds that they touch and are at rest"
         together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)

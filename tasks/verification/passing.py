@@ -59,8 +59,10 @@ def goes_past(
         objects: Two objects whose outlines meet.
         rests: Whether one of two has come to rest at the other.
     """
+    contact = _contact(mind, objects)
+    if contact is not None and contact.in_front:
+        return True
     if held := holds_on(mind, objects):
-        contact = _contact(mind, objects)
         on = contact is not None and (contact.passing or not contact.known)
         if not all(gapes(mind, *other) for other in held):
             return on

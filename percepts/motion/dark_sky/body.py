@@ -17,6 +17,7 @@ DRIFT = 0.0006  # way, as a share of the image diagonal, from which a body has m
 STEADY = 4.0  # the same, in root mean squares of its deviations from a steady course
 LEAST_S = 0.5  # time over which a drift is measured at least, seconds
 SETTLED_S = 1.0  # time alone from which a body is no part of what it touches later, seconds
+LARGE = 0.004  # share of the picture that a body at rest must fill: captions and the like fill less
 
 Point = tuple[float, float]
 Corner = tuple[int, int]
@@ -86,6 +87,12 @@ class SkyBody:
     def has_speed(self) -> bool:
         """Whether its velocity was measured since it has been alone, or not."""
         return self.path[-1][0] - self.path[0][0] >= LEAST_S / 2
+
+    @property
+    def stands_alone(self) -> bool:
+        """Whether it has been alone for long, in full view, and is larger than a caption."""
+        large = self.area >= LARGE * self.visible.size
+        return self.settled and self.alone and not self.cut and large
 
     @property
     def area(self) -> int:

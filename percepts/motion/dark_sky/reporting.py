@@ -27,7 +27,7 @@ Regions = tuple[Region, ...]
 def bodies_with_ids(
     bodies: Bodies, members: Sequence[Sequence[Region]], ids: IdAllocator, diagonal: float
 ) -> Bodies:
-    """The bodies, with ids for those that are to be reported: those with a moving region, or that drifted.
+    """The bodies, with ids for those that are to be reported: they move, have drifted, or stand alone.
 
     Args:
         bodies: The bodies.
@@ -38,7 +38,7 @@ def bodies_with_ids(
     used = {b.id for b in bodies}
     out = []
     for body, regions in zip(bodies, members, strict=True):
-        if body.id == 0 and (regions or body.drifted(diagonal)):
+        if body.id == 0 and (regions or body.drifted(diagonal) or body.stands_alone):
             free = [r.id for r in regions if r.id not in used]
             body = replace(body, id=min(free, default=0) or ids.new())
             used.add(body.id)

@@ -17,7 +17,7 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_reg
 class DarkSkySegmenter:
     """Gives regions the outlines of bodies that stand out from a dark sky; one per video.
 
-    Also reports such bodies without a region, once they have drifted against the ground.
+    Also reports such bodies without a region, once they have drifted against the ground, or stand alone.
     """
 
     def __init__(self) -> None:

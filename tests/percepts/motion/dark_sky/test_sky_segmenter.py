@@ -91,20 +91,35 @@ def test_small_holes_are_filled() -> None:
     assert whole(found[0])[60, 80]
 
 
-def test_a_body_at_rest_is_reported_only_once_it_drifts() -> None:
+def test_a_small_body_at_rest_is_reported_only_once_it_drifts() -> None:
     run = Run(last=5)
     for k in range(20):
-        assert run.step(painted([disc(80, 60, 14)], [120], k)) == ()
-    told = [run.step(painted([disc(80 + 0.5 * k, 60, 14)], [120], k)) for k in range(25)]
+        assert run.step(painted([disc(80, 60, 4)], [120], k)) == ()
+    told = [run.step(painted([disc(80 + 0.5 * k, 60, 4)], [120], k)) for k in range(25)]
     assert told[0] == ()
     assert [r.id for r in told[-1]] == [6]
     assert told[-1][0].velocity[0] == pytest.approx(0.5 * FPS, rel=0.3)
 
 
-def test_what_moves_with_the_ground_is_not_reported() -> None:
+def test_a_large_body_at_rest_is_reported_after_a_second() -> None:
+    body, run = disc(80, 60, 14), Run(last=5)
+    told = [run.step(painted([body], [120], k)) for k in range(20)]
+    assert all(regions == () for regions in told[:12])
+    assert [[r.id for r in regions] for regions in told[14:]] == [[6]] * 6
+    assert alike(whole(told[-1][0]), body) > 0.85
+    assert told[-1][0].velocity == (0.0, 0.0)
+
+
+def test_a_large_body_that_the_border_cuts_is_not_reported_at_rest() -> None:
     run = Run()
     for k in range(30):
-        assert run.step(painted([disc(40 + k, 60, 14)], [120], k), (), (-1.0, 0.0)) == ()
+        assert run.step(painted([disc(5, 60, 14)], [120], k)) == ()
+
+
+def test_a_small_body_that_moves_with_the_ground_is_not_reported() -> None:
+    run = Run()
+    for k in range(30):
+        assert run.step(painted([disc(40 + k, 60, 4)], [120], k), (), (-1.0, 0.0)) == ()
 
 
 def test_a_small_mover_before_a_ground_that_the_border_cuts_stays_as_it_is() -> None:
