@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
+from math import inf
+from typing import NamedTuple
 
 from visup.agent import Relation
 from visup.tasks.automaton.states import TaskStep
 
-StepEntries = tuple[tuple[TaskStep, tuple[float, float]], ...]
-"""Step -> since when its entry was observed, and when last, seconds."""
+
+class StepEntry(NamedTuple):
+    """The observed entry to a step.
+
+    Attributes:
+        since: Since when it was observed, seconds.
+        until: When it was last observed, seconds.
+        held_by: The relation by which the step last held, or None.
+        held_at: When it last held, seconds.
+    """
+
+    since: float
+    until: float
+    held_by: Relation | None = None
+    held_at: float = -inf
+
+
+StepEntries = tuple[tuple[TaskStep, StepEntry], ...]
+"""Step -> its entry."""
 
 Meetings = tuple[tuple[tuple[TaskStep, ...], float], ...]
 """Steps that begin together -> when the entries of all were last observed at the same time, seconds."""
@@ -21,6 +40,7 @@ def observed_entries(
     now: float,
     *,
     refuted: Callable[[TaskStep], bool] = lambda step: False,
+    held_by: Callable[[TaskStep], Relation | None] = lambda step: None,
 ) -> tuple[StepEntries, Meetings]:
     """Add the entries that are observed now, and drop those that have turned out to be none.
 
@@ -30,13 +50,16 @@ def observed_entries(
         entry: The relation by which the beginning of a step is observed now, or None.
         now: Seconds.
         refuted: Whether it is known now that a step has not begun, whatever was observed before.
+        held_by: The relation by which a step holds now, or None.
     """
     entries = {s: span for s, span in before[0] if not refuted(s)}
     met = {steps: at for steps, at in before[1] if all(s in entries for s in steps)}
     for steps in possible:
         found = ((s, entry(s)) for s in steps)
-        entries |= {s: (r.since, now) for s, r in found if r is not None}
-        together = coincidence([entries[s] for s in steps if s in entries])
+        for step, relation in found:
+            if relation is not None:
+                entries[step] = _observed(entries.get(step), relation.since, held_by(step), now)
+        together = coincidence([entries[s][:2] for s in steps if s in entries])
         if together is not None and all(s in entries for s in steps):
             met[steps] = together
     return tuple(entries.items()), tuple(met.items())
@@ -52,3 +75,34 @@ def coincidence(spans: Sequence[tuple[float, float]]) -> float | None:
     """
     last = min((until for _, until in spans), default=None)
     return last if last is not None and max(since for since, _ in spans) <= last else None
+
+
+def _observed(
+    before: StepEntry | None, since: float, held_by: Relation | None, now: float
+) -> StepEntry:
+    if held_by is not None:
+        return StepEntry(since, now, held_by, now)
+    return StepEntry(since, now) if before is None else before._replace(since=since, until=now)
+
+
+def held_on_entry(
+    entries: StepEntries, steps: Collection[TaskStep], holds: Callable[[TaskStep], bool]
+) -> dict[TaskStep, Relation]:
+    """The steps that held at the same time as the others began, but are uncertain when all begin.
+
+    A gripper opens just as it sets a part down: once the part is known to lie there, the hold is doubted.
+
+    Args:
+        entries: The observed entries.
+        steps: Those that begin together, whose entries have coincided.
+        holds: Whether a step is known to hold now.
+
+    Returns:
+        Step -> the relation by which it held; none unless another one holds now.
+    """
+    found = {s: entry for s, entry in entries if s in steps}
+    if len(found) < len(steps) or not any(holds(s) for s in steps):
+        return {}
+    begun = max(entry.since for entry in found.values())
+    then = ((s, e.held_by) for s, e in found.items() if e.held_at >= begun and not holds(s))
+    return {s: held_by for s, held_by in then if held_by is not None}

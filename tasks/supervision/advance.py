@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import Backpointer, behind, extended
-from visup.tasks.automaton.entries import observed_entries
+from visup.tasks.automaton.entries import held_on_entry, observed_entries
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import (
@@ -188,6 +188,7 @@ class Advance:
             self._entry,
             self.now,
             refuted=lambda step: self.observe(step).carried_past,
+            held_by=lambda step: self.observe(step).held_by,
         )
         return replace(hypothesis, entries=entries, met=met)
 
@@ -234,6 +235,14 @@ class Advance:
             else x
             for i, x in enumerate(leaves(state))
         ]
+        if opened:
+            held = held_on_entry(hypothesis.entries, transition.entered, self._holds)
+            under_way = [
+                self.steps.held_before(x, self.observe(x.step), held[x.step], self.now)
+                if x.step in held
+                else x
+                for x in under_way
+            ]
         left = tuple(x.step for x in transition.left)
         begun_at = tuple(x.payload.begun for x in transition.left)
         early = self._early(hypothesis, transition)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from visup.agent import Status, Truth
+from visup.agent import Relation, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
@@ -45,6 +45,13 @@ class StepModel:
         meaning = self.actions[step.action]
         monitor = update(leaf.payload, step, meaning, seen, moment, self.settings)
         return replace(leaf, payload=monitor)
+
+    def held_before(
+        self, leaf: Leaf[StepMonitor], seen: ActionObservation, held_by: Relation, now: float
+    ) -> Leaf[StepMonitor]:
+        """A step that begins now, and held just before by a relation that is uncertain now."""
+        then = replace(seen, observed=True, holds=Truth.TRUE, held_by=held_by, helps=held_by)
+        return self.looked_at(leaf, replace(then, contrary=None), Moment(now, 0.0), False)
 
     def together(self, state: State[StepMonitor], observe: Observe) -> State[StepMonitor]:
         """A state in which actions joined by `&` have held only if they did at the same time."""

@@ -33,7 +33,7 @@ def load(foot: float, *, crane: bool = True) -> list[Thought]:
     return reason(seen(i, [box_region(n, box) for n, box in at(i)]) for i in range(400))
 
 
-def last(thoughts: list[Thought], name: str) -> Truth:
+def last(thoughts: list[Thought], name: str) -> Truth | None:
     return thoughts[-1].mind.truth(name, CONTAINER, TRUCK)
 
 

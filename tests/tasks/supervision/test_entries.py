@@ -6,10 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, Script, Spell, play
 from visup.agent import Relation, Status, Truth
 from visup.tasks import parse_task
-from visup.tasks.automaton.entries import Meetings, StepEntries, coincidence, observed_entries
+from visup.tasks.automaton.entries import (
+    Meetings,
+    StepEntries,
+    StepEntry,
+    coincidence,
+    held_on_entry,
+    observed_entries,
+)
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.supervision.supervise import task_reasoner
 
@@ -89,3 +96,71 @@ def test_one_entry_may_be_doubted_when_another_is_confirmed(
     )
     found = stages(CARRY, told, 8.0)
     assert (Status.DONE in found["place"]) is done
+
+
+PUT = """actor arm is arm
+actor satellite is satellite
+actor dish is dish
+<t> ::= <carry> <place> <release> <retreat>
+<carry> ::= moving_together(arm, satellite) & converging(satellite, dish)
+<place> ::= touching(satellite, dish) & coupled(arm, satellite)
+<release> ::= decoupled(arm, satellite) & touching(satellite, dish)
+<retreat> ::= diverging(arm, satellite) for 0.3 s
+"""
+
+
+@pytest.mark.parametrize(("coupled_until", "done"), [(5.0, True), (4.6, False)])
+def test_what_held_until_the_other_was_confirmed_has_held_with_it(
+    coupled_until: float, done: bool
+) -> None:
+    """A gripper opens as it sets a part down: its hold is in doubt before the contact is confirmed."""
+    hold, meeting = (ARM, SATELLITE), (SATELLITE, INTRUDER)
+    told = (
+        Spell("moving_together", 1.0, 4.95, hold),
+        Spell("converging", 2.5, 4.7, meeting),
+        Spell("touching", 4.9, 12.0, meeting),
+        Spell("touching", 0.5, 5.5, hold),
+        Spell("coupled", 1.0, coupled_until, hold),
+        Spell("coupled", coupled_until, 5.1, hold, truth=Truth.UNKNOWN),
+        Spell("diverging", 5.3, 12.0, hold),
+    )
+    script = Script(told, dict.fromkeys((ARM, SATELLITE, INTRUDER), (0.0, 1000000000.0)))
+    played = play(task_reasoner([parse_task(PUT)]), script, 10.0)
+    fails = [
+        m.time
+        for m in played.minds
+        for s in m.tasks[0].stages
+        if s.stage == "place" and s.status is Status.FAILING
+    ]
+    assert (not fails) is done
+
+
+OPENED, CLOSED = TaskStep("opened", (), "s"), TaskStep("closed", (), "s")
+HOLD = Relation("opened", (1,), Truth.TRUE, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("held_at", "holding", "found"),
+    [
+        (2.0, {CLOSED}, {OPENED: HOLD}),
+        (1.4, {CLOSED}, {}),
+        (2.0, set(), {}),
+        (2.0, {OPENED, CLOSED}, {}),
+    ],
+)
+def test_a_step_held_on_entry_if_it_did_when_the_other_began_which_holds_now(
+    held_at: float, holding: set[TaskStep], found: dict[TaskStep, Relation]
+) -> None:
+    told = {OPENED: StepEntry(1.0, 2.0, HOLD, held_at), CLOSED: StepEntry(1.5, 2.2)}
+    entries = tuple(told.items())
+    assert held_on_entry(entries, (OPENED, CLOSED), holding.__contains__) == found
+    assert held_on_entry(entries[:1], (OPENED, CLOSED), holding.__contains__) == {}
+
+
+def test_an_entry_remembers_when_the_step_last_held() -> None:
+    near = {OPENED: Relation("near", (1,), Truth.TRUE, 0.0)}
+    found: tuple[StepEntries, Meetings] = ((), ())
+    for now, holds in enumerate([False, True, True, False]):
+        held = {OPENED: HOLD} if holds else {}
+        found = observed_entries(found, [(OPENED,)], near.get, now, held_by=held.get)
+    assert dict(found[0])[OPENED] == StepEntry(0.0, 3, HOLD, 2)
