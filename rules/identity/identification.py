@@ -40,6 +40,7 @@ from visup.rules.identity.votes import (
 )
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object, recognised
+from visup.rules.presence.object_tracks import at_border
 from visup.rules.presence.reasoner import visible_share
 from visup.rules.wording.conditions import (
     Condition,
@@ -167,6 +168,9 @@ class IdentityReasoner(ExplainableReasoner):
         s = self.settings
         kind: LookKind = getattr(s, look.kind)
         heard = weights(look.hypotheses, s, waited, kind.awaited)
+        if at_border(mind.objects[object_id].region, mind.frame_size):
+            # Ever another part of it is in view, so its views cannot agree.
+            return Tally(tuple(heard.items()), worth(s.stranger, s))
         # Views that are inconsistent over time count against a name (paper, figure 5).
         likely = ((n, w * pose_support(mind, object_id, n)) for n, w in heard.items())
         return Tally(tuple(likely), worth(s.stranger, s))

@@ -7,9 +7,9 @@ For each object o and each model name n, in each step of length dt:
 
 where s is the best similarity with which any view of n was hypothesised for o's region in this step (nothing
 at or below 0.4 counts; section 7.3), k the rank of n among the names of this step (0 for the best), p(o, n)
-the consistency of its views over time (`pose_support`), and visible(o) the visible share of o. Hypotheses in
-quick succession are of the same picture: `new` is the time since the last ones, as a share of `apart_s`, at
-most 1. The three principles:
+the consistency of its views over time (`pose_support`; 1 while the border cuts o), and visible(o) the visible
+share of o. Hypotheses in quick succession are of the same picture: `new` is the time since the last ones, as
+a share of `apart_s`, at most 1. The three principles:
 
 1. recurrent and temporally stable hypotheses are more likely: votes accumulate over steps;
 2. hypotheses that do not recur are forgotten: votes decay with `tau_s`;

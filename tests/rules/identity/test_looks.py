@@ -85,3 +85,19 @@ def test_what_is_awaited_is_not_seen_in_what_looks_otherwise() -> None:
         return [("dish", 0.85), ("arm", 0.45)]
 
     assert believed(said, lambda i: INSIDE, actors={"arm": ("arm",)}).name == "dish"
+
+
+@pytest.mark.parametrize(("box", "counts"), [(INSIDE, True), (AT_BORDER, False)])
+def test_views_must_agree_unless_the_border_cuts_the_body(
+    box: tuple[int, int, int, int], counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of an arm that comes in ever another part is in view."""
+
+    def votes_of(support: float) -> float:
+        told = "visup.rules.identity.identification.pose_support"
+        monkeypatch.setattr(told, lambda *_: support)
+        return believed(lambda _: [("arm", 0.9)], lambda _: box).candidates[0].votes
+
+    agreeing, contrary = votes_of(1.0), votes_of(0.8)
+    assert agreeing > 1.0
+    assert contrary == pytest.approx((0.8 if counts else 1.0) * agreeing)
