@@ -50,12 +50,17 @@ def evidence(
             what = _say(monitor.contrary, actions)
             known = monitor.entered if monitor.contrary_since is None else monitor.contrary_since
             since = since_reported(monitor.told, step.actors, monitor.contrary, known)
+            if _is_condition(monitor.contrary, actions):
+                return f"`{what}` has held since {since:.1f} s; {_fails_so(step)}"
             return (
                 f"{who} {have} been {what} since {since:.1f} s; "
                 f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.FAILING | Status.FAILED if monitor.fault is not None:
             was, what = ("was" if alone else "were"), _say(monitor.fault, actions)
+            if _is_condition(monitor.fault, actions):
+                at = f"`{what}` held at {monitor.fault_since:.1f} s"
+                return f"{at} and {who} {have} not recovered; {_fails_so(step)}"
             return (
                 f"{who} {was} {what} at {monitor.fault_since:.1f} s and {have} not recovered; "
                 f"stage `{step.stage}` requires {them} to be {meaning.text}"
@@ -64,6 +69,8 @@ def evidence(
             by = monitor.helped_by or ""
             what, known = _say(by, actions), max(0.0, monitor.helped_since)
             since = since_reported(monitor.told, step.actors, by, known)
+            if _is_condition(by, actions):
+                return f"`{what}` has held since {since:.1f} s"
             return f"{who} {have} been {what} since {since:.1f} s"
         case Status.STALLED if monitor.helped_at is not None:
             return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
@@ -294,7 +301,18 @@ VERDICT_WORDS = {
 
 def _say(relation: str, actions: Words) -> str:
     meaning = actions.get(relation)
-    return meaning.text if meaning else relation.replace("_", " ")
+    if meaning is None:
+        return relation.replace("_", " ") if relation.isidentifier() else relation
+    return meaning.text
+
+
+def _fails_so(step: TaskStep) -> str:
+    return f"stage `{step.stage}` fails when it does"
+
+
+def _is_condition(relation: str, actions: Words) -> bool:
+    """Whether the name of a relation is the text of a condition that a course states."""
+    return relation not in actions and not relation.isidentifier()
 
 
 def prospects_text(belief: TaskBelief) -> str:

@@ -92,6 +92,24 @@ def test_what_excludes_what_was_told_is_told_to_begin_no_sooner(
     assert f"{told};" in evidence(step, ACTIONS["coupled"], failing, 8.5, ACTIONS)
 
 
+def test_a_condition_by_which_a_stage_fails_is_quoted() -> None:
+    step = TaskStep("converging", ("part",), "lift")
+    apart = StepMonitor(3.0, status=Status.FAILING, contrary="apart(arm, part)", contrary_since=4.7)
+    assert evidence(step, ACTIONS["converging"], apart, 5.2, ACTIONS) == (
+        "`apart(arm, part)` has held since 4.7 s; stage `lift` fails when it does"
+    )
+    before = replace(apart, contrary=None, fault="apart(arm, part)", fault_since=4.7)
+    assert evidence(step, ACTIONS["converging"], before, 9.0, ACTIONS) == (
+        "`apart(arm, part)` held at 4.7 s and the part has not recovered; "
+        "stage `lift` fails when it does"
+    )
+    under_way = StepMonitor(
+        3.0, status=Status.PROGRESSING, helped_by="range(arm, part) < 5 m", helped_since=3.5
+    )
+    told = evidence(step, ACTIONS["converging"], under_way, 9.0, ACTIONS)
+    assert told == "`range(arm, part) < 5 m` has held since 3.5 s"
+
+
 def test_what_was_going_on_when_a_stage_was_left_is_not_told_to_go_on_later() -> None:
     assert in_retrospect("the arm has been moving since 3.9 s", 4.9) == (
         "at 4.9 s the arm had been moving since 3.9 s"
