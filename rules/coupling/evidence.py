@@ -14,11 +14,18 @@ from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact
 from visup.rules.coupling.relative_motion import RelativeTrack
+from visup.rules.geometry.regions import image_diagonal
 from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.reasoner import kinematics
 
 CONFIDENCE = 0.9
 """Confidence of couplings: outlines at rest relative to each other may still be apart in depth."""
+
+ALONG_SPEED = 0.05
+"""Least speed of two that move as one though their outlines are apart, image diagonals per second."""
+
+ALONG_SHARE = 0.4
+"""Their greatest relative speed, as a share of the speed of the slower one."""
 
 COLUMNS = ColumnLayout(
     (
@@ -95,6 +102,17 @@ def common_speed(mind: Mind, pair: Pair) -> float:
     """The speed of the slower of two, pixels per second; of the only known one; else 0."""
     speeds = [own_speed(mind, i) for i in pair]
     return min((s for s in speeds if s is not None), default=0.0)
+
+
+def goes_along(mind: Mind, pair: Pair) -> bool:
+    """Whether one of two, both fast, goes where the other goes: then it has not come apart, whatever the gap.
+
+    The outline of an arm that leaves the picture ends somewhere, and seems to leave what its fingers hold.
+    What is dropped, or left behind, soon moves otherwise.
+    """
+    common, relative = common_speed(mind, pair), kinematics(mind).pair("relative_speed", *pair)
+    fast = common > ALONG_SPEED * image_diagonal(mind.frame_size)
+    return bool(fast and relative < ALONG_SHARE * common)
 
 
 def own_speed(mind: Mind, number: int) -> float | None:

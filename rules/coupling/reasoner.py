@@ -46,6 +46,7 @@ from visup.rules.coupling.evidence import (
     common_speed,
     coupling_cells,
     feet_of,
+    goes_along,
     observed_pairs,
     pair_regions,
     regions_apart,
@@ -193,6 +194,7 @@ class CouplingReasoner(ExplainableReasoner):
             contact = None
         far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
         apart = (seen.touching == NO and far) or self._leaves(contact, found, seen, mind)
+        apart = apart and not goes_along(mind, seen.pair)
         same = track is before.relative_track and odds == before.rest_odds and not converging
         same = same and contact is before.contact
         if same and apart == (before.apart_since is not None):

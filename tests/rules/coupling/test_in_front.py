@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
-from visup.agent import Truth
+from visup.agent import Coupling, Mind, Truth, Verdict
+from visup.agent.model.task_beliefs import TaskBelief
 from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact, updated_contact
+from visup.rules.coupling.evidence import NO, YES, PairObservation, feet_of, goes_along
 
 SPREADER, CONTAINER, TRUCK = 1, 2, 3
 FOOT, HEIGHT = 330.0, 60.0
@@ -23,7 +27,7 @@ def load(foot: float, *, crane: bool = True) -> list[Thought]:
     def at(i: int) -> list[tuple[int, tuple[float, float, float, float]]]:
         t = i / 25 - 4.0
         x = 60.0 + 60.0 * min(max(0.0, t), 4.0)
-        y = 180.0 + min(40.0 * max(0.0, t - 4.5), foot - HEIGHT - 180.0)
+        y = 180.0 + min(90.0 * max(0.0, t - 4.5), foot - HEIGHT - 180.0)
         above = 50.0 + 40.0 * max(0.0, -1.5 - t)
         container = (CONTAINER, (x, y, 90.0, HEIGHT))
         truck = (TRUCK, (260.0, 250.0, 180.0, FOOT - 250.0))
@@ -103,3 +107,41 @@ def test_nothing_is_in_front_whose_foot_is_higher(
     found = contact(*(Feet(y, ground, height) for y in feet))
     assert not found.in_front or feet[-1] > ground >= min(feet)
     assert found.in_front == (min(feet) <= ground < feet[-1] - 0.25 * height)
+
+
+@pytest.mark.parametrize(
+    ("couplings", "machines", "known"),
+    [
+        ([], (), False),
+        ([(SPREADER, CONTAINER)], (), True),
+        ([(CONTAINER, TRUCK)], (), False),
+        ([(SPREADER, CONTAINER), (SPREADER, TRUCK)], (), False),
+        ([(SPREADER, CONTAINER)], ((SPREADER, CONTAINER),), False),
+    ],
+    ids=["nobody", "carried", "each other", "both", "a part of the same machine"],
+)
+def test_feet_count_if_a_third_one_carries_one_of_the_two(
+    couplings: list[tuple[int, int]], machines: tuple[tuple[int, ...], ...], known: bool
+) -> None:
+    mind = load(ON)[-1].mind
+    task = TaskBelief("load", Verdict.IN_PROGRESS, machines=machines)
+    mind = replace(mind, couplings=tuple(Coupling(c, 0.0) for c in couplings), tasks=(task,))
+    pair = PairObservation((CONTAINER, TRUCK), YES, NO, NO, 0.0, None)
+    feet = feet_of(pair, mind)
+    assert (feet == Feet(ON, FOOT, HEIGHT)) is known
+    assert (feet is not None) is known
+
+
+@pytest.mark.parametrize(
+    ("speed", "ahead", "along"), [(100, 10, True), (100, 60, False), (10, 0, False)]
+)
+def test_two_go_along_if_both_are_fast_and_hardly_differ(
+    speed: float, ahead: float, along: bool
+) -> None:
+    def at(i: int) -> list[tuple[float, float, float, float]]:
+        x = 20.0 + speed * i / 25
+        return [(x, 100.0, 60.0, 60.0), (x + ahead * i / 25, 240.0, 60.0, 60.0)]
+
+    seq = (seen(i, [box_region(n, b) for n, b in enumerate(at(i), start=1)]) for i in range(50))
+    mind: Mind = reason(seq)[-1].mind
+    assert goes_along(mind, (1, 2)) is along

@@ -187,3 +187,22 @@ def test_what_is_being_covered_goes_no_faster_than_its_image_motion() -> None:
     seen_now = [m for m in minds if m.objects[1].last_seen == m.time]
     assert len(seen_now) > 50
     assert all(common_speed(m, (1, 2)) <= 0.5 for m in seen_now)
+
+
+@pytest.mark.parametrize(("slowdown", "parts"), [(0.0, False), (0.2, False), (0.8, True)])
+def test_what_goes_where_its_carrier_goes_is_held_though_a_gap_opens(
+    slowdown: float, parts: bool
+) -> None:
+    """An arm that lifts a cup leaves the picture: its fingers are seen no more, and a gap opens."""
+
+    def at(i: int) -> Observation:
+        t = i / 25
+        rise = 20.0 * max(0.0, t - 4.0) if t < 6.0 else 40.0 + 80.0 * (t - 6.0)
+        left = rise if t < 6.5 else 80.0 + (1.0 - slowdown) * 80.0 * (t - 6.5)
+        lost = min(30.0, 60.0 * max(0.0, t - 6.5))  # of the arm's outline
+        near = 80.0 * max(0.0, 1.0 - t / 2.0)
+        arm = box_region(1, (100, 120 - rise - near, 120, 180 - lost))
+        return seen(i, [arm, box_region(2, (130, 300 - left, 60, 80))])
+
+    found = told(reason(at(i) for i in range(200)))
+    assert [k for k, _ in found] == (["coupled", "decoupled"] if parts else ["coupled"])

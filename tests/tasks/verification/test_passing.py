@@ -53,6 +53,7 @@ ON = OutlineContact(0.0, passing=True, known=True)
 FAR = OutlineContact(0.0, passing=True, known=True, path=50.0)
 SLOW = OutlineContact(0.0, passing=False, known=True)
 UNKNOWN = OutlineContact(0.0)
+BEFORE = OutlineContact(0.0, passing=False, known=True, in_front=True)
 
 
 @pytest.mark.parametrize(
@@ -66,6 +67,8 @@ UNKNOWN = OutlineContact(0.0)
         (True, float("nan"), ON, Truth.FALSE, True),  # a gap that is not known is none
         (False, 0.0, ON, Truth.FALSE, False),  # nobody holds it: by how far it has passed alone
         (False, 0.0, ON, Truth.TRUE, True),
+        (True, 0.0, BEFORE, Truth.FALSE, True),  # set down in front of it
+        (False, 0.0, BEFORE, Truth.FALSE, True),  # and let go of
     ],
 )
 def test_outlines_that_meet(
