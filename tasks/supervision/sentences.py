@@ -40,38 +40,28 @@ def evidence(
         actions: All actions, for their wording.
     """
     who, alone = names(step.actors), len(step.actors) < 2
-    have, them = ("has", "it") if alone else ("have", "them")
+    have, was = ("has", "was") if alone else ("have", "were")
     match monitor.status:
         case Status.FAILING | Status.FAILED if monitor.early:
             return _too_soon(step, meaning, monitor)
         case Status.FAILED if monitor.late:
             return _late(step, monitor)
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
-            what = _say(monitor.contrary, actions)
             known = monitor.entered if monitor.contrary_since is None else monitor.contrary_since
             since = since_reported(monitor.told, step.actors, monitor.contrary, known)
-            if _is_condition(monitor.contrary, actions):
-                return f"`{what}` has held since {since:.1f} s; {_fails_so(step)}"
+            what = _clause(monitor.contrary, actions, f"{who} {have} been", "has held")
             return (
-                f"{who} {have} been {what} since {since:.1f} s; "
-                f"stage `{step.stage}` requires {them} to be {meaning.text}"
+                f"{what} since {since:.1f} s; {_demand(step, meaning, monitor.contrary, actions)}"
             )
         case Status.FAILING | Status.FAILED if monitor.fault is not None:
-            was, what = ("was" if alone else "were"), _say(monitor.fault, actions)
-            if _is_condition(monitor.fault, actions):
-                at = f"`{what}` held at {monitor.fault_since:.1f} s"
-                return f"{at} and {who} {have} not recovered; {_fails_so(step)}"
-            return (
-                f"{who} {was} {what} at {monitor.fault_since:.1f} s and {have} not recovered; "
-                f"stage `{step.stage}` requires {them} to be {meaning.text}"
-            )
+            what = _clause(monitor.fault, actions, f"{who} {was}", "held")
+            stays = "the stage has" if _is_condition(monitor.fault, actions) else have
+            what = f"{what} at {monitor.fault_since:.1f} s and {stays} not recovered"
+            return f"{what}; {_demand(step, meaning, monitor.fault, actions)}"
         case Status.PROGRESSING if monitor.helped_since is not None:
-            by = monitor.helped_by or ""
-            what, known = _say(by, actions), max(0.0, monitor.helped_since)
+            by, known = monitor.helped_by or "", max(0.0, monitor.helped_since)
             since = since_reported(monitor.told, step.actors, by, known)
-            if _is_condition(by, actions):
-                return f"`{what}` has held since {since:.1f} s"
-            return f"{who} {have} been {what} since {since:.1f} s"
+            return f"{_clause(by, actions, f'{who} {have} been', 'has held')} since {since:.1f} s"
         case Status.STALLED if monitor.helped_at is not None:
             return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
         case Status.UNKNOWN if monitor.unseen_since is not None:
@@ -301,13 +291,22 @@ VERDICT_WORDS = {
 
 def _say(relation: str, actions: Words) -> str:
     meaning = actions.get(relation)
-    if meaning is None:
-        return relation.replace("_", " ") if relation.isidentifier() else relation
-    return meaning.text
+    return meaning.text if meaning else relation.replace("_", " ")
 
 
-def _fails_so(step: TaskStep) -> str:
-    return f"stage `{step.stage}` fails when it does"
+def _clause(relation: str, actions: Words, who_are: str, held: str) -> str:
+    """A relation as a clause; a condition that a course states is quoted."""
+    if _is_condition(relation, actions):
+        return f"`{relation}` {held}"
+    return f"{who_are} {_say(relation, actions)}"
+
+
+def _demand(step: TaskStep, meaning: ActionDefinition, relation: str, actions: Words) -> str:
+    """What the stage requires of a step that fails by a relation."""
+    if _is_condition(relation, actions):
+        return f"stage `{step.stage}` fails when it does"
+    them = "it" if len(step.actors) < 2 else "them"
+    return f"stage `{step.stage}` requires {them} to be {meaning.text}"
 
 
 def _is_condition(relation: str, actions: Words) -> bool:

@@ -100,8 +100,7 @@ def test_a_condition_by_which_a_stage_fails_is_quoted() -> None:
     )
     before = replace(apart, contrary=None, fault="apart(arm, part)", fault_since=4.7)
     assert evidence(step, ACTIONS["converging"], before, 9.0, ACTIONS) == (
-        "`apart(arm, part)` held at 4.7 s and the part has not recovered; "
-        "stage `lift` fails when it does"
+        "`apart(arm, part)` held at 4.7 s and the stage has not recovered; stage `lift` fails when it does"
     )
     under_way = StepMonitor(
         3.0, status=Status.PROGRESSING, helped_by="range(arm, part) < 5 m", helped_since=3.5
