@@ -4,6 +4,8 @@ Touching in the picture is not touching. The continuation decides: a body in con
 other, takes it along, or bounces back; one that goes on as fast as it came passes in front of the other, or
 behind it. What is carried, and comes down past the foot of the other, is in front of it: what stands on
 another body, or in it, has its foot above the foot of that, seen from anywhere above the ground.
+
+*Approximation*: what is hung up under another thing, from above, counts as in front of it.
 """
 
 from __future__ import annotations

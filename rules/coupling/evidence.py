@@ -199,11 +199,8 @@ def coupling_cells(
 
 def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
     """Whether one of two has passed so far across the other that they cannot be in contact."""
-    if contact.in_front:
-        return True
-    return contact.passing and contact.path > ContactSettings().doubt_share * smaller_size(
-        pair, mind
-    )
+    far = ContactSettings().doubt_share * smaller_size(pair, mind)
+    return contact.in_front or (contact.passing and contact.path > far)
 
 
 def smaller_size(pair: tuple[int, ...], mind: Mind) -> float:
