@@ -51,7 +51,7 @@ class StepModel:
     ) -> Leaf[StepMonitor]:
         """A step that begins now, and held just before by a relation that is uncertain now."""
         then = replace(seen, observed=True, holds=Truth.TRUE, held_by=held_by, helps=held_by)
-        return self.looked_at(leaf, replace(then, contrary=None), Moment(now, 0.0), False)
+        return self.looked_at(leaf, then, Moment(now, 0.0), False)
 
     def together(self, state: State[StepMonitor], observe: Observe) -> State[StepMonitor]:
         """A state in which actions joined by `&` have held only if they did at the same time."""

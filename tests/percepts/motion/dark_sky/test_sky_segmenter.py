@@ -114,6 +114,7 @@ def test_a_large_body_that_the_border_cuts_is_not_reported_at_rest() -> None:
     run = Run()
     for k in range(30):
         assert run.step(painted([disc(5, 60, 14)], [120], k)) == ()
+    assert run.ids.new() == 1  # none was given
 
 
 def test_a_small_body_that_moves_with_the_ground_is_not_reported() -> None:
