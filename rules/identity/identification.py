@@ -168,12 +168,11 @@ class IdentityReasoner(ExplainableReasoner):
         s = self.settings
         kind: LookKind = getattr(s, look.kind)
         heard = weights(look.hypotheses, s, waited, kind.awaited)
-        if at_border(mind.objects[object_id].region, mind.frame_size):
-            # Ever another part of it is in view, so its views cannot agree.
-            return Tally(tuple(heard.items()), worth(s.stranger, s))
-        # Views that are inconsistent over time count against a name (paper, figure 5).
-        likely = ((n, w * pose_support(mind, object_id, n)) for n, w in heard.items())
-        return Tally(tuple(likely), worth(s.stranger, s))
+        if not at_border(mind.objects[object_id].region, mind.frame_size):
+            # Views that are inconsistent over time count against a name (paper, figure 5). Of what the
+            # border cuts ever another part is in view, so that its views cannot agree.
+            heard = {n: w * pose_support(mind, object_id, n) for n, w in heard.items()}
+        return Tally(tuple(heard.items()), worth(s.stranger, s))
 
     def _believe(self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes) -> ObjectBelief:
         s = self.settings

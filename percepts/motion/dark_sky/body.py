@@ -91,8 +91,8 @@ class SkyBody:
     @property
     def stands_alone(self) -> bool:
         """Whether it has been alone for long, in full view, and is larger than a caption."""
-        large = self.area >= LARGE * self.visible.size
-        return self.settled and self.alone and not self.cut and large
+        whole = self.settled and self.alone and not self.cut
+        return whole and self.area >= LARGE * self.visible.size
 
     @property
     def area(self) -> int:
