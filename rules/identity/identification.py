@@ -169,8 +169,8 @@ class IdentityReasoner(ExplainableReasoner):
         kind: LookKind = getattr(s, look.kind)
         heard = weights(look.hypotheses, s, waited, kind.awaited)
         if not at_border(mind.objects[object_id].region, mind.frame_size):
-            # Views that are inconsistent over time count against a name (paper, figure 5). Of what the
-            # border cuts ever another part is in view, so that its views cannot agree.
+            # Views that are inconsistent over time count against a name (paper, figure 5). The visible
+            # part of what the border cuts keeps changing, so that its views cannot agree.
             heard = {n: w * pose_support(mind, object_id, n) for n, w in heard.items()}
         return Tally(tuple(heard.items()), worth(s.stranger, s))
 

@@ -91,7 +91,7 @@ def test_what_is_awaited_is_not_seen_in_what_looks_otherwise() -> None:
 def test_views_must_agree_unless_the_border_cuts_the_body(
     box: tuple[int, int, int, int], counts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of an arm that comes in ever another part is in view."""
+    """The visible part of an arm that comes in keeps changing."""
 
     def votes_of(support: float) -> float:
         told = "visup.rules.identity.identification.pose_support"
