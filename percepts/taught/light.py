@@ -44,8 +44,8 @@ def relit(
     for number, view in enumerate(views):
         gain = light_change(view.scene, picture)
         if LEAST_CHANGE <= np.abs(np.log(gain)).max() <= MOST_CHANGE:
-            image = np.clip(np.rint(view.image * gain), 0, 255).astype(np.uint8)
-            yield number, replace(view, image=image)
+            image, scene = (_in_light(part, gain) for part in (view.image, view.scene))
+            yield number, replace(view, image=image, scene=scene)
 
 
 def light_change(then: NDArray[np.uint8], now: NDArray[np.uint8]) -> NDArray[np.float64]:
@@ -60,6 +60,10 @@ def light_change(then: NDArray[np.uint8], now: NDArray[np.uint8]) -> NDArray[np.
     """
     change = (_cells(now) - _cells(then)).reshape(-1, 3)
     return np.asarray(np.exp(np.median(change, axis=0)))
+
+
+def _in_light(picture: NDArray[np.uint8], gain: NDArray[np.float64]) -> NDArray[np.uint8]:
+    return np.clip(np.rint(picture * gain), 0, 255).astype(np.uint8)
 
 
 def _cells(picture: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from visup.percepts.appearance.looks.blob import Blob, overlap
 from visup.percepts.appearance.looks.bodies import MovingBody, body_colours
 from visup.percepts.appearance.looks.patches import FoundPatch, only_patch
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
-from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.looks.scene import Scene, prepare_scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
 from visup.percepts.appearance.scenery.background_memory import holds
 from visup.percepts.appearance.tracking.detection import colour_peaks, search
@@ -181,6 +181,17 @@ def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPla
     """
     it, unit = view.appearance, home_of(scene, view).scale
     return _patch_places(view.name, number, it, only_patch(scene, it, unit))
+
+
+def colours_tell(view: ViewModel) -> bool:
+    """Whether an object's colours alone find it in the picture in which it was taught.
+
+    Where they do not, as those of a black gripper before dark furniture, they find it nowhere else.
+    """
+    scene = prepare_scene(view.scene, 0.0)
+    home, it = home_of(scene, view), view.appearance
+    found = coloured_places(scene, view, 0)
+    return any(f.match.pose.apart(home, it.radius) < 2 * it.radius * home.scale for f in found)
 
 
 def lost_places(

@@ -21,7 +21,9 @@ from tests.percepts.appearance.scenes import (
 from tests.percepts.appearance.test_bodies import TOOL, TRAY, scene, turned
 from visup.agent import Frame, Observation
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
-from visup.percepts.appearance.tracking.finding import coloured_places
+from visup.percepts.appearance.looks.thing_model import view_models
+from visup.percepts.appearance.tracking.finding import coloured_places, colours_tell
+from visup.percepts.taught.view import taught_mask
 
 WIDE, HIGH = SIZES["tool"]
 SIZE = WIDTH, HEIGHT
@@ -69,6 +71,19 @@ def test_what_is_much_smaller_or_larger_is_something_else(by: float) -> None:
     assert coloured_places(scene(canvas), TOOL, 0) == []
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_colours_tell_where_they_do_so_in_the_picture_of_the_teaching(alone: bool) -> None:
+    """A patch of the same colours beside the thing that is shown: elsewhere, it may be the patch."""
+    taught, masks = picture({"tool": (60, 80)})
+    if not alone:
+        taught[80 : 80 + HIGH, 160 : 160 + WIDE] = taught[masks["tool"]].reshape(HIGH, WIDE, 3)
+    view = taught_mask("tool", taught, masks["tool"])
+    assert colours_tell(view_models([view])[0]) is alone
+    behaviour = AppearanceBehaviour([view])
+    found = behaviour.perceive(Frame(0, 0.0, turned(90)[0]), Observation(0, 0.0, SIZE), ())
+    assert bool([p for p in found if p.kind == "hypothesis"]) is alone
+
+
 def resting(image: Image, frames: int) -> list[set[str]]:
     """The names told of a picture that does not change, frame by frame."""
     behaviour = AppearanceBehaviour(shown({"tool": (100, 60)}, "tool"))
@@ -88,8 +103,8 @@ def test_it_is_told_from_the_first_picture_on_and_stays_while_it_rests() -> None
 @pytest.mark.parametrize("equal", [True, False])
 def test_colours_do_not_tell_equal_things_apart(equal: bool) -> None:
     """A thing seen from another side, striped the other way, is one of the two equal ones."""
-    names = ("part", "twin") if equal else ("part",)
-    behaviour = AppearanceBehaviour(shown({"part": (30, 60), "twin": (170, 60)}, *names))
+    places = {"part": (30, 60)} | ({"twin": (170, 60)} if equal else {})
+    behaviour = AppearanceBehaviour(shown(places, *places))
     pixels = thing("part").reshape(-1, 3)
     canvas = table()
     canvas[80:110, 100:124] = np.random.default_rng(3).permutation(pixels).reshape(30, 24, 3)
