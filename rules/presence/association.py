@@ -8,7 +8,7 @@ maps region ids to objects, so that an object keeps its id: `associate` finds th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 
 from visup.agent import Hypothesis, Mind, Observation, Region
@@ -42,24 +42,36 @@ def recognised(mind: Mind, observation: Observation) -> frozenset[int]:
     Such a region is the object's own, however near another one is; of regions that merely move together
     it is unknown how many bodies they are.
     """
-    owner, found = region_owners(mind), set[int]()
+    owner = region_owners(mind)
+    return frozenset(owner[i] for i in recognised_regions(observation) if i in owner)
+
+
+def recognised_regions(observation: Observation) -> frozenset[int]:
+    """Regions that a behaviour recognised by appearance; see `recognised`."""
+    found = set[int]()
     for report in observation.reports:
         if {"region", "hypothesis"} <= set(report.gives):
-            named = (p.value.region_id for p in report.percepts if p.kind == "hypothesis")
-            found.update(owner[i] for i in named if i in owner)
+            found.update(p.value.region_id for p in report.percepts if p.kind == "hypothesis")
     return frozenset(found)
 
 
-def associate(mind: Mind, regions: Iterable[Region]) -> tuple[dict[int, Region], dict[int, int]]:
+def associate(mind: Mind, observation: Observation) -> tuple[dict[int, Region], dict[int, int]]:
     """Associate a frame's regions with objects; a region without an owner starts a new object.
+
+    Of two regions of one object the one that is recognised by appearance is its own: an arm that was taken
+    for its gripper, while that was not seen, gives way to it. Otherwise its current region is.
 
     Returns:
         Object id -> its region, and the owners of all known regions, those of this frame last.
     """
     owners = dict(region_owners(mind))
+    named = recognised_regions(observation)
     found: dict[int, Region] = {}
-    # An object's current region takes precedence over an older one of the same object.
-    for region in sorted(regions, key=lambda r: not _is_current_region(mind, owners, r)):
+
+    def precedence(region: Region) -> tuple[bool, bool]:
+        return region.id not in named, not _is_current_region(mind, owners, region)
+
+    for region in sorted(observation.of("region"), key=precedence):
         object_id = owners.pop(region.id, None)
         if object_id is None or object_id in found:
             object_id = _free_id(region.id, mind.objects.keys() | found.keys())

@@ -69,7 +69,7 @@ class ObjectReasoner:
         return Outcome(self._forget(mind))
 
     def _see(self, mind: Mind, observation: Observation) -> Mind:
-        found, owners = associate(mind, observation.of("region"))
+        found, owners = associate(mind, observation)
         beliefs = [_sighted(mind, i, region) for i, region in found.items()]
         newest = list(owners.items())[-self.settings.most_owners :]
         return mind.with_objects(*beliefs).remember(OWNERS, MappingProxyType(dict(newest)))

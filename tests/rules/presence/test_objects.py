@@ -115,3 +115,20 @@ def test_what_is_recognised_and_moves_enters_at_once() -> None:
     assert unknown == pytest.approx(3.0 + P.entry_inside_s, abs=0.1)
     again = entered_at({1: [tray], 2: [tray]}, 40.0)
     assert again is None or again >= 3.0 + P.entry_inside_s - 0.1
+
+
+def test_what_passed_for_a_recognised_thing_gives_way_when_that_is_seen_again() -> None:
+    """A gripper is lost for a second; meanwhile its arm, which moves on from there, is taken for it."""
+
+    def looks() -> Iterator[Observation]:
+        for i in range(150):
+            lost = 60 <= i < 90
+            gripper = None if lost else box_region(1, (200 + i, 220, 60, 50))
+            arm = box_region(2, (195 + i, 200, 65, 60)) if i >= 60 else None
+            yield seen(i, [gripper, arm], names={1: [("gripper", 0.95)]})
+
+    steps = reason(looks())
+    assert steps[80].mind.objects[1].region.id == 2
+    objects = steps[-1].mind.objects
+    assert objects[1].region.id == 1
+    assert [b.id for b in objects.values() if b.name == "gripper"] == [1]
