@@ -84,6 +84,19 @@ def test_colours_tell_where_they_do_so_in_the_picture_of_the_teaching(alone: boo
     assert bool([p for p in found if p.kind == "hypothesis"]) is alone
 
 
+def test_colours_that_find_something_else_in_the_picture_of_the_teaching_tell_nothing() -> None:
+    """The thing was shown behind a fence, and another one like it, whole, beside it."""
+    taught, masks = picture({"tool": (60, 80)})
+    whole = taught[masks["tool"]].reshape(HIGH, WIDE, 3)
+    taught[80 : 80 + HIGH, 160 : 160 + WIDE] = whole
+    for rail in range(80, 80 + HIGH, 14):
+        taught[rail : rail + 6, 60 : 60 + WIDE] = table()[rail : rail + 6, 60 : 60 + WIDE]
+    (view,) = view_models([taught_mask("tool", taught, masks["tool"])])
+    (other,) = coloured_places(scene(view.scene), view, 0)
+    assert other.match.pose.x == pytest.approx(160 + (WIDE - 1) / 2, abs=2.0)
+    assert not colours_tell(view)
+
+
 def resting(image: Image, frames: int) -> list[set[str]]:
     """The names told of a picture that does not change, frame by frame."""
     behaviour = AppearanceBehaviour(shown({"tool": (100, 60)}, "tool"))
