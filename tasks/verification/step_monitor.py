@@ -274,9 +274,10 @@ def _note_progress(
     held, broken, ceased = monitor.held_s, monitor.broken_since, monitor.ceased
     if seen.holds is Truth.TRUE:
         held, broken = held + dt, None
-        if step.hold_s is None and seen.held_by is not None:
-            # Time for which it held before the step began counts too.
-            held = max(held, seen.elapsed(step, seen.held_by.since, now))
+        if seen.held_by is not None:
+            # It has held for longer than it has been confirmed; without `for` also before the step began.
+            earliest = -math.inf if step.hold_s is None else monitor.entered
+            held = max(held, seen.elapsed(step, max(seen.held_by.since, earliest), now))
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
         if seen.elapsed(step, broken, now) >= settings.gap_s:

@@ -1,4 +1,4 @@
-"""`(touching(a, b) for 2 s)` within a condition: it must have held for so long."""
+"""What must hold `for` a while: from when it began to hold, and `(... for 2 s)` within a condition."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Script, Spell, task_of, watch
-from visup.agent import Verdict
+from tests.tasks.scripted import ARM, SATELLITE, Script, Spell, task_of, watch
+from visup.agent import Truth, Verdict
 from visup.tasks.grammar.parser import read
 from visup.tasks.supervision.supervise import finish
 
+HOLD = """
+<t>    ::= <come> <hold>
+<come> ::= converging(arm, satellite)
+<hold> ::= coupled(arm, satellite) for 1 s
+"""
 DOCK = "<dock> ::= converging(arm, satellite) ends when {}"
 tenths = st.integers(10, 90).map(lambda n: n / 10)
 
@@ -48,3 +53,23 @@ def test_it_may_stand_among_others(condition: str, good: bool) -> None:
 def test_it_reads_back() -> None:
     text = DOCK.format("not (touching(a, b) and seen(a) for 2 s) or (seen(b) for wait)")
     assert str(read(text)) == text
+
+
+@given(st.integers(0, 6), st.integers(2, 20))
+def test_it_counts_from_when_it_began_to_hold_however_late_that_is_seen(
+    late: int, lasts: int
+) -> None:
+    """The two meet at 2.9 s; that they are coupled is doubtful at first; then one leaves the picture."""
+    until = 3.0 + lasts / 10
+    script = Script(
+        [
+            Spell("converging", 0.5, 2.9),
+            Spell("touching", 2.9, until),
+            Spell("coupled", 3.0, 3.0 + late / 10, truth=Truth.UNKNOWN),
+            Spell("coupled", 3.0, until),
+        ],
+        objects={ARM: (0.0, until), SATELLITE: (0.0, 1e9)},
+    )
+    held = finish(task_of(watch(script, 7.0, HOLD))) is Verdict.SUCCEEDED
+    # The frame in which it begins and the one in which it leaves may count or not.
+    assert held if lasts >= 13 else not held or lasts > 10
