@@ -61,6 +61,7 @@ class StepMonitor:
         missed: That `within`; None if the greatest delay expired.
         ceased: Whether it held once and was then observed not to.
         unseen_since: Since when nothing is known about it, or None.
+        unseen_s: How long nothing was known about it since it was entered.
         denied: Whether the end condition of the course was last observed not to hold.
         opened: Whether the begin condition of the course was observed (see `StageCondition`).
         confidence: Of the last observation, 0 to 1.
@@ -101,6 +102,7 @@ class StepMonitor:
     missed: RunningDeadline | None = None
     ceased: bool = False
     unseen_since: float | None = None
+    unseen_s: float = 0.0
     confidence: float = 1.0
     denied: bool = False
     opened: bool = False
@@ -270,14 +272,18 @@ def _note_progress(
     now, dt = moment
     if not seen.observed:
         # Unobserved is not false: progress is retained and the clocks stand still.
-        return replace(monitor, unseen_since=_first(monitor.unseen_since, now), better_since=None)
+        unseen_since, unseen_s = _first(monitor.unseen_since, now), monitor.unseen_s + dt
+        return replace(monitor, unseen_since=unseen_since, unseen_s=unseen_s, better_since=None)
     held, broken, ceased = monitor.held_s, monitor.broken_since, monitor.ceased
     if seen.holds is Truth.TRUE:
         held, broken = held + dt, None
-        if seen.held_by is not None:
-            # It has held for longer than it has been confirmed; without `for` also before the step began.
-            earliest = -math.inf if step.hold_s is None else monitor.entered
-            held = max(held, seen.elapsed(step, max(seen.held_by.since, earliest), now))
+        if seen.held_by is not None and step.hold_s is None:
+            # Time for which it held before the step began counts too.
+            held = max(held, seen.elapsed(step, seen.held_by.since, now))
+        elif seen.held_by is not None:
+            # It has held for longer than that has been certain.
+            since = max(seen.held_by.since, monitor.entered)
+            held = max(held, seen.elapsed(step, since, now) - monitor.unseen_s)
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
         if seen.elapsed(step, broken, now) >= settings.gap_s:

@@ -183,7 +183,7 @@ def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPla
     return _patch_places(view.name, number, it, only_patch(scene, it, unit))
 
 
-def colours_tell(view: ViewModel) -> bool:
+def has_distinctive_colours(view: ViewModel) -> bool:
     """Whether an object's colours alone find it in the picture in which it was taught.
 
     Where they do not, as those of a black gripper before dark furniture, they find it nowhere else.

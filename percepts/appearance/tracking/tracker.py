@@ -30,8 +30,8 @@ from visup.percepts.appearance.tracking.finding import (
     assigned,
     body_places,
     coloured_places,
-    colours_tell,
     footprint,
+    has_distinctive_colours,
     searched,
 )
 from visup.percepts.appearance.tracking.following import (
@@ -85,7 +85,7 @@ class ThingTracker:
         self._camera: Doubles | None = STILL
         self._scenery = CameraTrack()
         self._alike = look_alikes(self.views)
-        self._telling: dict[int, bool] = {}
+        self._distinctive: dict[int, bool] = {}
 
     @property
     def camera(self) -> Doubles | None:
@@ -107,7 +107,7 @@ class ThingTracker:
 
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far."""
-        return {k: v for k, v in vars(self).items() if k not in ("views", "_alike", "_telling")}
+        return {k: v for k, v in vars(self).items() if k not in ("views", "_alike", "_distinctive")}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a tracker of the same views."""
@@ -228,13 +228,15 @@ class ThingTracker:
     def _coloured(self, scene: Scene, names: Collection[str]) -> list[ThingPlace]:
         """Places of objects by their colours alone; these do not tell look-alikes apart."""
         sought = [(k, v) for k, v in self._views_of(names) if not self._alike[k]]
-        return [c for k, v in sought if self._tell(k) for c in coloured_places(scene, v, k)]
+        return [
+            c for k, v in sought if self._is_distinctive(k) for c in coloured_places(scene, v, k)
+        ]
 
-    def _tell(self, number: int) -> bool:
-        """Whether the colours of a view tell its object; found out when it is first asked."""
-        if number not in self._telling:
-            self._telling[number] = colours_tell(self.views[number])
-        return self._telling[number]
+    def _is_distinctive(self, number: int) -> bool:
+        """Whether a view has distinctive colours; found out when it is first asked."""
+        if number not in self._distinctive:
+            self._distinctive[number] = has_distinctive_colours(self.views[number])
+        return self._distinctive[number]
 
     def _views_of(self, names: Collection[str]) -> list[tuple[int, ViewModel]]:
         """The views of some objects, each with its number."""

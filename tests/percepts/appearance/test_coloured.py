@@ -22,7 +22,7 @@ from tests.percepts.appearance.test_bodies import TOOL, TRAY, scene, turned
 from visup.agent import Frame, Observation
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.tracking.finding import coloured_places, colours_tell
+from visup.percepts.appearance.tracking.finding import coloured_places, has_distinctive_colours
 from visup.percepts.taught.view import taught_mask
 
 WIDE, HIGH = SIZES["tool"]
@@ -72,19 +72,21 @@ def test_what_is_much_smaller_or_larger_is_something_else(by: float) -> None:
 
 
 @pytest.mark.parametrize("alone", [True, False])
-def test_colours_tell_where_they_do_so_in_the_picture_of_the_teaching(alone: bool) -> None:
+def test_colours_are_distinctive_where_they_find_the_thing_where_it_was_taught(
+    alone: bool,
+) -> None:
     """A patch of the same colours beside the thing that is shown: elsewhere, it may be the patch."""
     taught, masks = picture({"tool": (60, 80)})
     if not alone:
         taught[80 : 80 + HIGH, 160 : 160 + WIDE] = taught[masks["tool"]].reshape(HIGH, WIDE, 3)
     view = taught_mask("tool", taught, masks["tool"])
-    assert colours_tell(view_models([view])[0]) is alone
+    assert has_distinctive_colours(view_models([view])[0]) is alone
     behaviour = AppearanceBehaviour([view])
     found = behaviour.perceive(Frame(0, 0.0, turned(90)[0]), Observation(0, 0.0, SIZE), ())
     assert bool([p for p in found if p.kind == "hypothesis"]) is alone
 
 
-def test_colours_that_find_something_else_in_the_picture_of_the_teaching_tell_nothing() -> None:
+def test_colours_that_find_something_else_where_it_was_taught_are_not_distinctive() -> None:
     """The thing was shown behind a fence, and another one like it, whole, beside it."""
     taught, masks = picture({"tool": (60, 80)})
     whole = taught[masks["tool"]].reshape(HIGH, WIDE, 3)
@@ -94,7 +96,7 @@ def test_colours_that_find_something_else_in_the_picture_of_the_teaching_tell_no
     (view,) = view_models([taught_mask("tool", taught, masks["tool"])])
     (other,) = coloured_places(scene(view.scene), view, 0)
     assert other.match.pose.x == pytest.approx(160 + (WIDE - 1) / 2, abs=2.0)
-    assert not colours_tell(view)
+    assert not has_distinctive_colours(view)
 
 
 def resting(image: Image, frames: int) -> list[set[str]]:

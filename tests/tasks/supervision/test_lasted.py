@@ -73,3 +73,13 @@ def test_it_counts_from_when_it_began_to_hold_however_late_that_is_seen(
     held = finish(task_of(watch(script, 7.0, HOLD))) is Verdict.SUCCEEDED
     # The frame in which it begins and the one in which it leaves may count or not.
     assert held if lasts >= 13 else not held or lasts > 10
+
+
+@pytest.mark.parametrize(("hidden", "good"), [((9.0, 9.1), True), ((3.5, 4.4), False)])
+def test_what_cannot_be_seen_does_not_count(hidden: tuple[float, float], good: bool) -> None:
+    script = Script(
+        [Spell("converging", 0.5, 2.9), Spell("touching", 2.9, 4.7), Spell("coupled", 3.0, 4.7)],
+        objects={ARM: (0.0, 4.7), SATELLITE: (0.0, 1e9)},
+        hidden={ARM: hidden},
+    )
+    assert (finish(task_of(watch(script, 7.0, HOLD))) is Verdict.SUCCEEDED) == good
