@@ -83,3 +83,18 @@ def test_what_cannot_be_seen_does_not_count(hidden: tuple[float, float], good: b
         hidden={ARM: hidden},
     )
     assert (finish(task_of(watch(script, 7.0, HOLD))) is Verdict.SUCCEEDED) == good
+
+
+@pytest.mark.parametrize(("until", "good"), [(3.2, False), (3.8, True)])
+def test_what_held_before_the_stage_began_does_not_count(until: float, good: bool) -> None:
+    """Both hold from 0.5 s on; the first stage takes until 2.5 s, so the second one until 3.5 s."""
+    text = """
+    <t>    ::= <meet> <hold>
+    <meet> ::= touching(arm, satellite) for 2 s
+    <hold> ::= already coupled(arm, satellite) for 1 s
+    """
+    script = Script(
+        [Spell("touching", 0.5, until), Spell("coupled", 0.5, until)],
+        objects={ARM: (0.0, until), SATELLITE: (0.0, 1e9)},
+    )
+    assert (finish(task_of(watch(script, 7.0, text))) is Verdict.SUCCEEDED) == good
