@@ -189,9 +189,9 @@ def has_distinctive_colours(view: ViewModel) -> bool:
     Where they do not, as those of a black gripper before dark furniture, they find it nowhere else.
     """
     scene = prepare_scene(view.scene, 0.0)
-    home, it = home_of(scene, view), view.appearance
-    found = coloured_places(scene, view, 0)
-    return any(f.match.pose.apart(home, it.radius) < 2 * it.radius * home.scale for f in found)
+    home = footprint(scene, home_of(scene, view), view.appearance)
+    seen = (place.seen for place in coloured_places(scene, view, 0))
+    return home is not None and any(b is not None and overlap(b, home) > TAKEN for b in seen)
 
 
 def lost_places(

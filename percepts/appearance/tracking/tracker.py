@@ -85,7 +85,7 @@ class ThingTracker:
         self._camera: Doubles | None = STILL
         self._scenery = CameraTrack()
         self._alike = look_alikes(self.views)
-        self._distinctive: dict[int, bool] = {}
+        self._distinctive = [has_distinctive_colours(v) for v in self.views]
 
     @property
     def camera(self) -> Doubles | None:
@@ -227,16 +227,9 @@ class ThingTracker:
 
     def _coloured(self, scene: Scene, names: Collection[str]) -> list[ThingPlace]:
         """Places of objects by their colours alone; these do not tell look-alikes apart."""
-        sought = [(k, v) for k, v in self._views_of(names) if not self._alike[k]]
-        return [
-            c for k, v in sought if self._is_distinctive(k) for c in coloured_places(scene, v, k)
-        ]
-
-    def _is_distinctive(self, number: int) -> bool:
-        """Whether a view has distinctive colours; found out when it is first asked."""
-        if number not in self._distinctive:
-            self._distinctive[number] = has_distinctive_colours(self.views[number])
-        return self._distinctive[number]
+        views = self._views_of(names)
+        sought = [(k, v) for k, v in views if self._distinctive[k] and not self._alike[k]]
+        return [c for k, v in sought for c in coloured_places(scene, v, k)]
 
     def _views_of(self, names: Collection[str]) -> list[tuple[int, ViewModel]]:
         """The views of some objects, each with its number."""
