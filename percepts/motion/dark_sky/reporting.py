@@ -86,14 +86,15 @@ def regions_of(
 ) -> Regions:
     """All regions: one for each body with an id, and the moving ones that are of no body; by id.
 
+    An id is kept at rest: a body that the border cuts has got it when nearly all of it moved, so it is no ground.
+
     Args:
         bodies: The bodies, with ids.
         members: The moving regions of each.
         regions: All moving regions.
         now: Time, seconds.
     """
-    pairs = [(b, m) for b, m in zip(bodies, members, strict=True) if b.id and b.seen == now]
-    kept = [(b, m) for b, m in pairs if m or not b.cut]
+    kept = [(b, m) for b, m in zip(bodies, members, strict=True) if b.id and b.seen == now]
     taken = {r.id for _, m in kept for r in m} | {b.id for b, _ in kept}
     others = [r for r in regions if r.id not in taken]
     return tuple(sorted([*others, *(_region(b, m) for b, m in kept)], key=lambda r: r.id))

@@ -117,6 +117,15 @@ def test_a_large_body_that_the_border_cuts_is_not_reported_at_rest() -> None:
     assert run.ids.new() == 1  # none was given
 
 
+def test_a_body_that_the_border_cuts_is_reported_when_it_halts() -> None:
+    arm, run = bar(0, 90, 50, 62), Run(last=3)
+    assert [r.id for r in run.step(painted([arm], [120]), [region(arm, 3)])] == [3]
+    told = [run.step(painted([arm], [120], k)) for k in range(1, 40)]
+    assert {tuple(r.id for r in regions) for regions in told} == {(3,)}
+    assert alike(whole(told[-1][0]), arm) > 0.85
+    assert told[-1][0].velocity == (0.0, 0.0)
+
+
 def test_a_small_body_that_moves_with_the_ground_is_not_reported() -> None:
     run = Run()
     for k in range(30):
