@@ -86,7 +86,7 @@ def regions_of(
 ) -> Regions:
     """All regions: one for each body with an id, and the moving ones that are of no body; by id.
 
-    An id is kept at rest: a body that the border cuts has got it when nearly all of it moved, so it is no ground.
+    An id is kept at rest: what the border cuts got it when nearly all of it moved, and so is no ground.
 
     Args:
         bodies: The bodies, with ids.
