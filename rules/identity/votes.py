@@ -85,7 +85,7 @@ class VoteSettings:
     stranger: float = 0.5
     shape: LookKind = LookKind(awaited=0.1)
     found: LookKind = LookKind(awaited=0.06)
-    expected: float = 1.5
+    expected: float = 4.0
     apart_s: float = 0.2
     evidence: float = 2.2
     settle: float = 0.7

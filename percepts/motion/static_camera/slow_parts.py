@@ -148,6 +148,7 @@ def hardly_moves(velocity: tuple[float, float], scale: float) -> bool:
 
 def with_slow_parts(
     regions: Sequence[Region],
+    others: Sequence[Region],
     slow: Mask,
     bare: Floats | None,
     scene: FrameMeasurements,
@@ -157,6 +158,7 @@ def with_slow_parts(
 
     Args:
         regions: In frame pixels.
+        others: Further regions, which are no part of these.
         slow: (h, w) bool, working pixels, from `SlowChange`.
         bare: Belief that the ground is bare, of any size; None if nothing is known.
         scene: The frame.
@@ -169,7 +171,8 @@ def with_slow_parts(
     own = np.asarray(masks.any(axis=0)) if len(masks) else np.zeros_like(slow)
     if not own.any():
         return tuple(regions), own  # no pixel
-    added = _thick(_body(own, slow, bare, scene) & ~own)
+    taken = np.any([own, *(_reduced(r, slow.shape, size) for r in others)], axis=0)
+    added = _thick(_body(own, slow, bare, scene) & ~taken)
     away = [cv2.distanceTransform((~m).view(np.uint8), cv2.DIST_L2, 3) for m in masks]
     nearest = np.argmin(away, axis=0)
     parts = [added & (nearest == i) for i in range(len(regions))]

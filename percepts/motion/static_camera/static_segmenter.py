@@ -144,7 +144,9 @@ class StaticCameraSegmenter:
         slow = self._slow.pixels() if old else None
         if slow is None:
             return tuple(regions)
-        known, parts = with_slow_parts(old, slow, self._bare.share, scene, size)
+        slowly = {r.id for r in old}
+        others = [r for r in regions if r.id not in slowly]
+        known, parts = with_slow_parts(old, others, slow, self._bare.share, scene, size)
         self._slow.keep(parts)
         whole = {r.id: r for r in known}
         return tuple(whole.get(r.id, r) for r in regions)

@@ -71,13 +71,19 @@ def test_where_nobody_looked_a_tally_only_fades(
     assert all(v <= dict(counts)[name] for name, v in after.counts)
 
 
-def test_of_names_that_a_cut_silhouette_allows_the_awaited_one_is_believed() -> None:
-    def said(i: int) -> list[tuple[str, float]]:
-        return [("airplane", 0.64), ("arm", 0.57), ("lamp", 0.55)]
-
-    alone = believed(said, lambda i: AT_BORDER)
-    awaited = believed(said, lambda i: AT_BORDER, actors={"arm": ("arm",)})
-    assert (alone.name, awaited.name) == ("airplane", "arm")
+@pytest.mark.parametrize(
+    "looks",
+    [
+        [("airplane", 0.64), ("arm", 0.57), ("lamp", 0.55)],
+        [("ladder", 0.74), ("tower_crane", 0.70), ("arm", 0.60)],
+    ],
+)
+def test_of_names_that_a_cut_silhouette_allows_the_awaited_one_is_believed(
+    looks: list[tuple[str, float]],
+) -> None:
+    alone = believed(lambda _: looks, lambda _: AT_BORDER)
+    awaited = believed(lambda _: looks, lambda _: AT_BORDER, actors={"arm": ("arm",)})
+    assert (alone.name, awaited.name) == (looks[0][0], "arm")
 
 
 def test_what_is_awaited_is_not_seen_in_what_looks_otherwise() -> None:

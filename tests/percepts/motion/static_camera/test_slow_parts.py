@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -7,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.motion.clips import FPS, SIZE, clip, texture, window
-from visup.agent import Frame
+from visup.agent import Frame, Region
+from visup.percepts.motion.features.superpixels import superpixels
 from visup.percepts.motion.features.work_image import WorkImage, prepare_image
+from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.static_camera.slow_parts import (
     ALWAYS_S,
@@ -18,6 +23,7 @@ from visup.percepts.motion.static_camera.slow_parts import (
     GroundBelief,
     SlowChange,
     hardly_moves,
+    with_slow_parts,
 )
 
 GROUND = texture(3, SIZE)
@@ -115,6 +121,23 @@ def test_a_body_is_seen_whole_though_only_a_part_of_it_moves() -> None:
         shares.append((seen & whole).sum() / (seen | whole).sum())
     # Without the change it is a third throughout, the arm; and what was found does not flicker.
     assert min(shares[12:]) > 0.8
+
+
+def region(mask: np.ndarray, number: int) -> Region:
+    return describe_mask(mask, (0, 0), SIZE[::-1]).region(number, (0.0, 0.0), 1.0, 0.9)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_slow_part_beside_a_region_is_its_own_unless_it_is_a_region_already(
+    known: bool,
+) -> None:
+    image = work_image(0, with_body(0.0))
+    scene: Any = SimpleNamespace(image=image, cells=superpixels(image, 8, 8.0))
+    left, right = BODY & (XS < 115), BODY & (XS >= 115)
+    others = [region(right, 2)] if known else []
+    (own,), parts = with_slow_parts([region(left, 1)], others, BODY, None, scene, SIZE[::-1])
+    assert parts[right].mean() == pytest.approx(0.0 if known else 1.0, abs=0.25)
+    assert own.full_mask(SIZE[::-1])[right].mean() == pytest.approx(0.0 if known else 1.0, abs=0.25)
 
 
 @given(st.floats(0, 60), st.floats(-3.2, 3.2), st.floats(0.25, 1.0))
