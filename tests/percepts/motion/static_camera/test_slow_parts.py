@@ -25,6 +25,7 @@ from visup.percepts.motion.static_camera.slow_parts import (
     hardly_moves,
     with_slow_parts,
 )
+from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 
 GROUND = texture(3, SIZE)
 SKIN = texture(4, SIZE)
@@ -123,8 +124,8 @@ def test_a_body_is_seen_whole_though_only_a_part_of_it_moves() -> None:
     assert min(shares[12:]) > 0.8
 
 
-def region(mask: np.ndarray, number: int) -> Region:
-    return describe_mask(mask, (0, 0), SIZE[::-1]).region(number, (0.0, 0.0), 1.0, 0.9)
+def region(mask: np.ndarray, number: int, speed: float = 0.0) -> Region:
+    return describe_mask(mask, (0, 0), SIZE[::-1]).region(number, (speed, 0.0), 1.0, 0.9)
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -138,6 +139,19 @@ def test_the_slow_part_beside_a_region_is_its_own_unless_it_is_a_region_already(
     (own,), parts = with_slow_parts([region(left, 1)], others, BODY, None, scene, SIZE[::-1])
     assert parts[right].mean() == pytest.approx(0.0 if known else 1.0, abs=0.25)
     assert own.full_mask(SIZE[::-1])[right].mean() == pytest.approx(0.0 if known else 1.0, abs=0.25)
+
+
+@pytest.mark.parametrize("speed", [0.0, 100.0])
+def test_no_region_takes_another_whether_that_moves_or_not(speed: float) -> None:
+    image = work_image(0, with_body(0.0))
+    scene: Any = SimpleNamespace(image=image, cells=superpixels(image, 8, 8.0))
+    halves = [region(BODY & (XS < 115), 1), region(BODY & (XS >= 115), 2, speed)]
+    segmenter: Any = StaticCameraSegmenter()
+    segmenter._static_s = 1.0
+    segmenter._slow = SimpleNamespace(note=lambda _: None, pixels=lambda: BODY, keep=lambda _: None)
+    whole = segmenter._completed(scene, halves, SIZE[::-1])
+    one, other = (r.full_mask(SIZE[::-1]) for r in whole)
+    assert not (one & other).any()
 
 
 @given(st.floats(0, 60), st.floats(-3.2, 3.2), st.floats(0.25, 1.0))
