@@ -60,6 +60,17 @@ def test_the_slider_moves_video_figures_and_text(page: Browser) -> None:
     assert len(lines) >= 4
 
 
+def test_a_move_before_the_length_of_the_video_is_known_is_made_good(page: Browser) -> None:
+    video = "document.querySelector('#cursor video')"
+    moved_to(page, 4.0)
+    page.value(f"{video}.currentTime = 0")
+    page.until(f"!{video}.seeking && {video}.currentTime === 0")
+    page.value(f"{video}.dispatchEvent(new Event('durationchange'))")
+    page.until(f"!{video}.seeking && {video}.currentTime > 0")
+    share = page.value(f"{video}.currentTime / {video}.duration")
+    assert share == pytest.approx(4.0 / data().duration, abs=0.02)
+
+
 def test_a_click_into_a_figure_moves_the_cursor(page: Browser) -> None:
     moved_to(page, 0.0)
     place = page.value(

@@ -45,11 +45,16 @@
       course.dispatchEvent(new Event("input"));
     }
   };
+  const seek = () => {
+    if (usable()) video.currentTime = (now / duration) * video.duration;
+  };
   const go = (time) => {
     now = Math.min(Math.max(time, 0), duration);
-    if (usable()) video.currentTime = (now / duration) * video.duration;
+    seek();
     show();
   };
+  // A move that came before the length of the video was known is made good.
+  if (video) video.addEventListener("durationchange", seek);
 
   const rest = () => {
     clearInterval(clock);
