@@ -86,7 +86,8 @@ def regions_of(
 ) -> Regions:
     """All regions: one for each body with an id, and the moving ones that are of no body; by id.
 
-    An id is kept at rest: what the border cuts got it when nearly all of it moved, and so is no ground.
+    An id is kept at rest: what the border cuts got it when most of it moved, or while it was in full view. So
+    it is taken for no ground: an approximation, as one that once seemed to move as a whole would stay, too.
 
     Args:
         bodies: The bodies, with ids.
