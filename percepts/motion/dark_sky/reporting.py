@@ -103,7 +103,11 @@ def regions_of(
 
 def _region(body: SkyBody, members: Sequence[Region]) -> Region:
     height, width = body.visible.shape
-    outline = describe_mask(_whole(body.visible), (0, 0), (width, height))
+    gap = joining_gap(body.visible.shape)
+    x, y, w, h = cv2.boundingRect(body.visible.view(np.uint8))
+    left, top = max(x - gap, 0), max(y - gap, 0)
+    around = np.ascontiguousarray(body.visible[top : y + h + gap, left : x + w + gap])
+    outline = describe_mask(_whole(around, gap), (left, top), (width, height))
     if not members:
         return outline.region(body.id, body.velocity, SIGMA, CONFIDENCE)
     main = replace(outline.applied_to(max(members, key=lambda r: r.area)), id=body.id)
@@ -113,15 +117,13 @@ def _region(body: SkyBody, members: Sequence[Region]) -> Region:
     return replace(main, velocity=body.velocity, velocity_sigma=SIGMA)
 
 
-def _whole(mask: Mask) -> Mask:
-    """A mask without small holes, and without the narrow gaps between its parts if it has several."""
+def _whole(mask: Mask, gap: int) -> Mask:
+    """A mask without small holes, and without gaps of up to `gap` pixels between its parts."""
     clean = clean_mask(mask, 1)
     if clean is None:
         return mask
     if cv2.connectedComponents(clean.view(np.uint8), connectivity=4)[0] <= 2:
         return clean
-    joined = cv2.morphologyEx(
-        clean.view(np.uint8), cv2.MORPH_CLOSE, square(joining_gap(mask.shape))
-    )
+    joined = cv2.morphologyEx(clean.view(np.uint8), cv2.MORPH_CLOSE, square(gap))
     found = clean_mask(np.asarray(joined, np.uint8).view(bool), 1)
     return clean if found is None else found

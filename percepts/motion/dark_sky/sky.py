@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.motion.outlines.region_outline import chosen, label_areas, renumbered
+
 Mask = NDArray[np.bool_]
 
 DARKEST = 30  # levels below which a pixel may be sky
@@ -66,8 +68,9 @@ def bright_components(tone: NDArray[np.uint8], least: float) -> Components | Non
     level, noise = sky
     smooth = cv2.blur(tone, (SMOOTH, SMOOTH))
     bright = np.asarray(smooth > level + max(BRIGHTER, SIGMAS * noise / SMOOTH))
+    bright_enough = without_halos(tone, level)
     for _ in range(ROUNDS):
-        bright = _trimmed(bright, tone, level)
+        bright = _trimmed(bright, bright_enough)
     return _labelled(bright, least)
 
 
@@ -96,6 +99,22 @@ def sky_tone(tone: NDArray[np.uint8]) -> tuple[float, float] | None:
     return (level, noise) if noise <= MOST_NOISE and same >= ONE_TONE else None
 
 
+def without_halos(tone: NDArray[np.uint8], level: float) -> Mask:
+    """Where a pixel has enough of its brightest neighbour's level above the sky not to be a halo.
+
+    Args:
+        tone: (H, W) uint8, from `brightness`.
+        level: Of the sky.
+
+    Returns:
+        (H, W) bool; only what is brighter than the sky is judged.
+    """
+    lit = np.arange(256, dtype=np.float32)
+    halos = np.searchsorted(np.arange(256) - level, HALO * (lit - level), side="right")
+    brightest_halo = (np.maximum(halos, 1) - 1).astype(np.uint8)
+    return np.asarray(tone > cv2.LUT(cv2.dilate(tone, square(3)), brightest_halo))
+
+
 def joining_gap(shape: tuple[int, ...]) -> int:
     """Width of the gaps that do not part a body, pixels; odd.
 
@@ -110,14 +129,13 @@ def square(side: int) -> NDArray[np.uint8]:
     return np.ones((side, side), np.uint8)
 
 
-def _trimmed(bright: Mask, tone: NDArray[np.uint8], level: float) -> Mask:
+def _trimmed(bright: Mask, bright_enough: Mask) -> Mask:
     """Bright pixels without those beside the sky that only catch the light of a brighter neighbour.
 
     Lenses and compression blur edges; of what is left the outline lies where the body ends.
     """
     inner = cv2.erode(bright.view(np.uint8), square(3)).view(bool)
-    lit = cv2.dilate(tone, square(3)).astype(np.float32)
-    return np.asarray(bright & (inner | (tone - level > HALO * (lit - level))))
+    return np.asarray(bright & (inner | bright_enough))
 
 
 def _labelled(bright: Mask, least: float) -> Components:
@@ -125,11 +143,11 @@ def _labelled(bright: Mask, least: float) -> Components:
     kernel = square(joining_gap(bright.shape))
     closed = cv2.morphologyEx(bright.view(np.uint8), cv2.MORPH_CLOSE, kernel)
     count, labels = cv2.connectedComponents(closed, connectivity=4, ltype=cv2.CV_32S)
-    areas = np.bincount(labels[bright], minlength=count)
+    areas = label_areas(np.where(bright, labels, 0), count)
     areas[0] = 0
     good = (areas >= least) & (areas <= BIGGEST * bright.size)
     number = np.where(good, np.cumsum(good), 0).astype(np.int32)
-    labels = np.asarray(number[labels], np.int32)
+    labels = renumbered(labels, number)
     kept = np.concatenate([[0], areas[good]]).astype(np.int64)
     cut = np.zeros(len(kept), bool)
     cut[np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])] = True
@@ -139,9 +157,7 @@ def _labelled(bright: Mask, least: float) -> Components:
 
 def _without_specks(bright: Mask, most: float) -> Mask:
     """Without connected spots of up to `most` pixels."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        bright.view(np.uint8), connectivity=8, ltype=cv2.CV_32S
-    )
-    keep = stats[:, cv2.CC_STAT_AREA] > most
+    count, labels = cv2.connectedComponents(bright.view(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    keep = label_areas(labels, count) > most
     keep[0] = False
-    return np.asarray(keep[labels]) if count > 1 else bright
+    return chosen(labels, keep) if count > 1 else bright

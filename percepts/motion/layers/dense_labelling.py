@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from visup.percepts.motion.features._partition_jit import laplacian, may_be_foreground
+from visup.percepts.motion.features._partition_jit import may_be_foreground
 from visup.percepts.motion.features._superpixels_jit import bayes_shares, sum_point_evidence
+from visup.percepts.motion.features.diffusion import solve_symmetric, weighted_laplacian
 from visup.percepts.motion.features.motion_constraints import Points
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import Superpixels
@@ -133,37 +132,12 @@ def random_walk(
     right = share[inside] * weight[inside, None] + prior[inside] * persistence[inside, None]
     right = right.astype(np.float64)
     own = (weight + persistence + bias)[inside].astype(np.float64)
-    system, beyond = _system(cells.link, inside, own)
+    system, beyond = weighted_laplacian(cells.link, inside, own)
     right[:, 0] += bias[inside] + beyond
-    found = splu(
-        system,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        relax=1,  # cells have too few neighbours for dense blocks
-        panel_size=1,
-        options={"SymmetricMode": True},
-    ).solve(right)
+    found = solve_symmetric(system, right)
     found = np.maximum(found, 0)
     out[inside] = found / found.sum(axis=1, keepdims=True)
     return out
-
-
-def _system(
-    link: sparse.csr_matrix, inside: NDArray[np.int64], own: NDArray[np.float64]
-) -> tuple[sparse.csc_matrix, NDArray[np.float64]]:
-    """The weighted Laplacian of some cells, and (M,) the affinity of each to cells left out.
-
-    Args:
-        link: (count, count) affinity of neighbours, symmetric.
-        inside: (M,) numbers of the cells, ascending.
-        own: (M,) additional terms of the diagonal.
-
-    Returns:
-        (M, M) float64, symmetric; and (M,) float64.
-    """
-    parts = laplacian(link.indptr, link.indices, link.data, inside, own)
-    data, rows, columns, beyond = parts
-    return sparse.csc_matrix((data, rows, columns), shape=(len(own), len(own))), beyond
 
 
 def appearance_prior(cells: Superpixels, prior: Floats) -> Floats:

@@ -194,10 +194,8 @@ def update_planes(
                 step = np.float32(0.3 if alike else 1.0)
                 lasted = pace.seconds * pace.slowly if things[y, x] else pace.seconds
                 instead = instead + lasted if alike else lasted
-            for i in range(3):
-                now, old, before = image[y, x, i], mean[y, x, i], other[y, x, i]
-                mean[y, x, i] = old + weight * (now - old)
-                other[y, x, i] = before + step * (now - before)
+            _approach(mean, image, y, x, weight)
+            _approach(other, image, y, x, step)
             # Leaves and water vary strongly and return; a single passing object has little effect.
             if not moves:
                 spread += pace.restless * (min(off, pace.rare) - 1) * spread
@@ -211,6 +209,14 @@ def update_planes(
             if instead > enough or (gone[y, x] and is_known):
                 mean[y, x] = other[y, x]
                 variance[y, x], seen_s[y, x], other_s[y, x] = 2 * pace.least, instead, 0.0
+
+
+@compiled
+def _approach(tones: Floats, image: Floats, y: int, x: int, step: np.float32) -> None:
+    """Move a tone of (h, w, 3) by a share `step` of the way to that of the image; most stay as they are."""
+    if step > 0:
+        for i in range(3):
+            tones[y, x, i] += step * (image[y, x, i] - tones[y, x, i])
 
 
 @compiled
@@ -257,23 +263,3 @@ def _squared_distance(image: Floats, tones: Floats, y: int, x: int) -> float:
     b = image[y, x, 1] - tones[y, x, 1]
     c = image[y, x, 2] - tones[y, x, 2]
     return float(a * a + b * b + c * c)
-
-
-@compiled
-def believe_bare(
-    share: Floats, was_hidden: Mask, hidden: Mask, pace: tuple[np.float32, np.float32]
-) -> None:
-    """Update the belief that ground is bare, in place.
-
-    Args:
-        share: (h, w) the belief, 0 to 1.
-        was_hidden: (h, w) which ground was ever hidden.
-        hidden: (h, w) which is.
-        pace: How fast belief grows where ground was hidden, and where it never was.
-    """
-    fast, slow = pace
-    for y in range(share.shape[0]):
-        for x in range(share.shape[1]):
-            was_hidden[y, x] |= hidden[y, x]
-            grown = min(share[y, x] + (fast if was_hidden[y, x] else slow), np.float32(1))
-            share[y, x] = np.float32(0) if hidden[y, x] else grown

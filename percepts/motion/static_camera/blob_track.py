@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.outlines.region_outline import component_areas
+from visup.percepts.motion.outlines.region_outline import component_areas, renumbered
 
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.int32]
@@ -118,17 +117,6 @@ def find_blobs(
     return Foreground(
         image, renumbered(np.asarray(labels, np.int32), number), int(keep.sum()), time, seconds
     )
-
-
-@compiled
-def renumbered(labels: Labels, number: Labels) -> Labels:
-    """(h, w) labels, each replaced by its new number, (count,); most of them are 0, and stay so."""
-    out = np.zeros(labels.shape, np.int32)
-    for y in range(labels.shape[0]):
-        for x in range(labels.shape[1]):
-            if labels[y, x]:
-                out[y, x] = number[labels[y, x]]
-    return out
 
 
 def template_window(

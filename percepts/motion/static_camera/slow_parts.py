@@ -18,14 +18,13 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
 from visup.agent import Region
+from visup.percepts.motion.features.diffusion import solve_symmetric, weighted_laplacian
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
-from visup.percepts.motion.outlines.region_outline import describe_mask
-from visup.percepts.motion.static_camera._background_model_jit import believe_bare
+from visup.percepts.motion.outlines.region_outline import chosen, describe_mask, marked
+from visup.percepts.motion.static_camera._slow_parts_jit import believe_bare, squared_difference
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 Mask = NDArray[np.bool_]
@@ -60,7 +59,8 @@ class SlowChange:
         """Begin anew, after the camera has moved."""
         self._past: tuple[WorkImage, ...] = ()
         self._parts: Mask | None = None  # (h, w) parts found in the frame before
-        self._brief: Floats | None = None  # (h, w) squared change over one frame
+        self._last: Floats | None = None  # (h, w) squared change since the frame before
+        self._brief: Floats | None = None  # (h, w) the same, averaged over time
 
     def note(self, image: WorkImage) -> None:
         """Take in the next image."""
@@ -68,7 +68,8 @@ class SlowChange:
             self.forget()
         if self._past:
             last = self._past[-1]
-            brief = np.asarray(cv2.blur(_squared_change(image, last), (5, 5)), np.float32)
+            self._last = _squared_change(image, last)
+            brief = np.asarray(cv2.blur(self._last, (5, 5)), np.float32)
             if self._brief is not None:
                 passed = 1 - float(np.exp(-(image.time - last.time) / MEMORY_S))
                 weight = np.float32(max(passed, 1 / len(self._past)))
@@ -79,10 +80,10 @@ class SlowChange:
 
     def pixels(self) -> Mask | None:
         """(h, w) bool: where the newest image has changed slowly; None before the first span is over."""
-        if self._brief is None:
+        if self._brief is None or self._last is None:
             return None
         *past, image = self._past
-        last = _averaged(_squared_change(image, past[-1]))
+        last = _averaged(self._last)
         # Also where leaves have only just moved, and beside what moves fast, which is seen as it is.
         brief = cv2.dilate(self._brief, np.ones((NEAR, NEAR), np.uint8))
         noise = np.maximum(brief, max(float(np.median(self._brief)), LEAST_NOISE))
@@ -173,6 +174,8 @@ def with_slow_parts(
         return tuple(regions), own  # no pixel
     taken = np.any([own, *(_reduced(r, slow.shape, size) for r in others)], axis=0)
     added = _thick(_body(own, slow, bare, scene) & ~taken)
+    if not added.any():
+        return tuple(regions), added
     away = [cv2.distanceTransform((~m).view(np.uint8), cv2.DIST_L2, 3) for m in masks]
     nearest = np.argmin(away, axis=0)
     parts = [added & (nearest == i) for i in range(len(regions))]
@@ -195,14 +198,13 @@ def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) 
     share = _random_walk(body, np.asarray(ground, np.float32), cells)
     inside = cells.paint(share > 0.5) | own
     count, labels = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
-    touched = np.zeros(count, dtype=bool)
-    touched[labels[own]] = True
-    touched[0] = False
-    return np.asarray(touched[labels])
+    return chosen(labels, marked(labels, own, count))
 
 
 def _thick(added: Mask) -> Mask:
     """Parts that are more than the rim by which an outline is off, (h, w) bool."""
+    if not added.any():
+        return added
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (THICK, THICK))
     core = cv2.morphologyEx(np.pad(added.view(np.uint8), THICK, mode="edge"), cv2.MORPH_OPEN, disc)
     near = cv2.dilate(core[THICK:-THICK, THICK:-THICK], disc)
@@ -211,27 +213,29 @@ def _thick(added: Mask) -> Mask:
 
 def _random_walk(body: Floats, ground: Floats, cells: Superpixels) -> Floats:
     """Probability that a walk from a cell ends at a body, given the rates at which it ends in each cell."""
-    links = LINK * cells.link
-    ends = body + ground + 1e-6 + np.asarray(links.sum(axis=1)).ravel()
-    return np.asarray(spsolve((sparse.diags(ends) - links).tocsc(), body), np.float32)
+    here = np.arange(cells.count)
+    ends = (body.astype(np.float64) + ground + 1e-6) / LINK
+    system, _ = weighted_laplacian(cells.link, here, ends)
+    return np.asarray(solve_symmetric(system, body.astype(np.float64) / LINK), np.float32)
 
 
 def _closed(own: Mask, slow: Mask) -> Mask:
     """Regions and slow change, the gaps between them closed: what outlines enclose may not change."""
     reach = int(min(REACH * np.sqrt(np.count_nonzero(own)), MOST_REACH * max(own.shape)))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    both = np.pad((own | slow).view(np.uint8), reach)
-    closed = cv2.morphologyEx(both, cv2.MORPH_CLOSE, disc)
-    return np.asarray(closed[reach : reach + own.shape[0], reach : reach + own.shape[1]] > 0)
+    both = own | slow
+    x, y, w, h = cv2.boundingRect(both.view(np.uint8))
+    part = np.s_[y : y + h, x : x + w]
+    closed = cv2.morphologyEx(np.pad(both[part].view(np.uint8), reach), cv2.MORPH_CLOSE, disc)
+    out = np.zeros_like(both)
+    out[part] = closed[reach : reach + h, reach : reach + w] > 0
+    return out
 
 
 def _likely_pixels(change: Floats) -> Mask:
     """Pixels that change, (h, w) bool: sure ones, and likely ones that hang together with them."""
     count, labels = cv2.connectedComponents((change > LIKELY).view(np.uint8), connectivity=8)
-    sure = np.zeros(count, dtype=bool)
-    sure[labels[change > SURE]] = True
-    sure[0] = False
-    return np.asarray(sure[labels])
+    return chosen(labels, marked(labels, change > SURE, count))
 
 
 def _averaged(change: Floats) -> Floats:
@@ -240,9 +244,8 @@ def _averaged(change: Floats) -> Floats:
 
 def _squared_change(now: WorkImage, old: WorkImage) -> Floats:
     """Squared difference of two images but for their exposure, (h, w)."""
-    a, b = now.grey.astype(np.float32), old.grey.astype(np.float32)
-    gap = a - b * np.median((a[::4, ::4] + 1) / (b[::4, ::4] + 1))
-    return np.asarray(gap * gap, np.float32)
+    a, b = (np.asarray(image.grey[::4, ::4], np.float32) + 1 for image in (now, old))
+    return squared_difference(now.grey, old.grey, np.float32(np.median(a / b)))
 
 
 def _reduced(r: Region, shape: tuple[int, ...], size: tuple[int, int]) -> Mask:

@@ -22,7 +22,9 @@ from visup.percepts.motion.layers._affine_jit import (
     reweighted_least_squares,
     squared_misfits,
 )
+from visup.percepts.motion.outlines.region_outline import chosen, label_areas, marked, renumbered
 from visup.percepts.motion.static_camera._background_model_jit import has_exposure
+from visup.percepts.motion.static_camera._slow_parts_jit import squared_difference
 from visup.percepts.motion.static_camera._templates_jit import best_shift
 from visup.percepts.motion.static_camera.background_model import (
     EVEN,
@@ -233,3 +235,28 @@ def test_shares_are_priors_times_likelihoods(seed: int, kinds: int) -> None:
     assert share == pytest.approx(expected / expected.sum(axis=1, keepdims=True), abs=1e-5)
     told = (number > 0) | (more != 0).any(axis=1)
     assert weight == pytest.approx(np.minimum(-logs.min(axis=1), 5) / 5 * told, abs=1e-5)
+
+
+@given(st.integers(0, 999), st.integers(1, 6))
+@settings(deadline=None, max_examples=20)
+def test_labels_are_counted_chosen_marked_and_renumbered_as_numpy_does_it(
+    seed: int, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, count, SHAPE).astype(np.int32)
+    keep, number = rng.random(count) < 0.5, rng.integers(0, 9, count).astype(np.int32)
+    where = rng.random(SHAPE) < 0.1
+    number[0] = 0  # by the contract of `renumbered`
+    touched = np.isin(np.arange(count), labels[where]) & (np.arange(count) > 0)
+    assert np.array_equal(label_areas(labels, count), np.bincount(labels.ravel(), minlength=count))
+    assert np.array_equal(chosen(labels, keep), keep[labels])
+    assert np.array_equal(marked(labels, where, count), touched)
+    assert np.array_equal(renumbered(labels, number), number[labels])
+
+
+@given(st.integers(0, 999), st.floats(0.5, 2))
+@settings(deadline=None, max_examples=20)
+def test_differences_are_squared_at_the_same_exposure(seed: int, exposure: float) -> None:
+    now, old = np.random.default_rng(seed).integers(0, 256, (2, *SHAPE)).astype(np.uint8)
+    gap = now - old.astype(np.float32) * np.float32(exposure)
+    assert np.array_equal(squared_difference(now, old, np.float32(exposure)), gap * gap)

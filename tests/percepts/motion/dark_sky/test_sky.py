@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,10 +10,12 @@ from hypothesis import strategies as st
 
 from tests.percepts.motion.dark_sky.scenes import SHAPE, alike, bar, disc, painted
 from visup.percepts.motion.dark_sky.sky import (
+    HALO,
     bright_components,
     brightness,
     joining_gap,
     sky_tone,
+    without_halos,
 )
 
 LEAST = 40.0
@@ -95,3 +98,15 @@ def test_a_blue_panel_is_as_bright_as_its_brightest_channel() -> None:
     assert (brightness(image) == 90).all()
     assert brightness(image[..., 1]).shape == SHAPE
     assert brightness(image[..., :1]).shape == SHAPE
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 999), st.floats(0, 29), st.integers(1, 255))
+def test_a_halo_has_less_than_its_share_of_the_brightest_neighbour(
+    seed: int, level: float, brightest: int
+) -> None:
+    tone = np.random.default_rng(seed).integers(0, brightest + 1, (9, 11)).astype(np.uint8)
+    lit = cv2.dilate(tone, np.ones((3, 3), np.uint8)).astype(np.float32)
+    above = lit > level  # only beside what is brighter than the sky is it asked
+    expected = tone - level > HALO * (lit - level)
+    assert np.array_equal(without_halos(tone, level)[above], expected[above])

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.motion.features.test_superpixels_jit import cells_of
+from visup.percepts.motion.features.diffusion import solve_symmetric, weighted_laplacian
 from visup.percepts.motion.layers.dense_labelling import random_walk
 from visup.percepts.motion.outlines.region_outline import region_outline
 
@@ -30,6 +31,19 @@ def test_what_is_left_out_of_the_system_is_background_all_the_same(seed: int, do
     assert np.abs(found - slow).max() < 0.1
     clear = slow.max(axis=1) > 0.6
     assert np.array_equal(found.argmax(axis=1)[clear], slow.argmax(axis=1)[clear])
+
+
+@given(st.integers(0, 99), st.sampled_from([(), (3,)]))
+@settings(deadline=None, max_examples=15)
+def test_a_symmetric_system_is_solved(seed: int, columns: tuple[int, ...]) -> None:
+    cells = cells_of(seed)
+    rng = np.random.default_rng(seed)
+    own, right = 0.01 + rng.random(cells.count), rng.random((cells.count, *columns))
+    system, beyond = weighted_laplacian(cells.link, np.arange(cells.count), own)
+    link = cells.link.toarray().astype(np.float64)
+    slow = np.linalg.solve(np.diag(link.sum(axis=1) + own) - link, right)
+    assert np.allclose(solve_symmetric(system, right), slow, rtol=1e-6)
+    assert np.allclose(beyond, 0, atol=1e-6)  # no cell was left out
 
 
 @given(st.integers(0, 99), st.integers(-9, 9), st.integers(-9, 9))
