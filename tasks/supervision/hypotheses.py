@@ -17,6 +17,7 @@ from visup.tasks.automaton.backpointers import Backpointer
 from visup.tasks.automaton.entries import Meetings, StepEntries
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.automaton.task_filter import TaskPosterior
+from visup.tasks.grammar.conditions import actors_of, facts_of
 from visup.tasks.verification.step_monitor import BAD, StepMonitor
 
 # The status of a stage is the first of these among its steps.
@@ -120,9 +121,20 @@ def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
     last = hypothesis.backpointer
     if last is None or last.step.action != HOLD:
         return found
-    begun = [x.payload.begun for x in leaves(hypothesis.state) if x.payload.begun is not None]
-    since = min(begun, default=math.inf)
+    since = _taken_along(hypothesis, last.step)
     return {last.step.stage if _undoes(x, last.step, since) else s: x for s, x in found.items()}
+
+
+def _taken_along(hypothesis: TaskHypothesis, hold: TaskStep) -> float:
+    """Since when the stage after a hold has been seen to begin, seconds; infinite if it has not.
+
+    If it says what the two that are coupled do together (`moving_together`), that must have begun: that one of
+    them moves alone is no sign that it is taken along.
+    """
+    steps = list(leaves(hypothesis.state))
+    joint = [x for x in steps if set(hold.actors) <= set(x.step.actors)]
+    begun = (x.payload.begun for x in joint or steps)
+    return min((b for b in begun if b is not None), default=math.inf)
 
 
 def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
@@ -131,8 +143,16 @@ def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
     What happens between them after that (a second try, say) changes nothing.
     """
     monitor = leaf.payload
-    same = set(leaf.step.actors) <= set(hold.actors) and monitor.fault is not None
+    same = monitor.fault is not None and _concerned(leaf) <= set(hold.actors)
     return same and monitor.status in BAD and not monitor.late and monitor.fault_since < begun
+
+
+def _concerned(leaf: Leaf[StepMonitor]) -> set[str]:
+    """The actors of what makes a step fail: of its stage's `fails when`, or its own."""
+    fails = leaf.step.condition("fails")
+    if fails is None or leaf.payload.fault != str(fails.condition):
+        return set(leaf.step.actors)
+    return {str(name) for fact in facts_of(fails.condition) for name in actors_of(fact)}
 
 
 def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:

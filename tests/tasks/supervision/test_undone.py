@@ -91,6 +91,24 @@ def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, 
     assert failing(Script(spells), LIFT) == {fails}
 
 
+@pytest.mark.parametrize(
+    ("together_s", "fails"),
+    [
+        (0.0, "grasp"),  # the dish, or a push, brings the two nearer: nothing was taken along
+        (1.5, "lift"),
+    ],
+)
+def test_what_moves_without_its_gripper_was_not_taken_along(together_s: float, fails: str) -> None:
+    lift = "moving_together(arm, satellite) & converging(satellite, dish)\n  fails"
+    text = LIFT.replace("moving_together(arm, satellite) fails", lift)
+    nears = Spell("converging", 4.5, 12.0, (SATELLITE, INTRUDER))
+    held = Spell("touching", 2.0, 6.0), Spell("coupled", 2.5, 6.0)
+    spells: tuple[Spell, ...] = (Spell("converging", 0.5, 2.0), *held, Spell("diverging", 6.0, 9.0))
+    spells += (Spell("moving_together", 6.0 - together_s, 6.0),) if together_s else ()
+    script = Script((*spells, nears), THREE, identities=IDENTITIES)
+    assert failing(script, f"actor dish is dish{text}") == {fails}
+
+
 def test_what_goes_wrong_with_another_one_undoes_no_grasp() -> None:
     text = LIFT.split("<lift>  ::=")[0] + "<lift>  ::= converging(satellite, dish)\n"
     text = f"actor dish is dish{text}"
