@@ -165,13 +165,15 @@ def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
     """Whether the first of two steps determines the status of their stage.
 
-    A step that approaches within the stage shows that it is active, though another is still waiting; one that
-    held before shows nothing.
+    A step that approaches within the stage shows that it is active, though another is still waiting. It shows
+    nothing if it held before, or if the other says what its actors do together with further ones: a part that
+    moves has not been lifted before it moves together with the gripper.
     """
-    pair = leaf.payload, other.payload
-    if {p.status for p in pair} == {Status.ACTIVE, Status.PROGRESSING}:
-        going = next(p for p in pair if p.status is Status.PROGRESSING)
-        return (leaf.payload is going) is going.begun_anew
+    pair = leaf, other
+    if {x.payload.status for x in pair} == {Status.ACTIVE, Status.PROGRESSING}:
+        going, waiting = sorted(pair, key=lambda x: x.payload.status is Status.ACTIVE)
+        alone = set(going.step.actors) < set(waiting.step.actors)
+        return (leaf is going) is (going.payload.begun_anew and not alone)
     return WORST_FIRST.index(leaf.payload.status) < WORST_FIRST.index(other.payload.status)
 
 
