@@ -17,11 +17,14 @@ from tests.tasks.scripted import (
     task_of,
     watch,
 )
-from visup.agent import Coupling, Expectation, Mind, Observation, Outcome, Truth
+from visup.agent import Coupling, Expectation, Mind, Observation, Outcome, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks import parse_task
+from visup.tasks.automaton.states import Leaf, ParallelState, TaskStep
+from visup.tasks.supervision.hypotheses import TaskHypothesis, under_way
 from visup.tasks.supervision.monitored_phases import brought_along
 from visup.tasks.supervision.supervise import task_reasoner
+from visup.tasks.verification.step_monitor import entered
 
 THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
 MEETS = Spell("converging", 0.5, 2.0), Spell("touching", 2.0, 20.0)
@@ -107,6 +110,27 @@ def test_what_moves_without_its_gripper_was_not_taken_along(together_s: float, f
     spells += (Spell("moving_together", 6.0 - together_s, 6.0),) if together_s else ()
     script = Script((*spells, nears), THREE, identities=IDENTITIES)
     assert failing(script, f"actor dish is dish{text}") == {fails}
+
+
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize(
+    ("going", "waiting", "begun"),
+    [
+        (("part",), ("gripper", "part"), False),  # it is pushed, or the camera drifts
+        (("part", "dish"), ("gripper", "part"), True),
+        (("gripper", "part"), ("part",), True),
+    ],
+)
+def test_what_two_do_together_does_not_begin_by_one_of_them_alone(
+    going: tuple[str, ...], waiting: tuple[str, ...], begun: bool, first: bool
+) -> None:
+    monitor = entered(4.0)
+    goes = replace(monitor, status=Status.PROGRESSING, turn=4.0, first_since=5.0)
+    waits = replace(monitor, status=Status.ACTIVE)
+    parts = Leaf(TaskStep("a", going, "lift"), goes), Leaf(TaskStep("b", waiting, "lift"), waits)
+    hypothesis = TaskHypothesis(ParallelState(parts if first else parts[::-1]), 0)
+    status = under_way(hypothesis)["lift"].payload.status
+    assert status is (Status.PROGRESSING if begun else Status.ACTIVE)
 
 
 def test_what_goes_wrong_with_another_one_undoes_no_grasp() -> None:
