@@ -34,10 +34,10 @@ class Support(IntEnum):
     """Strength of support for a transition; each time it rises, the transition is taken or not."""
 
     NONE = 0
-    NEARER = 1
-    OVER = 2
-    EARLY = 3  # it begins, but the steps it completes were not seen through
-    BEGUN = 4
+    NEARER = 1  # the steps that it enters are approaching
+    OVER = 2  # the steps that it completes are over by themselves
+    EARLY = 3  # the steps that it enters begin, but those that it completes were not seen completed
+    BEGUN = 4  # the steps that it enters begin, and those that it completes were seen completed
 
 
 class Progress(IntEnum):
@@ -49,7 +49,7 @@ class Progress(IntEnum):
 
 
 HOLD = "coupled"
-"""The action by which one takes hold of another."""
+"""The action by which one object grasps another."""
 
 Standing = tuple[Progress, Status]
 """Position of a stage in the course, and its status."""
@@ -65,14 +65,14 @@ class TaskHypothesis:
         state: Its state.
         node: Number of the state (see `Automaton`).
         past: Completed stages with their latest beliefs.
-        finished: When the task was completed, or None.
-        entries: Possible next steps whose entry was observed: since when, and when last, seconds.
-        met: Steps that begin together whose entries were observed at the same time, and when last.
-        considered: Transitions not taken, by the steps they enter, with the strength of their support.
+        finished: Time when the task was completed, seconds, or None.
+        entries: Observed entries of possible next steps.
+        met: Steps that begin together whose entries were observed at the same time, with the last such time.
+        considered: (entered steps, support) of transitions that were considered and not taken.
         backpointer: Completed steps and their times.
         gone_on: Whether it has completed a step.
-        lasting: The stage completed last, if it lasts until the next one begins and that was not observed to;
-            else empty.
+        lasting: The stage completed last, if it lasts until the next one begins and that beginning was not
+            observed; otherwise empty.
     """
 
     state: State[StepMonitor]
@@ -107,8 +107,8 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
     """Active stage -> its step with the worst status, in the order of the text.
 
-    What goes wrong before a stage has begun goes wrong in the stage that lasts until then. So does what
-    undoes a hold of which the next stage has seen nothing: a grasp that takes nothing along was none.
+    A failure before a stage has begun is attributed to the previous stage, if that lasts until then. So is
+    the end of a grasp before the next stage has begun: a grasp that takes nothing along was not a grasp.
     """
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
@@ -126,9 +126,14 @@ def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
 
 
 def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
-    """Whether a step fails since the two that the step before coupled came apart before it had begun.
+    """Whether a step fails because the pair coupled by the previous step came apart before it had begun.
 
-    What happens between them after that (a second try, say) changes nothing.
+    Later events between the two, such as a second attempt, do not change this.
+
+    Args:
+        leaf: An active step.
+        hold: The previous step, by which the pair was coupled.
+        begun: Time when any active step began, seconds; infinite if none has.
     """
     monitor = leaf.payload
     same = set(leaf.step.actors) <= set(hold.actors) and monitor.fault is not None
@@ -145,8 +150,8 @@ def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
     """Whether the first of two steps determines the status of their stage.
 
-    A step that approaches within the stage shows that it is active, though another is still waiting; one that
-    held before shows nothing.
+    A step in progress shows that the stage is active, though another step is still waiting. A step whose
+    action held before its turn shows nothing.
     """
     pair = leaf.payload, other.payload
     if {p.status for p in pair} == {Status.ACTIVE, Status.PROGRESSING}:
