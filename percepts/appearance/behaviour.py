@@ -1,4 +1,4 @@
-"""Taught objects and other motion as one behaviour: a region for each, and names for the taught ones."""
+"""The behaviour that reports a region for each taught or moving object, and names for the taught ones."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from visup.percepts.motion.outlines.region_outline import RegionOutline
 from visup.percepts.taught.light import relit
 from visup.percepts.taught.view import TaughtView
 
-SAME = 0.4  # overlap (IoU) from which a moving region is a newly detected object
+SAME = 0.4  # IoU from which a newly detected object takes over the id of a moving region
 
 
 class AppearanceBehaviour:
@@ -38,7 +38,7 @@ class AppearanceBehaviour:
     reported once, as that object.
 
     Args:
-        taught: Views of objects; several of one name add up.
+        taught: Views of objects; views of the same name are views of one object.
         motion: Segments independent motion.
     """
 
@@ -79,7 +79,7 @@ class AppearanceBehaviour:
             frame: The next frame.
             observation: What was reported for this frame so far; nothing is reported unless its health is
                 fully OK.
-            directives: Those that motion segmentation obeys.
+            directives: Requests from cogitation, passed on to motion segmentation.
 
         Returns:
             Percepts of kind 'camera', unless unknown; of kind 'region', by id; then of kind
@@ -115,7 +115,7 @@ class AppearanceBehaviour:
         ]
 
     def _see_in_light(self, views: tuple[tuple[int, TaughtView], ...] | None) -> None:
-        """Seek the taught objects by their views in the light of the video, too."""
+        """Add views whose colours are adapted to the lighting of the video, if that differs; see `relit`."""
         self._relit = views
         if views:
             self._tracker = ThingTracker(view_models([*self._taught, *(v for _, v in views)]))

@@ -1,4 +1,4 @@
-"""Objects that a task identifies only by position are taught from the first picture."""
+"""The behaviour that learns, from the first frame, the objects that a task identifies only by position."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from visup.percepts.taught.view import TaughtView, taught_view
 
 
 class PlacedBehaviour:
-    """Reports taught objects, other motion, and the objects at given positions of the first valid picture.
+    """Reports taught objects, other motion, and the objects at given positions of the first valid frame.
 
-    Nothing is taught at a position without an edge around it; what moves away from there may still be
-    found to have been there.
+    Nothing is taught at a position where no outline is found; an object that moves away from there can
+    still be matched to the position by where it was first seen (`tasks/casting/fitness.py`).
 
     Args:
-        places: Name -> (x, y), pixels.
+        places: Name -> (x, y), frame pixels.
         taught: Views of other objects.
     """
 

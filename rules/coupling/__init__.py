@@ -1,8 +1,9 @@
-"""Coupling: which objects move as one body, and when they part.
+"""Coupling: which objects are rigidly connected, and when they separate.
 
-Read in this order: `reasoner.py` (the sequential test of rest, and its conditions), `evidence.py` (the memory
-of a pair), `carriers.py` (who sets out while one alone moves it), `contact.py` (contact versus passing),
-`relative_motion.py` (relative motion of two outlines; its compiled loops are `_relative_motion_jit.py`).
+Read in this order: `reasoner.py` (the sequential test of relative rest, and the conditions of coupling and
+decoupling), `evidence.py` (the memory of a pair), `carriers.py` (which body carries one that starts to move),
+`contact.py` (contact as opposed to passing by), `relative_motion.py` (relative motion of two outlines; its
+compiled loops are in `_relative_motion_jit.py`).
 """
 
 from visup.rules.coupling.reasoner import CouplingReasoner, CouplingSettings

@@ -14,7 +14,7 @@ def first_recent(path: Floats, now: float, window: float, least: int) -> int:
 
     Args:
         path: (N, 6); see `fused_velocity`.
-        now: Seconds.
+        now: Current time, seconds.
         window: Length of the window, seconds; longer where gaps leave too few positions in it.
         least: Fewest positions.
     """
@@ -49,7 +49,7 @@ def _noise(path: Floats) -> tuple[float, float, float]:
 
 @compiled
 def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floats]:
-    """The slope of positions fused with the mean of velocities, weighted by precision.
+    """The velocity by linear regression of positions, fused with the mean of velocities by precision.
 
     Args:
         path: (N, 6) of time, position (x, y), velocity (x, y) and its variance; see `RelativeTrack.path`.
@@ -57,7 +57,7 @@ def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floa
         lasts: Correlation time of velocity errors, seconds.
 
     Returns:
-        (2,) velocity and (2, 2) its covariance.
+        (2,) velocity, pixels per second, and (2, 2) its covariance.
     """
     count = len(path)
     xx, xy, yy = _noise(path)

@@ -1,10 +1,13 @@
-"""Carriers: what rested and sets out while one moving body alone touches it is carried by that body.
+"""Carriers: a body at rest that starts to move is carried by the only moving body that touches it.
 
-A body at rest does not set out by itself. So its first clear motion tells who holds it, where relative rest
-does not: the outline of an arm that bends, slides along itself or leaves the image says little about how its
-hand moves relative to the part. Who touches it but rests (a table, a tray) does not move it; where two
-movers touch it, nothing is believed. Who is knocked is not carried: it comes to rest, or is thrown off,
-before it has gone far.
+An inert body does not start to move by itself. Its first clear motion therefore reveals what holds it, even
+where relative rest cannot be measured: the outline of an arm that bends, slides along itself or leaves the
+image says little about how its hand moves relative to the part. A body that touches it but rests (a table, a
+tray) does not move it; if two moving bodies touch it, neither is believed to be the carrier. A body that was
+merely knocked comes to rest, or loses touch, before it has moved far enough.
+
+In this module, to *set out* is to start to move after a rest, and the *way* of a body is its displacement
+since it set out.
 """
 
 from __future__ import annotations
@@ -27,14 +30,15 @@ class CarrierSettings:
     """When a body that sets out counts as carried.
 
     Attributes:
-        rest_s: How long it must have rested before.
-        moving_s: How long it must have moved.
-        path_share: How far it must have come, in its own sizes (root of the area).
+        rest_s: How long it must have rested before, seconds.
+        moving_s: How long it must have moved since, seconds.
+        path_share: Least length of its way, as a share of its size (square root of the area).
         speed: Least speed of a body that sets out, and least mean speed on its way, image diagonals per
-            second: outlines next to a hand, or before a camera that sways, drift more slowly.
-        rest_share: Greatest speed of rest, as a share of that.
-        along_share: Least path of the carrier in the same time, as a share of that way; and
-        past_share: the greatest: who goes much farther passes by.
+            second; outlines next to a hand, or in front of a swaying camera, drift more slowly.
+        rest_share: Greatest speed of a body at rest, as a share of `speed`.
+        along_share: Least path of the carrier in the same time, as a share of the way.
+        past_share: Greatest path of the carrier, as a share of the way; a body that moves much farther only
+            passes by.
     """
 
     rest_s: float = 0.4
@@ -47,7 +51,7 @@ class CarrierSettings:
 
 
 Course = tuple[float, tuple[float, float]]
-"""How far a body has moved, as the length of its path and as a vector, pixels."""
+"""The accumulated motion of a body: path length, and displacement (x, y); pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +59,14 @@ class BodyMotion:
     """The memory of one body: when it rested and set out; seconds and pixels.
 
     Attributes:
-        path: How far it has moved in all.
-        place: (x, y) of that as a vector.
-        rested_since: Since when it rests; None while it moves.
-        set_out: When it set out after a rest; None while it rests, or moves without having rested.
-        way: (x, y) from where it set out.
-        touching: Who has touched it ever since, with their `path` and `place` at that time.
-        carrier: Who carries it, as far as is known.
+        path: Length of its path since it was first seen.
+        place: (x, y) displacement since it was first seen.
+        rested_since: Time since when it is at rest; None while it moves.
+        set_out: Time when it set out; None while it rests, or moves without having rested for long enough.
+        way: (x, y) displacement since it set out.
+        touching: The bodies that have touched it ever since it set out: id -> their `path` and `place` at
+            that time.
+        carrier: Id of the body that carries it; None if unknown.
     """
 
     path: float = 0.0
@@ -81,15 +86,15 @@ class CarrierMemory:
     """The motions of all bodies.
 
     Attributes:
-        time: Of the last step, seconds.
-        of: By id.
+        time: Time of the last step, seconds; None before the first.
+        of: Object id -> its motion.
     """
 
     time: float | None = None
     of: Mapping[int, BodyMotion] = field(default_factory=lambda: MappingProxyType({}))
 
     def carried(self) -> dict[tuple[int, int], float]:
-        """The pairs of which one carries the other: when that one set out, seconds."""
+        """(id, id), ascending, of a carrier and the body it carries -> time when that set out, seconds."""
         return {
             (min(number, body.carrier), max(number, body.carrier)): body.set_out
             for number, body in self.of.items()
@@ -106,11 +111,11 @@ def updated_carriers(
     mind: Mind,
     settings: CarrierSettings,
 ) -> CarrierMemory:
-    """The motions of all bodies after another step.
+    """The motions of all bodies, with their carriers, updated by one step.
 
     Args:
-        memory: Those of the last step.
-        touching: Who touches whom, by id.
+        memory: The motions of the last step.
+        touching: Id of an object -> ids of the objects that touch it.
         mind: The mind, with the kinematics of this step.
         settings: Settings.
     """
@@ -128,7 +133,7 @@ def _moved_bodies(
     mind: Mind,
     settings: CarrierSettings,
 ) -> dict[int, BodyMotion]:
-    """Who rests, who moves and who sets out, without new carriers."""
+    """The motions of all bodies updated by one step; carriers are not determined yet."""
     now, dt = kinematics(mind), 0.0 if memory.time is None else mind.time - memory.time
     diagonal = image_diagonal(mind.frame_size)
     least, unclear = settings.speed * diagonal, CLEAR * diagonal
@@ -164,7 +169,7 @@ def _moved(
     now: float,
     settings: CarrierSettings,
 ) -> BodyMotion:
-    """A body after a step of clear motion: on its way, or setting out if it has rested for long enough."""
+    """A body after a step of clear motion: its way goes on, or begins if it has rested for long enough."""
     if body.set_out is not None:
         way = body.way[0] + step[0], body.way[1] + step[1]
         return replace(body, rested_since=None, way=way)
@@ -181,7 +186,7 @@ def _with_carrier(
     mind: Mind,
     settings: CarrierSettings,
 ) -> BodyMotion:
-    """A body with its carrier, once it has come far enough, as long as that touches it."""
+    """A body with its carrier: found once its way is long enough, dropped once they no longer touch."""
     if body.carrier is not None:
         return body if body.carrier in touching else replace(body, carrier=None)
     set_out = body.set_out
@@ -209,7 +214,7 @@ def _with_carrier(
 def _has_come_far(
     set_out: float, far: float, number: int, mind: Mind, settings: CarrierSettings
 ) -> bool:
-    """Whether a body that set out has moved for long enough, far enough and fast enough."""
+    """Whether the way of a body is long enough in time, in distance (`far`, pixels) and in mean speed."""
     lasted, size = mind.time - set_out, mind.objects[number].region.area ** 0.5
     least = settings.speed * image_diagonal(mind.frame_size) * lasted
     return lasted >= settings.moving_s - 1e-6 and far >= max(settings.path_share * size, least)
@@ -218,10 +223,15 @@ def _has_come_far(
 def _goes_along(
     other: BodyMotion, course: Course | None, way: tuple[float, float], settings: CarrierSettings
 ) -> bool:
-    """Whether a body moves, and since that course far enough for the way of another, and not against it.
+    """Whether a body may have carried another one along its way: it moves, far enough, and not oppositely.
 
-    The course is None if it came later. An arm that bends goes elsewhere than its hand, but not the other
-    way.
+    Directions need not agree: an arm that bends moves differently from its hand, but not oppositely.
+
+    Args:
+        other: The possible carrier.
+        course: Its accumulated motion when the other body set out; None if it touched that only later.
+        way: (x, y) way of the other body, pixels.
+        settings: Settings.
     """
     if other.rested_since is not None or course is None:
         return other.rested_since is None

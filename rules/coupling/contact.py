@@ -1,11 +1,12 @@
-"""Contact of outlines that meet in the image, as opposed to bodies passing each other.
+"""Contact of bodies whose outlines meet in the image, as opposed to passing in front or behind.
 
-Touching in the picture is not touching. The continuation decides: a body in contact comes to rest at the
-other, takes it along, or bounces back; one that goes on as fast as it came passes in front of the other, or
-behind it. What is carried, and comes down past the foot of the other, is in front of it: what stands on
-another body, or in it, has its foot above the foot of that, seen from anywhere above the ground.
+Outlines that meet need not be in contact; what happens next decides. A body in contact comes to rest relative
+to the other, takes it along, or bounces back; one that continues as fast as it came passes in front of the
+other, or behind it. A carried body whose lowest point (foot) comes down below the foot of the other is in
+front of it: a body that stands on the other, or in it, has its foot higher in the image, as seen from
+anywhere above the ground.
 
-*Approximation*: what is hung up under another thing, from above, counts as in front of it.
+*Approximation*: a body that is hung up under another one, coming from above, counts as in front of it.
 """
 
 from __future__ import annotations
@@ -22,16 +23,18 @@ class ContactSettings:
     """Settings of contact.
 
     Attributes:
-        passing: Relative speed from which one passes the other, image diagonals per second.
+        passing: Relative speed above which one body passes the other, image diagonals per second.
         passing_share: The same as a share of the speed at which both move.
-        slowed_share: The same as a share of the speed at which they met: braking indicates contact.
-        sure_share: The same where the velocity is known well: what eases alongside brakes long before; and
-        sure_sigmas: by how many standard deviations the speed must lie above that.
-        settled_s: How long they must not pass each other to have settled.
-        unknown_s: How long outlines must meet to have settled while their motion is unknown.
-        doubt_share: Distance passed across the other, in sizes of the smaller one, from which one is
-            assumed in front of the other or behind it.
-        below_share: How far the foot of what is carried must be below that of the other to be in front of
+        slowed_share: The same as a share of their greatest relative speed since they met: braking indicates
+            contact.
+        sure_share: The same, lower, for a speed that is known well: a body that is brought alongside with
+            care has braked to less before they meet.
+        sure_sigmas: Standard deviations by which such a speed must exceed that.
+        settled_s: How long they must not pass each other to be in contact, seconds.
+        unknown_s: How long outlines must meet to be in contact while their motion is unknown, seconds.
+        doubt_share: Distance moved across the other, in sizes of the smaller one, from which a passing body
+            is assumed to be in front of the other or behind it.
+        below_share: How far the foot of a carried body must be below that of the other one to be in front of
             it, as a share of its height.
     """
 
@@ -47,12 +50,12 @@ class ContactSettings:
 
 
 class Feet(NamedTuple):
-    """The lowest points of two bodies in the image, y in pixels.
+    """The lowest points of two bodies in the image, of which one is carried by a third.
 
     Attributes:
-        carried: Of the one that is carried.
-        other: Of the other one.
-        height: Height of the carried one, pixels.
+        carried: Lowest point of the carried body, y downwards in pixels.
+        other: Lowest point of the other body, y downwards in pixels.
+        height: Height of the carried body, pixels.
     """
 
     carried: float
@@ -65,17 +68,18 @@ class OutlineContact:
     """The memory of two bodies whose outlines meet; seconds and pixels.
 
     Attributes:
-        met_at: Since when they meet.
-        settled_since: Since when they are settled, or None.
-        path: How far one has passed across the other since it last did not.
+        met_at: Time since when they meet.
+        settled_since: Time since when they are in contact (settled), or None.
+        path: Distance that one has moved across the other in the current passage; 0 while none passes.
         passing: Whether one was last observed passing the other.
-        changed_at: Since when `passing` has its value.
-        known: Whether their relative motion is known, or was at most `unknown_s` ago.
-        known_at: When it was last known, or when they met.
-        fastest: Their greatest relative speed since, pixels per second.
-        highest: The highest foot of the one that is carried since they meet, y in pixels.
-        ground: The lowest foot of the other since then; what covers it hides its foot.
-        in_front: Whether what is carried has come down past that: it is in front of the other.
+        changed_at: Time since when `passing` has its value.
+        known: Whether their relative motion is known, or was known at most `unknown_s` ago.
+        known_at: Time when it was last known, or when they met.
+        fastest: Their greatest relative speed since they met, pixels per second.
+        highest: Highest foot of the carried body since they met: the least y, downwards in pixels.
+        ground: Lowest foot of the other body since they met (the greatest y), since a body in front of it may
+            hide its foot.
+        in_front: Whether the carried body has come down below `ground`: it is in front of the other.
     """
 
     met_at: float
@@ -107,17 +111,17 @@ def updated_contact(
     Args:
         before: The previous contact; None if they did not meet before.
         speed: Relative speed, pixels per second; None when unknown.
-        limit: Speed from which one passes the other, pixels per second.
-        moment: Current time, and time since the previous update, seconds.
+        limit: Speed above which one passes the other, pixels per second.
+        moment: (current time, time since the previous update), seconds.
         settings: Settings.
         sigma: Standard deviation of the speed, pixels per second.
         thrown_back: Whether they separate on the side on which they met, which implies contact.
-        feet: Of the two, if a third body carries one of them.
+        feet: The feet of the two, if a third body carries one of them.
     """
     now, dt = moment
     contact = before or OutlineContact(now, changed_at=now, known_at=now)
     if speed is None and contact.known and now - contact.known_at >= settings.unknown_s - 1e-6:
-        # Hidden in the other, say: had it gone on, it would have come out again.
+        # One may be hidden behind the other. It is not passing: then it would have come out again by now.
         contact = replace(contact, known=False, passing=False, path=0.0, met_at=contact.known_at)
     if speed is not None:
         contact = replace(contact, fastest=max(contact.fastest, speed), known_at=now)
@@ -145,7 +149,7 @@ def updated_contact(
 
 
 def _with_feet(contact: OutlineContact, feet: Feet, settings: ContactSettings) -> OutlineContact:
-    """The contact after a look at the feet of both."""
+    """The contact updated with the feet of both bodies."""
     highest, ground = min(contact.highest, feet.carried), max(contact.ground, feet.other)
     below = feet.carried > ground + settings.below_share * feet.height
     return replace(contact, highest=highest, ground=ground, in_front=below and highest <= ground)

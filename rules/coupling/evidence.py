@@ -1,4 +1,4 @@
-"""Evidence on coupling: memory and observations of pairs, and the relations derived from them."""
+"""Evidence on coupling: the memory and the observations of pairs, and the relations derived from them."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ CONFIDENCE = 0.9
 """Confidence of couplings: outlines at rest relative to each other may still be apart in depth."""
 
 ALONG_SPEED = 0.05
-"""Least speed of two that move as one though their outlines are apart, image diagonals per second."""
+"""Least speed of two bodies that may move as one although their outlines are apart, image diagonals per
+second."""
 
 ALONG_SHARE = 0.4
-"""Their greatest relative speed, as a share of the speed of the slower one."""
+"""Greatest relative speed of such bodies, as a share of the speed of the slower one."""
 
 COLUMNS = ColumnLayout(
     (
@@ -36,24 +37,24 @@ COLUMNS = ColumnLayout(
 )
 
 YES, MAYBE, NO = 1, 0, -1
-"""Codes of truths."""
+"""Codes of truth values: true, unknown, false."""
 
 Pair = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CouplingEvidence:
-    """The memory of one pair: seconds since when each has held, or None.
+    """The memory of one pair; times in seconds.
 
     Attributes:
-        converged_at: When they were last converging without touching.
-        rest_odds: Log odds, at least 0, that they touch and are at rest.
-        rest_since: Since when these have been above 0.
-        apart_since: Since when they are apart.
-        apart_path: How far they have moved apart since, as long as they were followed, pixels.
-        relative_track: Their relative motion since they are near.
-        contact: Contact of their outlines.
-        decoupled_at: When they were decoupled, if they were.
+        converged_at: Time when they were last converging without touching, or None.
+        rest_odds: Log odds, at least 0, that they touch and are at rest relative to each other.
+        rest_since: Time since when these have been above 0, or None.
+        apart_since: Time since when they are apart, or None.
+        apart_path: Relative path length since then, while they were tracked, pixels.
+        relative_track: Their relative motion while they are near each other, or None.
+        contact: Contact of their outlines; None while these do not meet.
+        decoupled_at: Time when they were last decoupled, or None.
     """
 
     converged_at: float | None = None
@@ -66,7 +67,7 @@ class CouplingEvidence:
     decoupled_at: float | None = None
 
     def parted_since(self, moment: float) -> bool:
-        """Whether they were decoupled after a moment, seconds."""
+        """Whether they were decoupled after a given time, seconds."""
         return self.decoupled_at is not None and self.decoupled_at > moment
 
 
@@ -79,14 +80,14 @@ NO_EVIDENCE = CouplingEvidence()
 
 
 class PairObservation(NamedTuple):
-    """The current observation of a pair; lives only while the reasoner runs.
+    """The observation of a pair in one step; lives only while the reasoner runs.
 
     Attributes:
-        pair: Their ids.
+        pair: Ids of the two objects, ascending.
         touching: Truth code.
         converging: Truth code.
         diverging: Truth code.
-        gap: Gap of their outlines, pixels; NaN unknown.
+        gap: Gap between their outlines, pixels; NaN if unknown.
         host: Id of the object whose region contains both, or None.
     """
 
@@ -99,16 +100,16 @@ class PairObservation(NamedTuple):
 
 
 def common_speed(mind: Mind, pair: Pair) -> float:
-    """The speed of the slower of two, pixels per second; of the only known one; else 0."""
+    """The speed of the slower body of a pair, pixels per second; unknown ones are ignored, 0 if both are."""
     speeds = [own_speed(mind, i) for i in pair]
     return min((s for s in speeds if s is not None), default=0.0)
 
 
 def goes_along(mind: Mind, pair: Pair) -> bool:
-    """Whether one of two, both fast, goes where the other goes: then it has not come apart, whatever the gap.
+    """Whether two fast bodies move alike, so that a gap between them does not mean that they have separated.
 
-    The outline of an arm that leaves the picture ends somewhere, and seems to leave what its fingers hold.
-    What is dropped, or left behind, soon moves otherwise.
+    The visible outline of an arm that leaves the image shrinks towards the border, and so seems to recede
+    from the object in its hand. An object that is dropped, or left behind, soon moves differently.
     """
     common, relative = common_speed(mind, pair), kinematics(mind).pair("relative_speed", *pair)
     fast = common > ALONG_SPEED * image_diagonal(mind.frame_size)
@@ -116,13 +117,13 @@ def goes_along(mind: Mind, pair: Pair) -> bool:
 
 
 def own_speed(mind: Mind, number: int) -> float | None:
-    """Speed of a body itself, pixels per second; None while unknown.
+    """Speed of a body, pixels per second: the smaller of outline motion and image motion; None if unknown.
 
-    The outline of a body being covered recedes as fast as its occluder advances, and that of an approaching
-    body grows; image motion is free of both effects. So the slower of both is used.
+    The outline of a body that is being covered recedes as fast as its occluder advances, and that of an
+    approaching body grows; image motion is free of both effects.
 
-    An approximation: image motion still contains the camera's. A body followed by a moving camera counts
-    as slow, and must rest at the other for longer before the two count as one.
+    An approximation: image motion contains the camera's. A body followed by a moving camera counts as slow,
+    and must rest relative to another one for longer before the two count as coupled.
     """
     body = mind.objects[number]
     told = [kinematics(mind).one("speed", number)]
@@ -149,7 +150,7 @@ def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
 
 
 def touching_bodies(observed: Sequence[PairObservation]) -> dict[int, set[int]]:
-    """Who touches whom, by id; without those that share a region."""
+    """Id of an object -> ids of the objects that touch it; pairs that share a region are left out."""
     found: dict[int, set[int]] = {}
     for seen in observed:
         if seen.touching == YES and seen.host is None:
@@ -173,7 +174,7 @@ def coupling_cells(
     evidence: Mapping[Pair, CouplingEvidence],
     mind: Mind,
 ) -> RelationBlock:
-    """The relations `coupled` and `in_contact`."""
+    """The columns of the relations `coupled`, `in_contact` and `passing_by` for all observed pairs."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
     state = np.zeros((3, len(observed)), dtype=np.int8)
     since = np.full(state.shape, mind.time)
@@ -198,7 +199,7 @@ def coupling_cells(
 
 
 def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
-    """Whether one of two has passed so far across the other that they cannot be in contact."""
+    """Whether one body has moved so far across the other that it must be in front of it, or behind it."""
     far = ContactSettings().doubt_share * smaller_size(pair, mind)
     return contact.in_front or (contact.passing and contact.path > far)
 
@@ -209,9 +210,9 @@ def smaller_size(pair: tuple[int, ...], mind: Mind) -> float:
 
 
 def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
-    """The current regions of the two, twice the same one when they are merged.
+    """The current regions of a pair, twice the same one when they are merged; None if either is not usable.
 
-    The visible rest of a hidden body moves like its occluder's edge, which carries no information.
+    The visible rest of a hidden body is not usable: it moves like the edge of its occluder.
     """
     if seen.host is not None:
         host = mind.objects[seen.host]
@@ -225,7 +226,10 @@ def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | N
 
 
 def feet_of(seen: PairObservation, mind: Mind) -> Feet | None:
-    """The feet of two bodies one of which a third one carries; None if none does, or they are not seen."""
+    """The lowest points of a pair of which exactly one body is carried by a third one; None otherwise.
+
+    None also if either is not seen, or if they share a region.
+    """
     others = (c.objects for c in mind.couplings if c.objects != seen.pair)
     held = {i for objects in others if not mind.one_machine(*objects) for i in objects}
     carried = held.intersection(seen.pair)

@@ -1,16 +1,17 @@
-"""Physical connection: when two objects become one body, and when they part (paper, section 5).
+"""The coupling reasoner: when two objects become rigidly connected, and when they part (paper, section 5).
 
-Two bodies are believed coupled when, for a while, they are at rest to each other, and
-- they touch, and came together before that; or
+Two bodies are believed coupled when they have been at rest relative to each other for a while, and
+- they touch, having approached each other before; or
 - they touch and move together; or
-- the number of regions fell, and the region that is left is like the union of the two.
-Or when one of them rested and set out while the other alone, of those that move, touches it (`carriers.py`).
+- they have merged into one region that resembles the union of the two.
+They are also believed coupled when one was at rest and starts to move while the other is the only moving body
+that touches it (`carriers.py`).
 
-Rest is judged by how both outlines move relative to each other (`relative_motion.py`), in a sequential
-test: each velocity gives odds of rest against motion, and these add up until they suffice (Wald 1945)
-or are lost. A body that bounces off, whose relative velocity is zero for a moment, is so not taken for
-one that was caught, and one that clearly rests is not waited for. Outlines that touch in the image may still
-be apart in space: with the depth of one of the two unknown this is not told apart from contact.
+Relative rest is decided by a sequential test (Wald 1945) on the relative velocity of both outlines
+(`relative_motion.py`): each measurement adds log odds of rest against motion, until they suffice or fall to
+0. A body that bounces off, whose relative velocity is zero for a moment, is therefore not taken for a
+captured one, and clear rest is accepted early. Outlines that touch in the image may still be apart in depth;
+while the depth of either is unknown, this cannot be distinguished from contact.
 """
 
 from __future__ import annotations
@@ -80,23 +81,25 @@ class CouplingSettings:
     """When two bodies count as one.
 
     Attributes:
-        relations: Thresholds; those of the relations.
-        near: Gap from which on two bodies are followed, image diagonals.
-        window_s: Window of a relative velocity, longer after a gap; those of one window count as one.
+        relations: Thresholds, shared with the relations.
+        near: Outline gap up to which the relative motion of a pair is tracked, image diagonals.
+        window_s: Window over which relative velocity is measured, seconds; longer after a gap. Velocities
+            within one window are correlated, and together count as one measurement.
         path_s: Length of the stored relative path, seconds.
-        moving: Usual relative speed of bodies that are not at rest, image diagonals per second.
-        still_share: Relative speed that still is rest, as a share of the speed at which both move: what is
-            carried sways and turns, and errors of velocities grow with these; and
-        moving_share: usual relative speed of bodies that move each by itself, as such a share.
-        rest_s: For how long they must be at rest, where they do not move: what turns back rests, too.
-        odds: Logarithm of the odds of rest from which on it is believed.
-        carried_share: The same as a share, where both are on the move.
-        anew_s: Outlines that are compared are no older than this.
-        approach_s: How long ago bodies may have come together for their rest to count.
-        part_s: How long they must be apart before they are decoupled; or
-        part_path: how far they must have moved apart while they were followed, image diagonals.
+        moving: Typical relative speed of a pair that is not at rest, image diagonals per second.
+        still_share: Relative speed that still counts as rest, as a share of the speed at which both move: an
+            object that is carried sways and rotates, and errors of velocities grow with speed.
+        moving_share: Typical relative speed of bodies that move independently, as a share of the same speed.
+        rest_s: Least duration of relative rest, seconds, unless both move: a body that reverses rests for a
+            moment, too.
+        odds: Log odds of rest at which it is believed.
+        carried_share: Share of `odds` that suffices while both move.
+        anew_s: Age at which the stored outlines are replaced, seconds.
+        approach_s: Longest time since the bodies approached each other for their rest to count, seconds.
+        part_s: How long a pair must be apart to be decoupled, seconds; `part_path` suffices as well.
+        part_path: How far a pair must have moved apart to be decoupled, image diagonals.
         contact: When outlines that meet are in contact.
-        carriers: When a body that sets out counts as carried.
+        carriers: When a body that starts to move counts as carried.
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
@@ -159,7 +162,7 @@ class CouplingReasoner(ExplainableReasoner):
                     events.append(_event("decoupled", text, pair, mind, observation))
                     evidence = replace(NO_EVIDENCE, decoupled_at=mind.time)
             elif log is None and evidence.relative_track is None and set_out is None:
-                pass  # as nearly always: they are not near each other; the first condition
+                pass  # fast path: far apart, as most pairs are, so that the first condition fails
             elif decide(self._coupling(evidence, seen, mind, set_out), log, "coupled", pair):
                 since = evidence.rest_since if set_out is None else set_out
                 since = mind.time if since is None else since
@@ -173,12 +176,13 @@ class CouplingReasoner(ExplainableReasoner):
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         mind = mind.remember(CARRIERS, carriers)
-        # That parts of one machine hang together is no news.
+        # Parts of one machine are always connected, which is not worth an event.
         return Outcome(mind, tuple(e for e in events if not mind.one_machine(*e.objects)))
 
     def _look(
         self, before: CouplingEvidence, seen: PairObservation, mind: Mind
     ) -> CouplingEvidence:
+        """The evidence on a pair updated with one observation; `before` itself if nothing changes."""
         converging = seen.converging == YES and seen.touching != YES
         track = self._follow(before.relative_track, seen, mind)
         odds, contact, found = before.rest_odds, before.contact, None
@@ -198,7 +202,7 @@ class CouplingReasoner(ExplainableReasoner):
         same = track is before.relative_track and odds == before.rest_odds and not converging
         same = same and contact is before.contact
         if same and apart == (before.apart_since is not None):
-            return before  # as nearly always: most pairs are far from each other
+            return before  # fast path, as most pairs are far apart
         converged = mind.time if converging else before.converged_at
         return CouplingEvidence(
             converged,
@@ -212,10 +216,10 @@ class CouplingReasoner(ExplainableReasoner):
         )
 
     def _parted(self, before: CouplingEvidence, pair: Pair, mind: Mind) -> float:
-        """How far two that are apart have moved relative to each other since, pixels.
+        """The relative path length of a pair since it came apart, pixels.
 
-        Once they are followed no longer it stands still, and only the time counts: beyond that a gap may
-        just as well be an outline that has leapt.
+        It is no longer updated once the pair is too far apart to be tracked: so wide a gap may be a jump of
+        an outline. Then only the time apart counts (`part_s`).
         """
         times = sample_window(mind).times
         lasted = float(times[-1] - times[-2]) if len(times) > 1 else 0.0
@@ -225,7 +229,10 @@ class CouplingReasoner(ExplainableReasoner):
     def _follow(
         self, before: RelativeTrack | None, seen: PairObservation, mind: Mind
     ) -> RelativeTrack | None:
-        """How the two move relative to each other; the same as before when they are not seen."""
+        """The updated relative track of a pair; None if it is not near, or has not been seen for long.
+
+        The track stays as it was while either body is out of view.
+        """
         s = self.settings
         merged = seen.host is not None
         if (
@@ -241,7 +248,8 @@ class CouplingReasoner(ExplainableReasoner):
         if not merged and not seen.gap <= s.near * image_diagonal(mind.frame_size):
             return None
         if before is None and merged:
-            # Not seen side by side before: one is followed as it was last seen, the other with it.
+            # Never seen side by side: the track starts from the last region of the hidden body and from the
+            # merged region.
             return begin_relative_track(regions_apart(seen.pair, mind), mind.time, mind.frame_size)
         return update_relative_track(
             before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
@@ -255,14 +263,22 @@ class CouplingReasoner(ExplainableReasoner):
         seen: PairObservation,
         mind: Mind,
     ) -> float:
-        """The odds of rest after another sight of both."""
+        """The log odds of relative rest, at least 0, updated with a relative velocity.
+
+        Args:
+            odds: Log odds before.
+            before: The relative track before this observation, if any.
+            found: The relative velocity measured now.
+            seen: The observation of the pair.
+            mind: The mind.
+        """
         s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
         diagonal = image_diagonal(mind.frame_size)
         both = common_speed(mind, seen.pair)
         still = max(s.relations.still_speed * diagonal, s.still_share * both)
         told = found.rest_odds(still, max(s.moving * diagonal, s.moving_share * both))
         told *= min(1.0, waited / found.span)
-        # Odds beyond the bound would only delay that the opposite is believed.
+        # Capped, since higher odds would only delay a change to the opposite belief.
         return min(max(0.0, odds + told), 2 * s.odds)
 
     def _contact(
@@ -272,7 +288,7 @@ class CouplingReasoner(ExplainableReasoner):
         seen: PairObservation,
         mind: Mind,
     ) -> OutlineContact:
-        """Two whose outlines meet: whether one goes past the other."""
+        """The updated contact of two outlines that meet: whether one passes the other."""
         s, track = self.settings.contact, before.relative_track
         limit = s.passing * image_diagonal(mind.frame_size)
         limit = max(limit, s.passing_share * common_speed(mind, seen.pair))
@@ -294,10 +310,10 @@ class CouplingReasoner(ExplainableReasoner):
         seen: PairObservation,
         mind: Mind,
     ) -> bool:
-        """Whether one of two moves on, while the other all but rests, though they are still near."""
+        """Whether one body moves away while the other is nearly at rest, though they are still near."""
         s, diagonal, now = self.settings, image_diagonal(mind.frame_size), kinematics(mind)
         speed = 0.0 if found is None else float(np.hypot(*found.velocity))
-        if seen.gap > s.near * diagonal:  # no longer followed, though they may still seem to touch
+        if seen.gap > s.near * diagonal:  # no longer tracked, but they may count as touching
             speed = float(np.nan_to_num(now.pair("relative_speed", *seen.pair)))
         passing = contact is not None and contact.passing
         known = contact is not None or seen.touching == NO
@@ -313,7 +329,14 @@ class CouplingReasoner(ExplainableReasoner):
         mind: Mind,
         set_out: float | None,
     ) -> Iterator[Condition]:
-        """Conditions of two becoming one body; `set_out`: when one did that the other carries, if so."""
+        """Conditions of a pair becoming coupled.
+
+        Args:
+            evidence: Evidence on the pair.
+            seen: The observation of the pair.
+            mind: The mind.
+            set_out: Time when one of them started to move, carried by the other, seconds; None if not so.
+        """
         if set_out is not None:
             yield Condition("one rested and set out while the other alone moved it", True)
             return
@@ -326,7 +349,7 @@ class CouplingReasoner(ExplainableReasoner):
         together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
         moving = common_speed(mind, seen.pair) > least
-        # Moving together was judged over its own window, and is hardly ever relative rest by chance.
+        # `moving_together` was established over a window of its own, so that less evidence suffices.
         share = 0.4 if together else s.carried_share if moving else 1.0
         yield at_least(text, evidence.rest_odds, share * s.odds)
         if not (moving or together) and evidence.rest_since is not None:
@@ -335,7 +358,7 @@ class CouplingReasoner(ExplainableReasoner):
         if seen.host is not None or together:
             return
         if moving:
-            return  # at rest to each other, and on the move: as one
+            return  # at rest relative to each other while both move: they move as one
         at = evidence.converged_at
         if at is None:
             yield Condition("they have come together, move together, or share a region", False)
@@ -345,7 +368,7 @@ class CouplingReasoner(ExplainableReasoner):
             yield Condition(text, ago <= s.approach_s, ago, s.approach_s, " s", below=True)
 
     def _decoupling(self, evidence: CouplingEvidence, mind: Mind) -> Iterator[Condition]:
-        """Conditions of two no longer being one body."""
+        """Conditions of a pair being no longer coupled."""
         yield Condition("they are apart", evidence.apart_since is not None)
         if evidence.apart_since is not None:
             least = self.settings.part_path * image_diagonal(mind.frame_size)

@@ -1,12 +1,13 @@
-"""Relative motion of two bodies that meet, from their outlines and from image motion.
+"""Relative motion of two bodies near each other, from their outlines and from image motion.
 
 Velocities reported by the segmenter are used where available; outlines always. Each outline is stored when
 the two come near, and registered to every later one: points are moved along their normals until they are on
 it (iterated closest points, Chen and Medioni 1992, translation only, robust). Hundreds of points carry more
 information than the few extreme ones, errors of short stretches hardly count, and errors of the stored
-outline are the same each time, so that they do not look like motion. Once both are in one region, both stored
-outlines are registered to that.
- Points at the image border, and those next to the other body, where an outline ends because the other begins,
+outline are the same each time, so that they do not look like motion. Once both bodies are in one region, both
+stored outlines are registered to the outline of that region.
+
+Points at the image border, and those next to the other body, where an outline ends because the other begins,
 are excluded.
 """
 
@@ -48,8 +49,8 @@ CORRELATION_S = 0.2
 PART_VARIANCE = 4.0
 """Factor of variance when the motion of a whole body replaces that of a part."""
 
-LEAST_POINTS = 12
-LEAST_SAMPLES = 5
+LEAST_POINTS = 12  # fewest points of an outline template
+LEAST_SAMPLES = 5  # fewest positions from which a velocity is measured
 _OUTLIER = 1.5  # distance beyond which a point is down-weighted, pixels
 
 
@@ -58,11 +59,11 @@ class OutlineTemplate:
     """Points of an outline for tracking a body.
 
     Attributes:
-        points: (N, 2) pixels.
-        normals: (N, 2) unit vectors across the outline.
-        shift: (x, y) by which the body has moved since, pixels.
-        velocity: (x, y) at which it moved last, pixels per second.
-        local: Whether they cover only the part of the body near the other one.
+        points: (N, 2) (x, y), frame pixels.
+        normals: (N, 2) unit normals of the outline.
+        shift: (x, y) by which the body has moved since the outline was stored, pixels.
+        velocity: (vx, vy) at which it moved last, pixels per second.
+        local: Whether the points cover only the part of the body near the other one.
     """
 
     points: Floats
@@ -77,10 +78,10 @@ class RelativeTrack:
     """The relative track of two bodies near each other.
 
     Attributes:
-        first: Outline of the first.
-        second: Outline of the second.
-        since: Seconds when they were stored.
-        before: Relative shift up to then, pixels.
+        first: Outline of the first body.
+        second: Outline of the second body.
+        since: Time when the outlines were stored, seconds.
+        before: (x, y) displacement accumulated with earlier outlines up to then, pixels.
         path: (time, x, y, vx, vy, variance): displacement of the second relative to the first, pixels,
             and its velocity by image motion, pixels per second; NaN where unknown. Oldest first.
     """
@@ -93,7 +94,7 @@ class RelativeTrack:
 
     @property
     def path_end(self) -> float:
-        """Seconds of the last sighting of both."""
+        """Time of the last observation of both, seconds."""
         return self.path[-1][0] if self.path else self.since
 
 
@@ -109,7 +110,7 @@ def outline_template(
         region: The region.
         others: Bodies near it.
         size: (width, height) of the image, pixels.
-        beside: A body relative to which it moves; of a larger body only the part near that is used.
+        beside: The other body of the pair; if `region` is larger than that, only its part nearby is used.
     """
     parts = even_rings(prepared_outline(region).rings, TEMPLATE_POINTS)
     points = joined(parts)
@@ -141,7 +142,7 @@ def _from_box(points: Floats, box: tuple[int, int, int, int]) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetOutline:
-    """An outline with which stored ones are registered.
+    """An outline to which stored ones are registered.
 
     Attributes:
         points: (M, 2) pixels, densely spaced.
@@ -166,19 +167,21 @@ def target_of(region: Region) -> TargetOutline:
 def registered(
     kept: OutlineTemplate, target: TargetOutline, ahead: Iterable[Vector] = ()
 ) -> OutlineTemplate | None:
-    """A stored outline registered with a later one.
+    """Register a stored outline to a later one.
 
-    Closest points find shifts of a few pixels; a body that moves farther between two frames is expected
-    elsewhere, and of all starts the one that brings most points onto the outline counts.
+    Iterated closest points converge only for shifts of a few pixels. For a body that moves farther between
+    two frames, registration also starts from predicted shifts; the result that brings the most points onto
+    the target is used.
 
     Args:
         kept: The outline, with its shift so far.
         target: The later outline.
-        ahead: Shifts since then to start from as well, (x, y) pixels; those of a pixel or so are not tried.
+        ahead: (x, y) predicted shifts from there to start from as well, pixels; those of a pixel or so are
+            skipped.
 
     Returns:
-        The outline with the new shift; None when too few points match, or when it has only one
-        direction.
+        The outline with the new shift; None if too few points match, or if all normals have nearly the same
+        direction, so that the shift along the outline is undetermined.
     """
     x, y = kept.shift
     starts = [kept.shift, *((x + dx, y + dy) for dx, dy in ahead if hypot(dx, dy) > _OUTLIER)]
@@ -211,12 +214,12 @@ def update_relative_track(
     lasts_s: float,
     anew_s: float,
 ) -> RelativeTrack | None:
-    """Update the relative track of two bodies with a sighting.
+    """Update the relative track of two bodies with an observation of both.
 
     Args:
-        track: The track before.
-        regions: Regions of the first and the second; twice the same when merged.
-        now: Seconds.
+        track: The track before; None if there was none.
+        regions: Regions of the first and the second body; twice the same one when merged.
+        now: Time of the observation, seconds.
         size: (width, height) of the image, pixels.
         lasts_s: Length of the path, seconds.
         anew_s: Age at which outlines are replaced, since bodies rotate, seconds.
@@ -246,7 +249,7 @@ def update_relative_track(
 
 
 def _followed(kept: OutlineTemplate, region: Region, dt: float) -> OutlineTemplate | None:
-    """A stored outline registered with the body as it is seen `dt` seconds after the last time."""
+    """A stored outline registered to the body's region `dt` seconds later; None if that fails."""
     known = region.velocity_sigma > 0.0
     velocities = (kept.velocity, region.velocity) if known else (kept.velocity,)
     ahead = [(vx * dt, vy * dt) for vx, vy in velocities]
@@ -264,7 +267,7 @@ def _begun_again(
     size: tuple[int, int],
     lasts_s: float,
 ) -> RelativeTrack | None:
-    """Restart two bodies whose outlines changed too much, bridging by image motion."""
+    """Restart the track of two bodies whose outlines changed too much; image motion bridges the gap."""
     fresh, (vx, vy, variance) = begin_relative_track(regions, now, size), _image_motion(regions)
     if fresh is None or not track.path or np.isnan(variance):
         return fresh
@@ -280,7 +283,7 @@ def _begun_again(
 def begin_relative_track(
     regions: tuple[Region, Region], now: float, size: tuple[int, int]
 ) -> RelativeTrack | None:
-    """Start tracking two bodies; None when too little of them is unobstructed."""
+    """Start the relative track of two bodies; None if too little of their outlines is unobstructed."""
     first = outline_template(regions[0], regions[1:], size, regions[1])
     second = outline_template(regions[1], regions[:1], size, regions[0])
     if first is None or second is None:
@@ -294,7 +297,10 @@ UNKNOWN_MOTION = (np.nan, np.nan, np.nan)
 
 
 def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
-    """Relative velocity as reported by the segmenter, and the variance of each component."""
+    """Relative velocity (vx, vy) by image motion, pixels per second, and the variance of each component.
+
+    All NaN if unknown.
+    """
     a, b = regions
     if a is b or a.velocity_sigma <= 0.0 or b.velocity_sigma <= 0.0:
         return (np.nan, np.nan, np.nan)
@@ -307,8 +313,8 @@ class RelativeVelocity:
     """A relative velocity.
 
     Attributes:
-        velocity: (2,) pixels per second.
-        covariance: (2, 2) its covariance.
+        velocity: (2,) of the second body relative to the first, pixels per second.
+        covariance: (2, 2) covariance of the velocity.
         span: Time over which it was measured, seconds.
     """
 
@@ -325,15 +331,18 @@ class RelativeVelocity:
         return float(np.sqrt(self.velocity @ self.covariance @ self.velocity)) / speed
 
     def rest_odds(self, still: float, moving: float) -> float:
-        """Log odds of rest against motion, given this velocity.
+        """Log odds of relative rest against motion, given this velocity.
+
+        The ratio of two Gaussian densities of zero mean, one for rest and one for motion, each widened by the
+        covariance. A direction in which the velocity is hardly known, such as that along a long arm,
+        contributes nothing.
 
         Args:
-            still: Relative speed that still is rest, pixels per second.
-            moving: Usual relative speed of bodies that are not at rest. A direction in which velocity is
-                hardly known, such as a long arm along itself, contributes nothing.
+            still: Relative speed that still counts as rest, pixels per second.
+            moving: Typical relative speed of bodies that are not at rest, pixels per second.
 
         Returns:
-            Log odds, bounded above by the ratio of both speeds, unbounded below.
+            Log odds; bounded above by the ratio of the two speeds, unbounded below.
         """
         (xx, xy), (_, yy) = self.covariance.tolist()
         vx, vy = self.velocity.tolist()
@@ -353,8 +362,8 @@ def relative_velocity(track: RelativeTrack, now: float, window_s: float) -> Rela
 
     Args:
         track: Their relative track.
-        now: Seconds.
-        window_s: Length of the window; longer where gaps leave too few positions in it.
+        now: Current time, seconds.
+        window_s: Length of the window, seconds; longer where gaps leave too few positions in it.
 
     Returns:
         The current velocity; None while too little is known.

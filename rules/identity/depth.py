@@ -19,11 +19,10 @@ class DepthSettings:
     """Settings of the depth estimate.
 
     Attributes:
-        tau_s: Time constant of smoothing.
-        fade_s: Depth not updated for this long becomes unknown.
-        least_visible: An object less visible than this is not measured, its area being too small.
-        clear: Weight of the best identity, each weighted by its votes squared, from which depth is
-            estimated.
+        tau_s: Time constant of smoothing, seconds.
+        fade_s: Depth not updated for this long becomes unknown, seconds.
+        least_visible: Visible share below which an object is not measured, its area being too small.
+        clear: Least part of the best identity in the sum of squared vote shares for depth to be estimated.
     """
 
     tau_s: float = 0.5

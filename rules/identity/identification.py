@@ -1,7 +1,6 @@
-"""Identification of objects: counts votes on names, and reports the clear ones.
+"""Identification of objects: counts votes on names, and reports clear winners.
 
-The vote itself is in `votes.py`. An operator's answer is not evidence but a fact, and settles the vote.
-
+The vote itself is in `votes.py`. An operator's answer is not evidence but a fact, and overrides the vote.
 """
 
 from __future__ import annotations
@@ -62,8 +61,8 @@ class NameEvidence:
     """The hypotheses about an object in one step.
 
     Attributes:
-        kind: Whether from its silhouette, or from the behaviour that detected it.
-        hypotheses: Names and views, in any order; empty if it was not matched.
+        kind: Source of the hypotheses: its silhouette ('shape'), or the behaviour that detected it ('found').
+        hypotheses: Hypotheses in any order; empty if it was not matched.
     """
 
     kind: Literal["shape", "found"]
@@ -71,7 +70,7 @@ class NameEvidence:
 
 
 def awaited(mind: Mind, object_id: int) -> frozenset[str]:
-    """Models of tasks' actors that no other object in view is believed to be."""
+    """Models of tasks' actors that no other object is believed to be, unless that has left."""
     wanted = {model for models in mind.actors.values() for model in models}
     found = {
         b.name
@@ -144,6 +143,7 @@ class IdentityReasoner(ExplainableReasoner):
     def _count(
         self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes, look: NameEvidence, dt: float
     ) -> ObjectVotes:
+        """The votes on an object after a step of `dt` seconds: decayed, plus those of its hypotheses."""
         s = self.settings
         visible = visible_share(mind, belief.id)
         hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
@@ -164,7 +164,7 @@ class IdentityReasoner(ExplainableReasoner):
     def _weighed(
         self, mind: Mind, object_id: int, look: NameEvidence, waited: Collection[str]
     ) -> Tally:
-        """The new votes of one match: weights of names, and of its being none of the models."""
+        """The votes cast by the hypotheses of one step: weights of names, and of none of the models."""
         s = self.settings
         kind: LookKind = getattr(s, look.kind)
         heard = weights(look.hypotheses, s, waited, kind.awaited)
@@ -175,6 +175,7 @@ class IdentityReasoner(ExplainableReasoner):
         return Tally(tuple(heard.items()), worth(s.stranger, s))
 
     def _believe(self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes) -> ObjectBelief:
+        """The belief about an object with its candidates: by the operator's answer, otherwise by votes."""
         s = self.settings
         answer = mind.answers.get(belief.id)
         if answer == UNKNOWN_OBJECT:

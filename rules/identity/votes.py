@@ -8,8 +8,8 @@ For each object o and each model name n, in each step of length dt:
 where s is the best similarity with which any view of n was hypothesised for o's region in this step (nothing
 at or below 0.4 counts; section 7.3), k the rank of n among the names of this step (0 for the best), p(o, n)
 the consistency of its views over time (`pose_support`; 1 while the border cuts o), and visible(o) the visible
-share of o. Hypotheses in quick succession are of the same picture: `new` is the time since the last ones, as
-a share of `apart_s`, at most 1. The three principles:
+share of o. Hypotheses in quick succession are not independent, since they see almost the same image: `new` is
+the time since the last ones, as a share of `apart_s`, at most 1. The three principles:
 
 1. recurrent and temporally stable hypotheses are more likely: votes accumulate over steps;
 2. hypotheses that do not recur are forgotten: votes decay with `tau_s`;
@@ -19,10 +19,11 @@ a share of `apart_s`, at most 1. The three principles:
 The set of names is open. Whatever is in view, the database has something slightly similar: in each step the
 possibility that the object is none of the models gets the vote of a name of similarity `stranger`. While it
 has the most votes, because all names are weak or change constantly, the object is an 'unknown object'.
- Matches of a silhouette are counted separately from those of the behaviour that detected the object. A model
-that a task expects, and that no other object is believed to be, was more likely a priori: it counts as more
-similar, since errors of similarity last as long as the view, and has some votes from the start. Votes are
-read as evidence: the likelihood of a name is proportional to exp(`evidence` * v).
+
+Matches of a silhouette are counted separately from those of the behaviour that detected the object. A model
+that a task expects, and that no other object is believed to be (*awaited*), is more likely a priori: it
+counts as more similar, since errors of similarity last as long as the view, and has some votes from the
+start. Votes are log evidence: the likelihood of a name is proportional to exp(`evidence` * v).
 """
 
 from __future__ import annotations
@@ -56,22 +57,22 @@ class VoteSettings:
     """Settings of the vote.
 
     Attributes:
-        least_similarity: Hypotheses at or below it do not count (paper: 0.4).
-        tau_s: Votes of a visible object fall to 37 % in this time.
+        least_similarity: Hypotheses at or below this similarity do not count (paper: 0.4).
+        tau_s: Time constant of the decay of votes on a visible object, seconds.
         tau_hidden_s: The same for a hidden object.
         rank: Weight of each name relative to the name above it in the same step.
         least_visible: Below this visible share an object is treated as hidden.
         most_candidates: Most names of an object.
         least_share: Names with a smaller share of the votes are dropped.
         known_votes: Votes that the best name needs for the object to be known at all.
-        stranger: Similarity of an object to some model even when it is none of them.
-        shape: Matches of the silhouette.
-        found: Matches by the behaviour that detected the region.
-        expected: Prior votes of an awaited model before any match of the silhouette.
-        apart_s: Hypotheses this far apart in time are of different pictures.
+        stranger: Similarity that an object has to some model even if it is none of them.
+        shape: Settings of matches of the silhouette.
+        found: Settings of matches by the behaviour that detected the region.
+        expected: Prior votes of an awaited model, unless the behaviour that detected the object has votes.
+        apart_s: Interval from which successive hypotheses count in full, seconds.
         evidence: Log likelihood per vote.
-        settle: Likelihood at which a name is reported.
-        settle_s: How long it must have had it.
+        settle: Likelihood from which a name is reported.
+        settle_s: How long it must have had that likelihood, seconds.
     """
 
     least_similarity: float = 0.4
@@ -110,13 +111,13 @@ class ObjectVotes:
     """The memory of one object's votes.
 
     Attributes:
-        counts: (name, votes), most votes first: over all kinds.
+        counts: (name, votes), most votes first, summed over all kinds of matches.
         none: Votes for its being none of the models.
         shape: Votes of matches of its silhouette.
         found: Votes of matches by the behaviour that detected it.
-        heard: Seconds of the last hypotheses about it, or None.
-        leader: The name that leads clearly now, or None.
-        leads_since: Seconds since when it leads.
+        heard: Time of the last hypotheses about it, seconds, or None.
+        leader: The name whose likelihood is at least `settle` now, or None.
+        leads_since: Time since when `leader` has its value, seconds.
         reported: The last reported name, or None.
     """
 
@@ -224,7 +225,7 @@ def candidates(
         stranger: Votes for the object's being none of the models.
 
     Returns:
-        Most likely first; none while the best has too few votes, or fewer than a stranger.
+        Most likely first; empty while the best name has too few votes, or fewer than `stranger`.
     """
     if not tally or tally[0][1] <= 0.0 or tally[0][1] < max(settings.known_votes, stranger):
         return ()
@@ -239,7 +240,13 @@ def candidates(
 
 
 def unknown_probability(tally: VoteCounts, settings: VoteSettings, stranger: float) -> float:
-    """Probability that an object is none of the models, 0 to 1; 1 without hypotheses."""
+    """Probability that an object is none of the models, 0 to 1; 1 without votes on a name.
+
+    Args:
+        tally: Votes on names.
+        settings: Scale of votes.
+        stranger: Votes for the object's being none of the models.
+    """
     odds = sum(exp(settings.evidence * (v - stranger)) for _, v in tally)
     return 1.0 / (1.0 + odds)
 
@@ -255,8 +262,8 @@ def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], mos
     Args:
         tally: The tally before.
         new: Weights of this step's names and of none of the models; empty without a match.
-        share: Factor of the weights.
-        fade: Seconds since the last count, and the time constant.
+        share: Factor on these weights, 0 to 1.
+        fade: (time since the last count, time constant), seconds.
         most: Names to keep.
     """
     if not (tally.counts or tally.none or new.counts):
@@ -266,11 +273,11 @@ def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], mos
 
 
 def joined(votes: ObjectVotes, settings: VoteSettings, awaited: Collection[str]) -> ObjectVotes:
-    """The votes of an object with those of all kinds summed.
+    """The votes on an object with `counts` and `none` summed over all kinds of matches.
 
     Args:
-        votes: With the tally of each kind.
-        settings: For the prior votes of awaited models.
+        votes: Votes with the updated tally of each kind.
+        settings: Settings, for the prior votes of awaited models.
         awaited: Models that are expected and not yet found.
     """
     kinds = votes.shape, votes.found

@@ -58,8 +58,9 @@ def recognised_regions(observation: Observation) -> frozenset[int]:
 def associate(mind: Mind, observation: Observation) -> tuple[dict[int, Region], dict[int, int]]:
     """Associate a frame's regions with objects; a region without an owner starts a new object.
 
-    Of two regions of one object the one that is recognised by appearance is its own: an arm that was taken
-    for its gripper, while that was not seen, gives way to it. Otherwise its current region is.
+    If an object owns two regions of a frame, it keeps the one that is recognised by appearance, otherwise its
+    current one; the other region starts a new object. So an arm that was taken for its gripper, while the
+    gripper was not seen, loses that identity when the gripper is recognised.
 
     Returns:
         Object id -> its region, and the owners of all known regions, those of this frame last.

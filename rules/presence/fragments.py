@@ -6,7 +6,8 @@ therefore a suspected fragment until it has been clearly apart from that body fo
 not clear it: a sliver along an edge appears to slide on it (the aperture problem), and its outline wanders.
 The price: of two bodies of unequal size that touch from the start, the smaller one is not reported before
 they separate.
- A region that came over the image border was never a part of a body inside and is not suspected, even when it
+
+A region that came over the image border was never a part of a body inside and is not suspected, even when it
 soon passes in front of one; at the start of a video nothing has come over the border yet. Of two new regions
 that touch, the larger one is the body; if their sizes are similar, neither is a part of the other.
 """
@@ -33,10 +34,10 @@ class FragmentSettings:
         part: Largest part, as a share of the body's area.
         touch: Outline gap up to which a region touches a body, image diagonals.
         apart: Outline gap beyond which it is clearly apart, image diagonals.
-        apart_size: The same as a share of the root of its area; the greater one counts.
-        within: Share of its outline inside a body's convex hull, or of its box inside the place of
-            the body, from which it is within the body.
-        apart_s: How long it must be apart, seconds.
+        apart_size: The same as a share of the square root of the region's area; the greater one counts.
+        within: Share of a region's outline inside a body's convex hull, or of its box inside the predicted
+            box of the body, from which it is within the body.
+        apart_s: How long it must be apart to be an object of its own, seconds.
     """
 
     part: float = 0.7
@@ -117,7 +118,10 @@ class FragmentTest:
     def _first(
         self, new: ObjectBelief, bodies: Iterable[ObjectBelief], mind: Mind, *, starting: bool
     ) -> FragmentHypothesis:
-        """A region that came over the border is not suspected, unless a body there reaches it."""
+        """The first hypothesis about a region.
+
+        A region that came over the border is not suspected, unless it touches a body at the same border.
+        """
         sides = border_sides(new.region, mind.frame_size)
         if starting or not sides:
             return FragmentHypothesis()
@@ -132,6 +136,7 @@ class FragmentTest:
         mind: Mind,
         of: Mapping[int, ObjectTrack],
     ) -> FragmentHypothesis:
+        """The hypothesis about a region updated by one step."""
         body = self._body_of(new.region, bodies, mind)
         body = body or mind.objects.get(-1 if fragment.body is None else fragment.body)
         if body is None or body.presence is Presence.LEFT:
@@ -148,7 +153,7 @@ class FragmentTest:
         return replace(fragment, apart_since=since, rejected=parted)
 
     def _in_place(self, region: Region, body: ObjectTrack | None, mind: Mind) -> bool:
-        """Whether a region is mostly where a barely visible body should be."""
+        """Whether a region is mostly inside the predicted box of a body, which may be hardly visible."""
         if body is None:
             return False
         x, y, w, h = region.bbox
@@ -158,7 +163,7 @@ class FragmentTest:
     def _may_contain(
         self, body: ObjectBelief, new: ObjectBelief, of: Mapping[int, ObjectTrack]
     ) -> bool:
-        """Whether a belief may be the body of a new one: another one in view, and larger."""
+        """Whether an object may be the body of a new one: it was seen no earlier, and is larger."""
         if body.id == new.id or body.id not in of or body.last_seen < new.first_seen:
             return False
         # A body that has lost a part is compared by its former area.
@@ -197,7 +202,7 @@ def share_within(region: Region, body: Region) -> float:
 
 
 def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, ObjectTrack]) -> bool:
-    """Whether a region is where a known object, at least partly hidden, should be."""
+    """Whether a region is mostly inside the predicted box of a known, at least partly hidden object."""
     for old in mind.objects.values():
         track = of.get(old.id)
         if not old.confirmed or old.presence is Presence.LEFT or track is None:

@@ -1,4 +1,4 @@
-"""Initiation: a region observed steadily, and not part of another object, enters."""
+"""Initiation: confirms objects whose region is observed steadily and is not a part of another object."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from visup.rules.presence.step_context import StepContext
 from visup.rules.wording.conditions import Condition, at_least
 
 MOVES_SIGMA = 3.0
-"""Speed beyond which what was recognised by appearance is moving, its standard deviations."""
+"""Speed, in its standard deviations, from which an object recognised by appearance is moving."""
 
 STATIONARY_S = 1.0
 """An object in view for longer than this before it moved did not enter now, seconds."""
 
 
 def confirm_new(context: StepContext) -> None:
-    """Confirm tentative objects that are visible now, unless they are known ones now seen whole."""
+    """Confirm tentative objects that are visible now, unless known objects turn out to be parts of them."""
     for belief in context.seen():
         if belief.confirmed or not context.decide("entry", belief.id, _conditions(context, belief)):
             continue
@@ -36,7 +36,7 @@ def confirm_new(context: StepContext) -> None:
 
 
 def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
-    """Conditions for the entry of an object: seen often and steadily enough, no part of another, no speck."""
+    """Conditions for the entry of an object: seen steadily, large enough, and not a part of another one."""
     s, track = context.settings, context.of[belief.id]
     if _known_at_first_sight(context, belief):
         yield Condition("not part of another object", not context.may_be_part(belief))
@@ -60,9 +60,9 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
 
 
 def _known_at_first_sight(context: StepContext, belief: ObjectBelief) -> bool:
-    """Whether it was recognised by appearance in the first picture, with little doubt.
+    """Whether it was recognised by appearance in the first frame, with little doubt.
 
-    Steadiness is asked for since shadows and flickers may pass for bodies; this one is known by its looks.
+    Then it need not be seen steadily, which only serves to exclude shadows and flicker.
     """
     if context.now > context.start or belief.id not in context.recognised:
         return False
@@ -71,13 +71,13 @@ def _known_at_first_sight(context: StepContext, belief: ObjectBelief) -> bool:
 
 
 def _is_moving(belief: ObjectBelief) -> bool:
-    """Whether its region moves beyond doubt; what looks like a known thing and moves is that thing."""
+    """Whether its region certainly moves; a moving object needs no more evidence than its recognition."""
     region = belief.region
     return hypot(*region.velocity) > MOVES_SIGMA * region.velocity_sigma > 0.0
 
 
 def _is_known_already(context: StepContext, belief: ObjectBelief) -> bool:
-    """Whether another object has the name by which it was recognised: it may be that one, seen again."""
+    """Whether another object has the name by which it was recognised: it may be that object, seen again."""
     found = hypotheses_by_object(context.mind, context.observation).get(belief.id, ())
     names = {h.name for h in found}
     return any(

@@ -63,7 +63,15 @@ def state_of(belief: ObjectBelief, track: ObjectTrack | None) -> LifecycleState:
 def confirm(
     context: StepContext, belief: ObjectBelief, kind: str, template: str, confidence: float
 ) -> None:
-    """Confirm an object, which enters."""
+    """Confirm a tentative object, and report its entry.
+
+    Args:
+        context: The step.
+        belief: The object.
+        kind: Kind of the event.
+        template: Sentence of the event; {0} is the object.
+        confidence: Confidence of the event, 0 to 1.
+    """
     context.put(replace(belief, confirmed=True))
     context.tell(kind, template, belief.id, confidence=confidence)
 
@@ -74,7 +82,7 @@ def demote(context: StepContext, belief: ObjectBelief) -> None:
 
 
 def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief | None) -> None:
-    """Hide an object behind another, or behind something unknown."""
+    """Report that an object is hidden by another one, or by something unknown (None)."""
     known = occluder if occluder is not None and occluder.confirmed else None
     came = known is not None and came_to(context.of[belief.id], known.region)
     _go(context, belief, Presence.HIDDEN, lost=False, into=known.id if known and came else None)
@@ -85,14 +93,14 @@ def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief |
 
 
 def lose(context: StepContext, belief: ObjectBelief) -> None:
-    """Lose an object that is no longer seen, for no apparent reason."""
+    """Report that an object is lost: it is no longer seen, for no apparent reason."""
     _go(context, belief, Presence.HIDDEN, lost=True)
     template = "{0} {is} lost: it is no longer seen, for no apparent reason."
     context.tell("lost", template, belief.id)
 
 
 def leave(context: StepContext, belief: ObjectBelief) -> None:
-    """Let an object leave over the border of the image."""
+    """Report that an object has left over the border of the image."""
     _go(context, belief, Presence.LEFT, lost=False)
     template = "{0} {leaves} the field of view."
     context.tell("exit", template, belief.id, confidence=EXIT_CONFIDENCE)
@@ -111,7 +119,7 @@ def _go(
 
 
 def reappear(context: StepContext, belief: ObjectBelief) -> None:
-    """Make an object visible again, wherever it was."""
+    """Report that an object is visible again after it was occluded, was lost, or had left."""
     before = state_of(belief, context.of[belief.id])
     seen = replace(belief, presence=Presence.SEEN)
     context.put(seen, lost=False, clear_since=None, partial_since=None, vanished_into=None)

@@ -13,7 +13,10 @@ from visup.rules.presence.step_context import StepContext
 
 
 def merge(context: StepContext) -> None:
-    """Find objects that merged with another, whose region grew into the union of the two."""
+    """Detect missing objects that merged with another one, whose region grew into the union of the two.
+
+    Also moves merged objects along with the region that contains them, until that shrinks again.
+    """
     alone = context.recognised
     for gone in context.missing():
         track = context.of.get(gone.id)

@@ -20,10 +20,11 @@ EXIT_HORIZON_S = 6.0
 """An object that is leaving is out of view within this time, seconds."""
 
 CAME_SHARE = 0.25
-"""By how much of its own size an object that comes to another nears it within a second."""
+"""Least approach of an object to another one within a second for it to have come there, as a share of the
+square root of its area."""
 
 LEAST_SIGHTINGS = 3
-"""Fewest sightings in which that is seen."""
+"""Fewest sightings from which an approach is measured."""
 
 TimedCentroid = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
@@ -35,26 +36,26 @@ class ObjectTrack:
 
     Attributes:
         region: Its region as last seen.
-        seen_at: Seconds of the last sighting.
-        coherent_since: Seconds since when sightings followed each other without a jump.
+        seen_at: Time of the last sighting, seconds.
+        coherent_since: Time since when sightings have followed each other without a jump, seconds.
         coherent_box: Its box at that time.
-        sightings: How many since then.
-        centroids: Those of the last second in which it was unobstructed; at most 16.
+        sightings: Number of sightings since then.
+        centroids: Centroids of the last second in which it was unobstructed; at most 16.
         whole_box: Its box when last seen whole.
-        whole_at: Seconds of that.
+        whole_at: Time when last seen whole, seconds.
         velocity: (vx, vy) when last unobstructed, pixels per second.
         reference_area: Area of the whole object, pixels.
         visible_share: Visible share of the reference area, 0 to 1.
-        partial_since: Seconds since when only a small part is visible, or None.
-        clear_since: Seconds since when most of it is visible again, or None.
-        merged_with: The object whose region contains it, or None.
-        merged_since: Seconds of that.
-        parted_at: Seconds when it last got its own region again, or None.
-        changed_at: Seconds when it got another region, whose shape cannot be compared with that of
-            the older one.
+        partial_since: Time since when only a small part is visible, seconds, or None.
+        clear_since: Time since when most of it is visible again, seconds, or None.
+        merged_with: Id of the object whose region contains it, or None.
+        merged_since: Time since when that is so, seconds.
+        parted_at: Time when it last got its own region again, seconds, or None.
+        changed_at: Time when it got another region, whose shape cannot be compared with that of the older
+            one, seconds.
         lost: Whether it is hidden without an explanation.
         first_box: Its box when first seen.
-        vanished_into: The object that has hidden it since it came there, or None.
+        vanished_into: Id of the object that it approached and that has hidden it since, or None.
     """
 
     region: Region
@@ -84,7 +85,7 @@ class PresenceMemory:
     """All tracks.
 
     Attributes:
-        start: Seconds of the first observation of regions, or None before it.
+        start: Time of the first observation of regions, seconds; None before it.
         of: Object id -> its track.
     """
 
@@ -149,7 +150,7 @@ def update_track(
     Args:
         track: The track before.
         region: The object's region now.
-        now: Seconds.
+        now: Time of the sighting, seconds.
         crowded: Whether another region touches it, so that a part of it may be hidden.
         allowed_gap_s: A longer gap between sightings breaks coherence.
         recognised: Whether it was recognised by appearance: its motion is then known, whatever touches it.
@@ -183,7 +184,7 @@ def update_track(
 
 
 def predicted_box(track: ObjectTrack, now: float) -> Box:
-    """Predicted box of the whole object, extrapolated by its drift for at most 3 s."""
+    """Predicted box of the whole object, extrapolated at constant velocity for at most 3 s."""
     ahead = min(now - track.whole_at, 3.0)
     return shifted(track.whole_box, track.velocity[0] * ahead, track.velocity[1] * ahead)
 
@@ -201,7 +202,7 @@ def heading_out(track: ObjectTrack, frame_size: tuple[int, int], margin: int = 3
     """Whether the object was at an edge of the image, moving over it, and may soon be out of view.
 
     An object that would need longer than `EXIT_HORIZON_S` at its speed, such as an arm that reaches far
-    into the image and whose drift is noise, is never considered leaving.
+    into the image and whose measured velocity is noise, is not considered leaving.
     """
     x, y, w, h = track.region.bbox
     vx, vy = track.velocity
@@ -270,9 +271,9 @@ def _recent_centroids(
 def _velocity(
     track: ObjectTrack, region: Region, centroids: tuple[TimedCentroid, ...], dt: float
 ) -> tuple[float, float]:
-    """Its velocity: by image motion where known, else by its centroid.
+    """(vx, vy), pixels per second: smoothed image motion where known, otherwise a line fitted to centroids.
 
-    The centroid also moves when something unseen begins to hide the body.
+    Image motion is preferred, since the centroid also moves when something unseen begins to hide the body.
     """
     if region.velocity_sigma > 0.0:
         share = max(1.0 - exp(-dt / 0.4), 1.0 / track.sightings)
@@ -289,9 +290,9 @@ def _velocity(
 
 
 def came_to(track: ObjectTrack, other: Region) -> bool:
-    """Whether an object came nearer to another's centre in the last second in which it was seen in full.
+    """Whether an object approached the centre of another one in the last second in which it was unobstructed.
 
-    The camera is taken to have hardly moved in that time.
+    It is assumed that the camera hardly moved in that time.
     """
     if len(track.centroids) < LEAST_SIGHTINGS:
         return False

@@ -24,12 +24,12 @@ class ObjectSettings:
     Attributes:
         most_objects: Most remembered objects; those unseen for longest are dropped first.
         most_owners: Most remembered region ids.
-        forget_unconfirmed_s: A tentative object unseen for this long is dropped.
-        forget_left_s: An object that left is remembered for this long.
-        forget_hidden_s: A hidden object is remembered for this long if it is identified or has a role in a
-            task.
-        forget_nameless_s: Any other hidden object is remembered for this long.
-        percept_age_s: Percepts of plug-ins' own kinds expire after this.
+        forget_unconfirmed_s: How long an unseen tentative object is remembered, seconds.
+        forget_left_s: How long an object that left is remembered, seconds.
+        forget_hidden_s: How long a hidden object is remembered that is identified or has a role in a task,
+            seconds.
+        forget_nameless_s: How long any other hidden object is remembered, seconds.
+        percept_age_s: Age at which percepts of plug-ins' own kinds expire, seconds.
     """
 
     most_objects: int = 64
@@ -110,7 +110,7 @@ class ObjectReasoner:
 
 
 def _is_identified(belief: ObjectBelief) -> bool:
-    """Whether some identity is likelier than none of the models."""
+    """Whether some model is more likely than its being none of the models."""
     return bool(belief.candidates) and belief.candidates[0].confidence > belief.unknown
 
 

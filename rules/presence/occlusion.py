@@ -27,7 +27,7 @@ PARTLY_OUT = 0.35
 
 
 def update_visible(context: StepContext) -> None:
-    """Confirmed objects that are visible now: occlusion, exit or reappearance."""
+    """Decide on occlusion, exit or reappearance of the confirmed objects that are visible now."""
     for belief in context.seen():
         if not belief.confirmed:
             continue
@@ -94,7 +94,7 @@ def _check_reappearance(context: StepContext, belief: ObjectBelief) -> None:
 def _reappearance_conditions(
     context: StepContext, belief: ObjectBelief, track: ObjectTrack
 ) -> Iterator[Condition]:
-    """Most of it must be visible; for one that was hidden, less is enough once nothing covers it."""
+    """Conditions for the reappearance of an object: most of it is visible, or less if nothing covers it."""
     s = context.settings
     if belief.presence is Presence.LEFT:
         needed = max(s.shown_share, 2 * s.leaving_share)
@@ -106,7 +106,7 @@ def _reappearance_conditions(
 
 
 def update_missing(context: StepContext) -> None:
-    """Confirmed objects without a region: occlusion, exit or loss."""
+    """Decide on occlusion, exit or loss of the confirmed objects that have no region now."""
     for belief in context.missing():
         track = context.of.get(belief.id)
         if track is None or belief.presence is not Presence.SEEN:
@@ -157,7 +157,10 @@ def _missing_exit_conditions(
 def _missing_occlusion_conditions(
     context: StepContext, track: ObjectTrack, occluder: ObjectBelief | None, leaving: bool
 ) -> Iterator[Condition]:
-    """It is occluded, not just missed, if little of it would be visible or it is missing for long."""
+    """Conditions for the occlusion of a missing object.
+
+    The segmenter may merely have missed it, unless little of it would be visible or it is missing for long.
+    """
     s = context.settings
     yield Condition("it has not left", not leaving)
     yield Condition("another object covers its place", occluder is not None)
@@ -183,7 +186,7 @@ def _loss_conditions(
 
 
 def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None:
-    """The object whose region is where this one should be, or next to its remains."""
+    """The object whose region covers the place of this one, or is next to what is visible of it."""
     best: tuple[float, ObjectBelief] | None = None
     for other in context.seen():
         if other.id == belief.id or context.may_be_part(other, belief):
@@ -197,8 +200,8 @@ def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None
 
 
 def _covered_share(context: StepContext, track: ObjectTrack, other: ObjectBelief) -> float:
-    """Share of an object's place that another one's region covers."""
-    # A region on the pixels of its last sighting has moved there since.
+    """Share of an object's last or predicted place that another one's region covers, 0 to 1."""
+    # A region that covers the object's last pixels has moved there since, so it is in front.
     share = shared_pixels(other.region, track.region) / max(1.0, track.region.area)
     if track.visible_share >= context.settings.whole_share:
         return share

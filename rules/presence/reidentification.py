@@ -18,10 +18,10 @@ from visup.rules.presence.object_tracks import border_sides, new_track, predicte
 from visup.rules.presence.step_context import StepContext
 
 PART = 0.7
-"""Largest part, as a share of the region's area."""
+"""Greatest area of an object that may be a part of a region, as a share of the region's."""
 
 WITHIN = 0.5
-"""Share of the object's outline inside the region's hull from which it is within it."""
+"""Least share of such an object's outline inside the region's convex hull."""
 
 
 def reidentify(context: StepContext) -> None:
@@ -41,15 +41,20 @@ def reidentify(context: StepContext) -> None:
 
 
 def parts_of(context: StepContext, whole: ObjectBelief) -> list[ObjectBelief]:
-    """Known objects that were only parts of a new region, by id."""
+    """The confirmed objects that turn out to be parts of a new, larger region; sorted by id."""
     others = (b for b in context.seen() if b.confirmed and b.id not in context.recognised)
     return [b for b in others if _was_part(context, b, whole)]
 
 
 def absorb_parts(context: StepContext, whole: ObjectBelief, parts: list[ObjectBelief]) -> None:
-    """The oldest of the objects that were parts of a new region takes it over.
+    """Let the oldest of the objects that are parts of a new region take it over.
 
-    The others count as parts from now on, and have to prove otherwise, like any fragment.
+    The others become tentative, and are suspected to be fragments until they have been clearly apart.
+
+    Args:
+        context: The step.
+        whole: The tentative object of the new region; it is deleted.
+        parts: From `parts_of`, at least one.
     """
     oldest = parts[0]
     _take_region(context, whole, oldest)
@@ -76,7 +81,7 @@ def _was_part(context: StepContext, part: ObjectBelief, whole: ObjectBelief) -> 
 
 
 def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
-    """Match score of a new region and a missing object; 0 for no match."""
+    """Match score of a new region and a missing object, 0 to 1; 0 for no match."""
     track = context.of[old.id]
     named = bool(new.candidates and old.candidates) and new.name == old.name
     if named and new.id in context.recognised and old.confidence > 0.9:
@@ -103,7 +108,7 @@ def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> 
 
 
 def _share_border_side(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> bool:
-    """Whether both are cut by the same side of the image, as while an object comes in."""
+    """Whether both reach the same side of the image, as while an object is coming in."""
     size = context.mind.frame_size
     return bool(border_sides(new.region, size) & border_sides(old.region, size))
 

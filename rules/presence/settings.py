@@ -7,27 +7,29 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PresenceSettings:
-    """Durations before changes are reported, and visible shares.
+    """Durations before changes are reported, in seconds, and visible shares, 0 to 1.
 
     Attributes:
         entry_s: A region that came over the border, or was present at the start, enters after this.
         entry_inside_s: The same for one that appears inside the image.
-        start_s: Length of the start, in which every region may be new.
+        start_s: Time from the first frame in which a new region counts as present from the start.
         least_sightings: Sightings required for entry.
-        allowed_gap_s: Longest flicker within a steady sighting.
+        allowed_gap_s: Longest gap between sightings that does not interrupt a steady observation.
         settle_s: How long an object must be missing before exit or occlusion is reported.
-        missed_s: The same when it is not seen though another hides only a part of it.
-        lost_s: The same when nothing explains it.
+        missed_s: The same for occlusion if the other object covers only a part of it.
+        lost_s: The same for loss, when nothing explains that it is missing.
         partial_s: How long little must be visible before exit or occlusion is reported.
         hidden_share: Below this visible share, next to another region, an object is occluded.
         leaving_share: Below this visible share, moving over the border, it has left.
         shown_share: Above this visible share a hidden object has reappeared.
         shown_s: How long it must be visible, or unobstructed, before that is reported.
-        whole_share: A less visible object was being hidden, and did not merge with another.
-        contact_px: Regions closer than this may hide parts of each other.
-        reidentify_s: A new region must be seen this long before it can be a hidden object.
+        whole_share: Least visible share, when last seen, of an object that may have merged with another; a
+            less visible one was being hidden.
+        contact_px: Gap below which regions may hide parts of each other, pixels.
+        reidentify_s: How long a new region must be seen before it can be a hidden object.
         least_share: Share of the image below which an unrecognised region does not enter.
-        sure_similarity: What is recognised by appearance in the first picture enters at once from here on.
+        sure_similarity: Similarity from which an object recognised by appearance in the first frame enters at
+            once.
     """
 
     entry_s: float = 0.36

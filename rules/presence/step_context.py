@@ -27,9 +27,9 @@ class StepContext:
         of: Object id -> its track.
         fragments: Object id -> whether it may be only a part of another.
         settings: Settings of the reasoner.
-        start: Seconds of the first observation of regions.
+        start: Time of the first observation of regions, seconds.
         log: Records the conditions of decisions for explanations, or None.
-        events: Reported events.
+        events: Events reported in this step.
     """
 
     mind: Mind
@@ -45,7 +45,7 @@ class StepContext:
 
     @property
     def now(self) -> float:
-        """Seconds."""
+        """Time of the observation, seconds."""
         return self.observation.time
 
     def objects(self) -> list[ObjectBelief]:
@@ -77,7 +77,7 @@ class StepContext:
         return self._recognised
 
     def may_be_part(self, new: ObjectBelief, body: ObjectBelief | None = None) -> bool:
-        """Whether a region may be only a part: of one body, or of any."""
+        """Whether an object may be only a fragment of `body`, or of any body if None."""
         fragment = self.fragments.get(new.id)
         if fragment is None or new.id in self.recognised:
             return False
@@ -88,7 +88,7 @@ class StepContext:
         return decide(conditions, self.log, kind, (object_id,))
 
     def put(self, belief: ObjectBelief, **track: object) -> None:
-        """Store a belief, and change fields of its track."""
+        """Store a belief, and replace fields of the object's track, given by name."""
         self.mind = self.mind.with_objects(belief)
         if track:
             self.of[belief.id] = replace(self.of[belief.id], **track)

@@ -28,7 +28,7 @@ V = TypeVar("V")
 W = TypeVar("W")
 END = -1
 """In place of a node: the end of the course."""
-TRANSITIONS_PER_NODE = 10
+TRANSITIONS_PER_NODE = 10  # most transitions expanded by `explored`, on average per requested node
 DEEPEST = 60  # nested courses around a step, limited by Python's recursion depth
 NEW = -1
 """In place of a carried step: the step begins with the transition."""
@@ -42,7 +42,7 @@ class Transition:
         target: The target node, or `END`.
         left: Positions of the steps that it completes.
         carried: For each step of the target its position in the source node, or `NEW`.
-        share: Its share among the transitions that complete the same steps.
+        share: Prior probability of this transition among those that complete the same steps.
     """
 
     target: int

@@ -17,10 +17,10 @@ class Backpointer:
 
     Attributes:
         step: The step.
-        left: When it was completed, seconds.
+        left: Time when it was completed, seconds.
         before: Its predecessor; None if there is none, or if it is forgotten.
         length: Number of completed steps, including forgotten ones.
-        begun: When it was first observed, or None.
+        begun: Time when it was first observed, seconds, or None.
     """
 
     step: TaskStep
@@ -57,7 +57,14 @@ def extended(
     now: float,
     begun: tuple[float | None, ...] = (),
 ) -> Backpointer | None:
-    """A path extended by the steps completed now, with when each was observed; the oldest are forgotten."""
+    """A path extended by the steps completed now; the oldest steps are forgotten.
+
+    Args:
+        backpointer: The path so far; None if it is empty.
+        left: The steps completed now.
+        now: Current time, seconds.
+        begun: Time when each of them was first observed, seconds, or None.
+    """
     for step, since in zip_longest(left, begun):
         length = backpointer.length + 1 if backpointer else 1
         backpointer = Backpointer(step, now, backpointer, length, since)

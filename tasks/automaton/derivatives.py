@@ -53,7 +53,7 @@ from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 
 W = TypeVar("W")
-DEEPEST = 200
+DEEPEST = 200  # most references followed without a step, against endless recursion
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def enter(
         task: The task that defines the stages.
         continuation: The course.
         payload: Initial payload of each step.
-        now: Seconds, from which each `within` counts.
+        now: Time from which each `within` counts, seconds.
 
     Yields:
         States; None if the course may be empty.
@@ -100,7 +100,7 @@ def derivatives(task: Task, state: State[W], payload: W, now: float) -> Iterator
         task: The task.
         state: The state.
         payload: Initial payload of each entered step.
-        now: Seconds, from which each `within` counts.
+        now: Time from which each `within` counts, seconds.
     """
     match state:
         case Leaf():
@@ -124,8 +124,8 @@ class _Entrance(Generic[W]):
     Attributes:
         task: The task that defines the stages.
         payload: Initial payload of each step.
-        now: Seconds, from which each `within` counts.
-        depth: Number of references followed without a step; a guard against endless recursion.
+        now: Time from which each `within` counts, seconds.
+        depth: Number of references followed without a step; see `DEEPEST`.
     """
 
     task: Task

@@ -1,4 +1,4 @@
-"""The observed entries to next steps, and whether those of steps that begin together coincide."""
+"""Observed entries to possible next steps, and whether those to steps that begin together coincide."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class StepEntry(NamedTuple):
     """The observed entry to a step.
 
     Attributes:
-        since: Since when it was observed, seconds.
-        until: When it was last observed, seconds.
+        since: Time since when it was observed, seconds.
+        until: Time when it was last observed, seconds.
         held_by: The relation by which the step last held, or None.
-        held_at: When it last held, seconds.
+        held_at: Time when the step last held, seconds.
     """
 
     since: float
@@ -30,7 +30,7 @@ StepEntries = tuple[tuple[TaskStep, StepEntry], ...]
 """Step -> its entry."""
 
 Meetings = tuple[tuple[tuple[TaskStep, ...], float], ...]
-"""Steps that begin together -> when the entries of all were last observed at the same time, seconds."""
+"""Steps that begin together -> time when the entries of all were last observed at the same time, seconds."""
 
 
 def observed_entries(
@@ -42,15 +42,18 @@ def observed_entries(
     refuted: Callable[[TaskStep], bool] = lambda step: False,
     held_by: Callable[[TaskStep], Relation | None] = lambda step: None,
 ) -> tuple[StepEntries, Meetings]:
-    """Add the entries that are observed now, and drop those that have turned out to be none.
+    """Add the entries that are observed now, and drop those that have turned out to be false.
 
     Args:
-        before: Those so far.
-        possible: The steps that may begin next, those that begin together in one tuple.
+        before: The entries and meetings so far.
+        possible: The steps that may begin next; those that begin together in one tuple.
         entry: The relation by which the beginning of a step is observed now, or None.
-        now: Seconds.
+        now: Current time, seconds.
         refuted: Whether it is known now that a step has not begun, whatever was observed before.
         held_by: The relation by which a step holds now, or None.
+
+    Returns:
+        The updated entries and meetings.
     """
     entries = {s: span for s, span in before[0] if not refuted(s)}
     met = {steps: at for steps, at in before[1] if all(s in entries for s in steps)}
@@ -68,7 +71,8 @@ def observed_entries(
 def coincidence(spans: Sequence[tuple[float, float]]) -> float | None:
     """The last time that lies in all of some intervals, or None.
 
-    An entry may be confirmed, and dated back, when another one is no longer certain.
+    Intervals are compared, not current observations: an entry may be confirmed, and dated back, when another
+    one is no longer certain.
 
     Args:
         spans: Begin and end of each, seconds.
@@ -88,17 +92,17 @@ def _observed(
 def held_on_entry(
     entries: StepEntries, steps: Collection[TaskStep], holds: Callable[[TaskStep], bool]
 ) -> dict[TaskStep, Relation]:
-    """The steps that held at the same time as the others began, but are uncertain when all begin.
+    """The steps that held when the others began, but have become uncertain by the time when all have begun.
 
-    A gripper opens just as it sets a part down: once the part is known to lie there, the hold is doubted.
+    A gripper opens just as it puts a part down: once the part is known to lie there, the grasp is in doubt.
 
     Args:
         entries: The observed entries.
-        steps: Those that begin together, whose entries have coincided.
+        steps: Steps that begin together, whose entries have coincided.
         holds: Whether a step is known to hold now.
 
     Returns:
-        Step -> the relation by which it held; none unless another one holds now.
+        Step -> the relation by which it held; empty unless another one of the steps holds now.
     """
     found = {s: entry for s, entry in entries if s in steps}
     if len(found) < len(steps) or not any(holds(s) for s in steps):

@@ -1,7 +1,7 @@
-"""Steps that are done before what must come before them: a cap put on a base that still lacks its block.
+"""Detects steps done before their prerequisites: a cap put on a base that still lacks its block.
 
-The course alone does not tell: what it passes on the way to a step may simply not have been seen. So a step
-is out of turn only if every way to it leads through a step that is known not to hold.
+That the prerequisites were not observed is no proof, since they may have been missed. A step is therefore out
+of turn only if every path to it leads through a step that is known not to hold.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MOST_NODES = 200
 
 
 def later_steps(automaton: Automaton, nodes: Iterable[int]) -> tuple[TaskStep, ...]:
-    """The steps of some nodes and of all that can be reached from them, each once, the nearest first."""
+    """The steps of some nodes and of all nodes that can be reached from them, each once, nearest first."""
     return tuple(dict.fromkeys(_reached(automaton, nodes, lambda _: True)))
 
 
@@ -26,16 +26,16 @@ def out_of_turn(
     steps: Iterable[TaskStep],
     lacks: Callable[[TaskStep], bool],
 ) -> tuple[TaskStep, TaskStep] | None:
-    """The first of some steps to which every way leads through one that is lacking.
+    """The first of some steps to which every path leads through a lacking one.
 
     Args:
         automaton: The states of the course.
-        nodes: Those that may be the present one.
+        nodes: Numbers of the states that may be the present one.
         steps: Steps that hold now.
         lacks: Whether a step is known not to hold, and has not held in its turn.
 
     Returns:
-        That step, and the first lacking one on the way; None if there is no such step.
+        That step, and the first lacking one; None if there is no such step.
     """
     held = list(steps)
     if not held:

@@ -12,7 +12,7 @@ from visup.tasks.automaton.transitions import HiddenState
 
 MOST_NODES = 1_000  # beyond this number of nodes success counts as impossible
 SMALLEST = 1e-9  # less likely paths are not followed
-SWEEPS = 500
+SWEEPS = 500  # most iterations over all nodes
 
 
 class Prognosis:
@@ -94,7 +94,7 @@ class Prognosis:
         return [(w, w.share / total) for w in transitions]
 
     def _solved(self) -> dict[int, float]:
-        """Node -> probability of reaching the end, apart from the fates of its own steps."""
+        """Node -> probability of reaching the end once its own steps are completed."""
         nodes = self._automaton.explored(self._most)
         hopes = dict.fromkeys(nodes, 0.0)
         for _ in range(SWEEPS):
@@ -108,6 +108,7 @@ class Prognosis:
         return hopes
 
     def _hoped(self, node: int, hopes: Mapping[int, float]) -> float:
+        """The probability of `_solved` for one node, from those of its successors."""
         return sum(
             share * self._after(transition, hopes) for transition, share in self._shares(node)
         )

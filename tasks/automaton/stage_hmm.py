@@ -71,8 +71,8 @@ class StageHmm:
         phases: Number of phases of a step with `for`; each takes an equal part of that time on average.
         unseen: Probability that the course moves on without the beginning of the next step being observed,
             although its approach is.
-        pass_over: Probability that a step is passed that was not seen through; squared if it was seen not to
-            happen.
+        pass_over: Probability that the course passes a step whose completion was not observed; squared if the
+            action was observed not to hold.
         look_s: Correlation time of observations, seconds: errors in neighbouring frames are dependent, so
             that this time counts as one observation.
     """
@@ -171,9 +171,9 @@ class StageHmm:
         return float(ratio ** (dt / self.look_s))
 
     def false_alarm(self, confidence: float) -> float:
-        """Likelihood ratio of a false alarm to a true observation, for one that held for a look.
+        """Likelihood ratio of a false alarm to a true observation, for one that has held for `look_s`.
 
-        It counts once, not at every look, because the errors of a lasting false alarm are dependent.
+        It counts once, not every `look_s`, because the errors of a lasting false alarm are dependent.
         """
         return 1.0 - confidence * (1.0 - self.spurious / (1.0 - self.spurious))
 
@@ -223,4 +223,4 @@ DEFAULT_HMM = StageHmm()
 SUPERVISION_HMM = StageHmm(
     begin=0.1, fail=0.02, recover=0.05, lose=0.125, missing=0.37, spurious=0.075
 )
-"""For relations in the mind, which alternate between true and neither."""
+"""For relations in the mind, which alternate between true and neither (`ActionStatus.NEITHER`)."""

@@ -20,10 +20,10 @@ class RunningDeadline:
     """A running `within` clause.
 
     Attributes:
-        seconds: As written.
+        seconds: Duration as written.
         stage: The stage that has the clause.
         pauses: The surrounding pause conditions, during which it does not run.
-        at: When it expires, seconds; excluded from equality, so that two paths to the same state are
+        at: Time when it expires, seconds; excluded from equality, so that two paths to the same state are
             recognised as such.
     """
 
@@ -38,7 +38,7 @@ class TaskStep:
     """One action that a course requires.
 
     Attributes:
-        action: Its name; for a comparison or a zone its key (see `structure.fact_key`).
+        action: Name of the action; for a comparison or a zone its key (see `structure.fact_key`).
         actors: Its actors.
         stage: The innermost stage that requires it.
         hold_s: Seconds for which it must hold, or None.
@@ -46,8 +46,8 @@ class TaskStep:
         conditions: At most one condition each by which it begins, ends, progresses or fails; and all pause
             conditions, outermost first.
         inside: All stages around the action, including the innermost.
-        already: Whether it is also satisfied if it holds since before its turn.
-        delay: Least and greatest time from the end of its predecessor to its beginning, seconds, or None.
+        already: Whether it is also satisfied if it has held since before its turn.
+        delay: (least, greatest) time from the end of its predecessor to its beginning, seconds, or None.
     """
 
     action: str
@@ -71,7 +71,7 @@ class TaskStep:
 
     @property
     def is_told(self) -> bool:
-        """Whether it has conditions by which it begins, ends, progresses or fails."""
+        """Whether the task file states conditions by which it begins, ends, progresses or fails."""
         return len(self.conditions) > len(self.pauses)
 
     def same_as(self, other: TaskStep) -> bool:
@@ -125,7 +125,7 @@ State: TypeAlias = Leaf[W] | SequenceState[W] | ParallelState[W]
 
 def leaves(state: State[W]) -> tuple[Leaf[W], ...]:
     """The active steps of a state, in the order of the text."""
-    # A loop, as courses nest deeply, and this is asked of each hypothesis several times a step.
+    # A loop instead of recursion: courses nest deeply, and this is called for each hypothesis in each step.
     while isinstance(state, SequenceState):
         state = state.head
     if isinstance(state, Leaf):

@@ -29,7 +29,7 @@ class TaskPosterior(Generic[K, H]):
     """The posterior of the state of a task.
 
     Attributes:
-        time: Seconds.
+        time: Time of the last observation, seconds.
         hypotheses: Hypotheses with their probabilities and best paths, most likely first.
         lost: Probability that the truth was dropped: one minus the product of the mass retained at each step,
             given the observations up to that step.
@@ -121,8 +121,9 @@ class TaskFilter(Generic[K, H, E]):
         Args:
             posterior: The previous posterior, which is not modified.
             evidence: The observation in the form of the model.
-            dt: Seconds since the posterior; 0 for the first observation.
-            now: Seconds, if it is not `dt` after the posterior: a gap may count as less.
+            dt: Time since the posterior, seconds; 0 for the first observation.
+            now: Time of the observation, seconds, if it is not `dt` after the posterior: of a long gap in the
+                frames, `dt` may be only a part.
         """
         now = posterior.time + dt if now is None else now
         new = pruned(

@@ -127,6 +127,7 @@ class HiddenTransitions:
         )
 
 
+# Of several steps that require the same action, the phase that comes first here is expected.
 CLEAREST = (PhaseKind.GOING, PhaseKind.FAILING, PhaseKind.LOST, PhaseKind.WAITING)
 
 

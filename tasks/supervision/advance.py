@@ -115,7 +115,7 @@ class Advance:
         return all(self.steps.over(x) for x in transition.left)
 
     def _unreached(self, transition: OpenTransition) -> float | None:
-        """Since when all steps that a transition completes are over without what they were for, or None."""
+        """Since when all steps that it completes are over without reaching their goal, seconds, or None."""
         held = [x.payload.held and x.step.hold_s is None for x in transition.left]
         pairs = zip(transition.left, held, strict=True)
         since = [self.observe(x.step).unreached if h else None for x, h in pairs]
@@ -123,7 +123,7 @@ class Advance:
         return max(known, default=None) if len(known) == len(since) else None
 
     def _going_on(self, transition: OpenTransition) -> list[TaskStep]:
-        """The steps that a transition completes which have lasted as long as required and still hold."""
+        """The steps with `for` that a transition completes and that still hold."""
         lasting = (x.step for x in transition.left if x.step.hold_s is not None)
         return [s for s in lasting if self.observe(s).holds is Truth.TRUE]
 
@@ -143,13 +143,13 @@ class Advance:
         if same and (not finished or transition.waits):
             return Support.NONE
         opens = transition.entered and self._opens(hypothesis, transition)
-        # With several alternatives an entry supports none of them: touching may precede coupling or backing
-        # off. A holding action does.
+        # With several alternatives, an entry alone supports none of them (touching may precede coupling or
+        # retreat); a holding action does.
         if opens and (ways == 1 or all(self._holds(s) for s in transition.entered)):
             return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._going_on(transition):
             return Support.OVER
-        # A failing step is not passed unseen.
+        # A failing step is not passed without the next one being observed.
         fails = any(x.payload.status in BAD for x in transition.left)
         nearer = ways == 1 and not fails and all(self._nearer(s) for s in transition.entered)
         return Support.NEARER if nearer else Support.NONE
@@ -198,7 +198,7 @@ class Advance:
         return seen.holds is Truth.TRUE or seen.sudden is not None
 
     def _entry(self, step: TaskStep) -> Relation | None:
-        """The relation by which a step is observed to begin: it has lasted, or is beyond doubt."""
+        """The relation by which a step is observed to begin: one that has lasted, or is sudden; or None."""
         seen = self.observe(step)
         return seen.entry if seen.sudden is not None or self._lasted(step, seen.entry) else None
 
@@ -276,8 +276,8 @@ class Advance:
         """The steps that a transition enters, if all have held since before the steps it completes began.
 
         Actions that last until something else begins (`converging`) may begin before their turn, and so may
-        measurements. An action required before of the same actors continues, and neither counts nor excuses
-        those beside it, unless it undoes what was required.
+        measurements: if one is entered, none is early. Steps of actors of whom something was required before
+        continue that, and are left out, unless they undo it.
         """
         if not transition.entered or any(s.already or s.is_told for s in transition.entered):
             return ()
@@ -299,7 +299,7 @@ class Advance:
     def _continues(
         self, step: TaskStep, now: Collection[frozenset[str]], passed: Sequence[Backpointer]
     ) -> bool:
-        """Whether a step goes on with what was required of the same actors before."""
+        """Whether a step continues an earlier step of the same actors."""
         actors = frozenset(step.actors)
         if actors in now:
             return True
@@ -308,14 +308,14 @@ class Advance:
         return last is not None and not (held_by and self._undone(step, held_by.since, last))
 
     def _undone(self, step: TaskStep, since: float, last: Backpointer) -> bool:
-        """Whether a step has undone, since then, what an earlier one required, after that was seen."""
+        """Whether a step that holds since a time has undone an earlier one that was observed before then."""
         if last.begun is None or since < last.begun:
             return False
         undoes = self.steps.actions[step.action].undoes
         return not set(undoes).isdisjoint(self.steps.actions[last.step.action].holds)
 
     def _in_turn(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
-        """A beginning step with the time from which its evidence counts and is reported."""
+        """A beginning step with the time from which its evidence counts, and the reports made before it."""
         left = transition.left
         same = any(leaf.step.same_as(x.step) for x in left)
         begun = (x.payload.begun for x in left)

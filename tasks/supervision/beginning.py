@@ -1,4 +1,4 @@
-"""Which stages have begun, and when: a stage waits in its turn until there is evidence of it."""
+"""Which stages have begun, and when: a stage whose turn has come begins once there is evidence of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def with_begun(
     Args:
         before: The previous beliefs, in the same order.
         stages: The present beliefs.
-        stirs: Whether an actor of an active step starts to move, which begins a task.
+        stirs: Whether an actor of an active step starts to move, which begins the first stage of a task.
     """
     stirs = stirs and is_first(before)
     pairs = zip(before, stages, strict=True)
@@ -57,7 +57,7 @@ def stage_onsets(
     posterior: TaskHypotheses | None,
     mind: Mind,
 ) -> Iterator[tuple[str, float]]:
-    """When each stage most probably began that is believed to have begun since the last step.
+    """Onsets of the stages that are believed to have begun since the last step.
 
     Args:
         model: The task.
@@ -67,7 +67,7 @@ def stage_onsets(
         mind: The mind.
 
     Yields:
-        Stage and seconds; see `stage_onset`.
+        (stage, time when it most probably began in seconds); see `stage_onset`.
     """
     begun = {s.stage for s in before.stages if s.begun}
     anew = [s.stage for s in now.stages if s.begun and s.stage not in begun]
@@ -82,15 +82,15 @@ def stage_onsets(
 
 
 CAME_LATER_S = 0.3
-"""An object that appears this long after others, seconds, has arrived or started to move: both count as a
-beginning."""
+"""An object that appears this long after the first one, seconds, has arrived or started to move; either
+begins a task."""
 
 
 def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
     """Whether actors of the most likely active steps start to move, or have just appeared.
 
-    A stage of several steps begins with the last of them, and who is named first is the one that comes or
-    goes: that a giver brings a payload does not begin what the receiver does.
+    Of a stage with several steps, an actor of each must move; for a trend, the actor named first: that the
+    giver brings a payload does not begin what the receiver should do.
     """
     if posterior is None or posterior.likeliest.finished is not None:
         return False

@@ -44,7 +44,7 @@ DIGITS = 9  # probabilities that differ by less are equal
 # that is more likely than pending after rounding to this many digits.
 WAITING_DIGITS = 2
 
-LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # final
+LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # verdicts without prospects
 
 
 def task_belief(
@@ -103,7 +103,7 @@ def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) 
         belief: The belief from the hypotheses.
         before: The previous belief.
         why: The broken invariant.
-        now: Seconds.
+        now: Current time, seconds.
     """
     if belief.verdict is Verdict.INTERRUPTED:
         return belief
@@ -128,15 +128,15 @@ def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) 
 
 
 def out_of_order_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) -> TaskBelief:
-    """The belief about a task whose order is broken: the stage that was to come first is failing.
+    """The belief about a task whose order is broken: its current stage, which should come first, is failing.
 
-    Its stages go on only once that has been undone.
+    The beliefs about its stages are frozen until the step done too soon has been undone.
 
     Args:
         belief: The belief from the hypotheses.
         before: The previous belief.
         why: How the order is broken.
-        now: Seconds.
+        now: Current time, seconds.
     """
     if belief.verdict in (*LOST, Verdict.SUCCEEDED):
         return belief
@@ -160,7 +160,7 @@ def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
 def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
     """The belief about a task that is probably not in progress.
 
-    Its casting is still followed, and unless the task is excluded, its requirements are still expected.
+    Its bindings are kept up to date, and unless the task is excluded, its requirements are still expected.
     """
     return replace(
         belief,
@@ -187,7 +187,7 @@ def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float
 
 
 def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
-    """The most likely standing of a stage: first whether it is pending, active or past, then its status."""
+    """The most likely standing of a stage: first its progress (pending, active or past), then its status."""
     progress = {p: sum(m for (q, _), m in chances.items() if q is p) for p in Progress}
     place = max(Progress, key=lambda p: round(progress[p], DIGITS))
     standing = max((s for s in chances if s[0] is place), key=lambda s: round(chances[s], DIGITS))
@@ -306,9 +306,9 @@ def _current(posterior: TaskHypotheses) -> str:
 def _prospects(
     model: MonitoredPhases, snapshot: TaskSnapshot, near: TaskHypotheses
 ) -> tuple[Prospect, ...]:
-    """The next stages or the end, without unlikely ones.
+    """The next stages or the end, most likely first, without unlikely ones.
 
-    Rounds whose new actor is not present yet are one prospect.
+    Rounds of a loop that differ only in a new actor that is not present yet are one prospect.
     """
     chances: dict[str, float] = {}
     awaited: dict[str, str] = {}

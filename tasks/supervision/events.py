@@ -35,7 +35,7 @@ KINDS = {
     Status.UNKNOWN: "stage_unknown",
 }
 WORTH_SAYING_S = 0.25
-"""A beginning is dated back in its sentence if it is at least this long ago, seconds."""
+"""The onset of a stage is mentioned in its sentence if it is at least this long ago, seconds."""
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
@@ -57,7 +57,7 @@ def stage_events(
         now: The belief of this step.
         mind: The mind, for the time; it may still hold the old belief.
         task: The task, for the texts of its stages.
-        onsets: Stage that begins now -> when it most probably began, seconds; now if it is not given.
+        onsets: Stage that begins now -> time when it most probably began, seconds; missing: now.
 
     Yields:
         Events of stages in the order of the task, then a change of the verdict.
@@ -85,7 +85,7 @@ def stage_events(
 def activity_events(
     before: TaskActivity, now: TaskActivity, belief: TaskBelief, mind: Mind
 ) -> Iterator[Event]:
-    """Events of a task that is inferred to be in progress, or not to be after all."""
+    """The event of a task that is inferred to be in progress, or no longer is, if that has changed."""
     if before.reportable == now.reportable:
         return
     kind = "task_active" if now.reportable else "task_inactive"
@@ -167,7 +167,8 @@ def _is_news(was: StageBelief | None, now: StageBelief) -> bool:
 
 def _kinds(was: StageBelief | None, now: StageBelief) -> Iterator[str]:
     before = Status.PENDING if was is None else was.status
-    # A stage reported done that is active again has not begun anew: it is undone.
+    # A stage that was reported done counts as begun again only if it makes progress or stalls: if it fails,
+    # it is undone instead.
     again = before is Status.DONE and now.status in (Status.PROGRESSING, Status.STALLED)
     if again or (now.begun and not (was is not None and was.begun)):
         yield "stage_started"
@@ -202,7 +203,7 @@ def _stage_event(
 
 
 def _dated(event: Event, began: float) -> Event:
-    """The beginning of a stage with the time at which it most probably began, said if that is earlier."""
+    """The event of a beginning stage with its onset (seconds), in the sentence as well if much earlier."""
     data = {**event.data, "began": round(began, 3)}
     if event.time - began < WORTH_SAYING_S:
         return replace(event, data=data)

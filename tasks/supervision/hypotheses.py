@@ -35,10 +35,10 @@ class Support(IntEnum):
     """Strength of support for a transition; each time it rises, the transition is taken or not."""
 
     NONE = 0
-    NEARER = 1
-    OVER = 2
-    EARLY = 3  # it begins, but the steps it completes were not seen through
-    BEGUN = 4
+    NEARER = 1  # the steps that it enters are approaching
+    OVER = 2  # the steps that it completes are over by themselves
+    EARLY = 3  # the steps that it enters begin, but those that it completes were not seen completed
+    BEGUN = 4  # the steps that it enters begin, and those that it completes were seen completed
 
 
 class Progress(IntEnum):
@@ -50,7 +50,7 @@ class Progress(IntEnum):
 
 
 HOLD = "coupled"
-"""The action by which one takes hold of another."""
+"""The action by which one object grasps another."""
 
 Standing = tuple[Progress, Status]
 """Position of a stage in the course, and its status."""
@@ -66,14 +66,14 @@ class TaskHypothesis:
         state: Its state.
         node: Number of the state (see `Automaton`).
         past: Completed stages with their latest beliefs.
-        finished: When the task was completed, or None.
-        entries: Possible next steps whose entry was observed: since when, and when last, seconds.
-        met: Steps that begin together whose entries were observed at the same time, and when last.
-        considered: Transitions not taken, by the steps they enter, with the strength of their support.
+        finished: Time when the task was completed, seconds, or None.
+        entries: Observed entries of possible next steps.
+        met: Steps that begin together whose entries were observed at the same time, with the last such time.
+        considered: (entered steps, support) of transitions that were considered and not taken.
         backpointer: Completed steps and their times.
         gone_on: Whether it has completed a step.
-        lasting: The stage completed last, if it lasts until the next one begins and that was not observed to;
-            else empty.
+        lasting: The stage completed last, if it lasts until the next one begins and that beginning was not
+            observed; otherwise empty.
     """
 
     state: State[StepMonitor]
@@ -108,8 +108,8 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
     """Active stage -> its step with the worst status, in the order of the text.
 
-    What goes wrong before a stage has begun goes wrong in the stage that lasts until then. So does what
-    undoes a hold of which the next stage has seen nothing: a grasp that takes nothing along was none.
+    A failure before a stage has begun is attributed to the previous stage, if that lasts until then. So is
+    the end of a grasp before the next stage has begun: a grasp that takes nothing along was not a grasp.
     """
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
@@ -126,10 +126,10 @@ def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
 
 
 def _taken_along(hypothesis: TaskHypothesis, hold: TaskStep) -> float:
-    """Since when the stage after a hold has been seen to begin, seconds; infinite if it has not.
+    """Time from which the stage after a hold has been observed, seconds; infinite if it has not.
 
-    If it says what the two that are coupled do together (`moving_together`), that must have begun: that one of
-    them moves alone is no sign that it is taken along.
+    If it has an action of both coupled actors, as `moving_together`, that action must have begun: a part that
+    moves alone has not been taken along.
     """
     steps = list(leaves(hypothesis.state))
     joint = [x for x in steps if set(hold.actors) <= set(x.step.actors)]
@@ -138,9 +138,14 @@ def _taken_along(hypothesis: TaskHypothesis, hold: TaskStep) -> float:
 
 
 def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
-    """Whether a step fails since the two that the step before coupled came apart before it had begun.
+    """Whether a step fails because the pair coupled by the previous step came apart before it had begun.
 
-    What happens between them after that (a second try, say) changes nothing.
+    Later events between the two, such as a second attempt, do not change this.
+
+    Args:
+        leaf: An active step.
+        hold: The previous step, by which the pair was coupled.
+        begun: Time from `_taken_along`.
     """
     monitor = leaf.payload
     same = monitor.fault is not None and _concerned(leaf) <= set(hold.actors)
@@ -148,7 +153,7 @@ def _undoes(leaf: Leaf[StepMonitor], hold: TaskStep, begun: float) -> bool:
 
 
 def _concerned(leaf: Leaf[StepMonitor]) -> set[str]:
-    """The actors of what makes a step fail: of its stage's `fails when`, or its own."""
+    """The actors of the fault of a step: those of the `fails when` of its stage, or its own."""
     fails = leaf.step.condition("fails")
     if fails is None or leaf.payload.fault != str(fails.condition):
         return set(leaf.step.actors)
@@ -165,9 +170,9 @@ def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
     """Whether the first of two steps determines the status of their stage.
 
-    A step that approaches within the stage shows that it is active, though another is still waiting. It shows
-    nothing if it held before, or if the other says what its actors do together with further ones: a part that
-    moves has not been lifted before it moves together with the gripper.
+    A step that progresses within the stage makes the stage active, though another one is still waiting. It does
+    not if it held before, or if the other one is about its actors together with further ones: a part that moves
+    has not been lifted until it moves together with the gripper.
     """
     pair = leaf, other
     if {x.payload.status for x in pair} == {Status.ACTIVE, Status.PROGRESSING}:

@@ -1,4 +1,4 @@
-"""Invariants: conditions that must never or always hold, during stages or a whole task; and its order."""
+"""Invariants (conditions that must never or always hold during stages or a task), and the order of stages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from visup.tasks.supervision.snapshot import TaskSnapshot
 def broken_since(
     model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[float | None, ...]:
-    """Since when each invariant has been broken, or None; an unobserved one counts as kept."""
+    """Time since when each invariant has been broken, seconds, or None; an unobserved one counts as kept."""
     before = memory.broken_since
     if not memory.activity.reportable:
         return (None,) * len(before)  # invariants do not apply while the task is not in progress
@@ -71,9 +71,9 @@ def violation(
 
     Args:
         model: The task.
-        broken: Since when each invariant has been broken.
-        now: Seconds.
-        safety: Whether to consider safety invariants, or the others.
+        broken: Time since when each invariant has been broken, seconds, or None.
+        now: Current time, seconds.
+        safety: Whether to consider the invariants of safety (`is_of_safety`), or the others.
     """
     for invariant, since in zip(model.task.invariants, broken, strict=True):
         if since is None or now - since < patience(model, invariant):
@@ -102,17 +102,17 @@ def order_violation(
     posterior: TaskHypotheses | None,
     before: OrderViolation | None,
 ) -> OrderViolation | None:
-    """A later step that is done before what must come first, until it has been undone; or None.
+    """A later step that was done before a step that must come first, until it has been undone; or None.
 
-    Only steps count that end once they have held, of actors of whom nothing was required before: what a
-    stage has left behind may go on, and may come back. And they must be work: that two are apart, as a later
-    stage requires, is so before anything is done.
+    Only some steps are considered (`MonitoredPhases.later`): they must end once they have held, and must not
+    be true before anything is done, such as that two objects are apart. Nor may anything have been required
+    of their actors before, since the action of an earlier stage may continue or recur.
 
     Args:
         model: The task.
         snapshot: The present observation.
         posterior: The hypotheses; None while the task has not begun.
-        before: What was out of order in the previous step.
+        before: The violation of the previous step, or None.
     """
     if before is not None and snapshot.observe(before.step).holds is not Truth.FALSE:
         return before
@@ -155,7 +155,7 @@ def _next(model: MonitoredPhases, node: int) -> Iterator[TaskStep]:
 def _done_since(
     model: MonitoredPhases, snapshot: TaskSnapshot, step: TaskStep, entered: float
 ) -> bool:
-    """Whether a step holds since some time after another, for as long as it should."""
+    """Whether a step began to hold well after `entered` (seconds), and has held long enough to be done."""
     held_by = snapshot.observe(step).held_by
     if held_by is None or held_by.since <= entered + BEFORE_S:
         return False

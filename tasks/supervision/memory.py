@@ -31,20 +31,20 @@ class TaskMemory:
         interrupted: Why the task was interrupted, or empty; permanent, unless an unexpected object turns out
             to be one of the actors.
         strangers: The unexpected objects that interrupted the task.
-        strange_since: Since when objects have been unexplained, by id.
-        broken_since: Since when each invariant has been broken, or None.
-        rival: A better casting that would change bindings, by actor; may be empty.
-        rival_since: Since when it has been better.
+        strange_since: (object id, time since when it has been unexplained in seconds).
+        broken_since: Time since when each invariant has been broken, seconds, or None.
+        rival: A better casting that would change bindings: object id by actor; may be empty.
+        rival_since: Time since when it has been better, seconds.
         kept: State of its facts: how long they have held, and when they paused work.
         activity: Whether it is in progress, if several tasks are given.
         gain: Latest evidence per second that it is in progress.
         inferred: Time of the last inference of whether it is in progress, seconds.
-        looks: Observations while an actor is missing, to be replayed once it is found.
-        akin: Unknown objects present from the start, or that once held an actor: the rest of a machine of
-            which only a part is known, or who works there, is not unexpected.
+        looks: Past observations while an actor is missing, to be replayed once it is found.
         violated: The invariant about one object by which the task has failed, or empty.
-        order_violation: What was done before its turn and has not been undone, or None.
-        forbidden: Whether a broken invariant interrupted it, which is final: its stages go on no further.
+        akin: Ids of unknown objects that are not unexpected, since they were present from the start or once
+            held an actor: the rest of a machine of which only a part is known, or a person who works there.
+        forbidden: Whether a broken invariant interrupted it, which is final: its stages no longer change.
+        order_violation: The step that was done before its turn and has not been undone, or None.
     """
 
     time: float

@@ -38,14 +38,14 @@ from visup.tasks.verification.step_monitor import BAD, Moment
 LEAST = 1e-13  # hypotheses with less mass are dropped
 
 Requirement = tuple[tuple[str, ...], tuple[str, ...]]
-"""Actors, and the required relations between them."""
+"""(actors, relations): the relations that are required between these actors."""
 
 
 MOST_LATER = 40
-"""Most later steps of a node that are watched for being done before their turn, the nearest ones."""
+"""Most later steps of a node, nearest first, that are watched for being done before their turn."""
 
 CARRIES = ("moving_together", "coupled")
-"""Relations of a carrier to what it carries."""
+"""Relations of a carrier to the object that it carries."""
 
 
 SupervisionFilter = TaskFilter[int, TaskHypothesis, Observe]
@@ -59,8 +59,8 @@ class MonitoredPhases:
     Attributes:
         task: The task.
         actions: Meanings of its actions, with those of comparisons and zones (see `task_vocabulary`).
-        settings: Patience.
-        looks: Evaluates facts that are no plain relations of the mind.
+        settings: Time constants and thresholds.
+        looks: Evaluators of facts that are not relations of the mind.
         rhythms: Periodic actions.
         hmm: The probabilities of the model.
     """
@@ -118,8 +118,8 @@ class MonitoredPhases:
     def requirements(self, node: int) -> tuple[Requirement, ...]:
         """Requirements at a node of the automaton: actors, and relations between them.
 
-        For each active step the relations by which it holds and that it expects, for each possible next one
-        those by which it begins. Who carries something there comes there as well.
+        For each active step the relations by which it holds and that it expects; for each possible next one
+        those by which it begins; and what these imply for carriers (`brought_along`).
         """
         if node not in self._requirements:
             asked = tuple(self._required(node))
@@ -133,8 +133,8 @@ class MonitoredPhases:
     def later(self, node: int) -> tuple[TaskStep, ...]:
         """The next steps after a node that would be out of turn if they were done now, at most `MOST_LATER`.
 
-        These end once they have held, and require something: that two are apart is so before anything is
-        done. What may have been so before its turn is none.
+        These end once they have held, and take work: that two objects are apart, say, is true before anything
+        is done. Steps that may have been satisfied before their turn are left out.
         """
         if node not in self._later:
             found = (s for s in later_steps(self.automaton, (node,)) if self._is_work(s))
@@ -179,8 +179,8 @@ class MonitoredPhases:
     ) -> Iterator[tuple[TaskStep, Relation]]:
         """Steps awaited by some hypothesis that have now held for a whole look (`look_s`).
 
-        By then any hypothesis that can advance to them has; a single hypothesis has nothing to be compared
-        to.
+        By then any hypothesis that can advance to them has done so. None for a single hypothesis, which has
+        no alternative to be weighed against.
         """
         if len(posterior.hypotheses) == 1:
             return
@@ -284,7 +284,7 @@ class MonitoredPhases:
 
 
 def brought_along(asked: Sequence[Requirement]) -> Iterator[Requirement]:
-    """What follows for carriers: who carries something to a third one nears that one as well.
+    """The requirements implied for carriers: a carrier approaches the place to which it brings an object.
 
     Args:
         asked: The requirements of some steps.

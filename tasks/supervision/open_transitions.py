@@ -19,7 +19,7 @@ from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.step_monitor import BAD, StepMonitor, entered
 
 FIRST_LOOK_S = 0.5
-"""Delay after the first frame, seconds, until which relations present from the start are recognised."""
+"""Time after the first frame within which relations that hold from the start are recognised, seconds."""
 
 Target = tuple[Transition, tuple[TaskStep, ...], State[int] | None]
 """A transition, the steps that it begins, and its target state; None at the end."""
@@ -58,12 +58,12 @@ class OpenTransition:
 
     @property
     def waits(self) -> bool:
-        """Whether it begins another round while all that the last one required may still hold."""
+        """Whether it begins another round while the actions of the last one may still hold."""
         return self.again and all(goes_on(s, self.left) for s in self.entered)
 
     @property
     def turn(self) -> float | None:
-        """When the last of the stages that it completes began, or None if that was not observed."""
+        """When the last of the stages that it completes began, seconds; None if that was not observed."""
         begun: dict[str, float] = {}
         for leaf in self.left:
             stage, since = leaf.step.stage, leaf.payload.begun
@@ -91,12 +91,12 @@ class OpenTransition:
 
 
 def goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
-    """Whether a step requires an action that already holds: it can begin only after that has ended."""
+    """Whether a step repeats a completed one whose action has not ceased: it must cease first."""
     return any(step.same_as(x.step) and not x.payload.ceased for x in left)
 
 
 def earliest_end(left: Leaf[StepMonitor]) -> float:
-    """The earliest time at which a completed step can have ended."""
+    """The earliest time at which a completed step can have ended, seconds."""
     monitor = left.payload
     if left.step.hold_s is not None and monitor.fulfilled_at is not None:
         return monitor.fulfilled_at
@@ -104,15 +104,15 @@ def earliest_end(left: Leaf[StepMonitor]) -> float:
 
 
 def missed(monitor: StepMonitor, seen: ActionObservation, since: float, now: float) -> StepMonitor:
-    """The monitor of a step whose turn comes since what leads to it is over, without success.
+    """The monitor of a step that should have begun when its approach ended, but did not.
 
     It fails at once if its contrary is observed.
 
     Args:
-        monitor: The monitor of a step that begins now.
+        monitor: The monitor of a step whose turn comes now.
         seen: Its observation.
-        since: Since when that is over, seconds.
-        now: Seconds.
+        since: Time when the approach (or carrying) ended without reaching its goal, seconds.
+        now: Current time, seconds.
     """
     monitor = replace(monitor, entered=since, begun=now)
     if seen.contrary is None:
@@ -164,7 +164,7 @@ class OpenTransitions:
         Args:
             state: The state.
             node: Its number.
-            now: Seconds, from which each `within` counts.
+            now: Time from which each `within` counts, seconds.
         """
         here = leaves(state)
         return [

@@ -1,9 +1,9 @@
 """Replays recent observations when an actor is identified late.
 
-While an actor of a task is missing, past looks (observations) are stored, thinned out and for a limited time.
-When an object is found to be the actor, they are replayed with it: the task filter restarts from its belief
-at the beginning of that time and processes each look with the casting known now. So nothing is counted twice,
-and a stage that has passed meanwhile is judged by its observations.
+While an actor of a task is missing, past beliefs of the mind (*looks*) are stored, thinned out and for a
+limited time. When an object is found to be the actor, they are replayed with it: the task filter restarts
+from its posterior at the beginning of that time and processes each look with the bindings known now. So
+nothing is counted twice, and a stage that has passed meanwhile is judged by its observations.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def remembered(
 
 
 def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -> bool:
-    """Whether an actor was found to be an object that was present before."""
+    """Whether an unbound actor has been bound to an object that was present before."""
     was = {b.actor: b.object_id for b in before}
     found = [b.object_id for b in now if b.object_id is not None and was.get(b.actor) is None]
     return any(i in mind.objects and mind.objects[i].first_seen < mind.time for i in found)

@@ -36,7 +36,7 @@ def evidence(
         step: The step.
         meaning: Its action.
         monitor: Its monitor.
-        now: Seconds.
+        now: Current time, seconds.
         actions: All actions, for their wording.
     """
     who, alone = names(step.actors), len(step.actors) < 2
@@ -83,10 +83,10 @@ def outcome(
         step: The step.
         meaning: Its action.
         monitor: Its monitor.
-        now: Seconds.
-        followed: Since when each next step has been observed, which limits the reported interval of an action
-            that lasts until then.
-        denied: Since when the action has been contradicted, or None.
+        now: Current time, seconds.
+        followed: Time since when each next step has been observed, seconds; limits the reported interval of
+            an action that lasts until then.
+        denied: Time since when the action has been contradicted, seconds, or None.
 
     Returns:
         DONE; FAILED if it ended before its `for` was satisfied, after its deadline, or while contradicted;
@@ -178,7 +178,7 @@ def lasted(
 
 
 def _first_known(monitor: StepMonitor) -> float:
-    """When a step first held, before that was recognised (`begun`)."""
+    """The earliest known time at which a step held or progressed, seconds; minus infinity if unknown."""
     known = (t for t in (monitor.begun, monitor.helped_since) if t is not None)
     return min(known, default=-math.inf)
 
@@ -191,7 +191,7 @@ def last_held(
     Args:
         meaning: Its action.
         monitor: Its monitor.
-        now: Seconds.
+        now: Current time, seconds.
         followed: See `outcome`.
     """
     over = now if monitor.helped_at is None else monitor.helped_at

@@ -52,14 +52,15 @@ class TaskSnapshot:
 
     def observe(self, step: TaskStep) -> ActionObservation:
         """The present observation of a step."""
-        # By identity, since steps are asked for a hundred times a frame; what is kept keeps its number.
+        # Cached by identity, which is fast, as steps are requested about a hundred times per frame. The step
+        # is stored as well, so that its id is not reused.
         found = self._observed.get(id(step))
         if found is None:
             found = self._observed[id(step)] = step, self._judge(step)
         return found[1]
 
     def _judge(self, step: TaskStep) -> ActionObservation:
-        """The observation of a step, with the conditions of its own if it has any."""
+        """The observation of a step, with the conditions that the course states for it."""
         if not step.conditions:
             return self._required(step)
         if self.pauses.now(step.pauses) is not None:
@@ -68,7 +69,7 @@ class TaskSnapshot:
         return self._conditions.apply(step, seen)
 
     def _required(self, step: TaskStep) -> ActionObservation:
-        """The observation of a required action; what came to a body that hides it now touches it."""
+        """The observation of a required action; an object that vanished into another one touches it."""
         seen = self._look(step.action, step.actors).settled
         if seen.holds is not Truth.UNKNOWN or "touching" not in self._actions[step.action].holds:
             return seen

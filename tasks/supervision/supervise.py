@@ -84,7 +84,7 @@ def task_reasoner(
     Args:
         tasks: Checked tasks (see `parse_task`). A single one is assumed to be in progress; of several it is
             inferred which are (see `task_inference.py`), and the others are not reported.
-        settings: Patience and thresholds.
+        settings: Time constants and thresholds.
         actions: Meanings of actions; None for all known ones, including those of plug-ins.
 
     Returns:
@@ -167,8 +167,8 @@ def _blank(model: MonitoredPhases, now: float, activity: TaskActivity) -> TaskMe
 def _due(memory: TaskMemory, now: float) -> bool:
     """Whether a task is updated in this step.
 
-    A reported task is, in each step. The others are updated together, so that no rival has an advantage, at a
-    lower rate, which delays their reports accordingly.
+    A reported task is updated in each step. The others are updated at a lower rate, which delays their
+    reports accordingly, and all at the same time, so that no rival has an advantage.
     """
     return memory.activity.reportable or not 0.0 < now - memory.time < UNREPORTED_S - 1e-9
 
@@ -217,7 +217,7 @@ def _with_activity(
     if memory.activity.begun and not activity.begun:
         posterior = None  # a rival has ended; later observations do not belong to it
     if posterior and any(x.payload.status in BAD for x in leaves(posterior.likeliest.state)):
-        posterior = None  # if it begins later, it begins from its beginning
+        posterior = None  # if it is in progress later, it starts from its first stage
     memory = memory if posterior is memory.posterior else replace(memory, looks=())
     belief = suppressed(belief, activity)
     return replace(memory, activity=activity, belief=belief, posterior=posterior, inferred=now)

@@ -1,7 +1,7 @@
 """Which of several tasks are in progress, inferred from how well each explains the observations.
 
 The evidence for a task is the log-likelihood ratio of the observations of its actions, in progress against
-not in progress (`MonitoredPhases.gain`). It fades, so that a task completed long ago does not block others.
+not in progress (`MonitoredPhases.gain`). It decays, so that a task completed long ago does not block others.
 Tasks that share an object are rivals: at most one of them is in progress. That none is in progress is an
 alternative until one has been believed; after that a task that goes badly is failing rather than never begun,
 unless a rival explains the observations better.
@@ -27,7 +27,7 @@ IDLE = 3.0
 """Prior odds that none of some rivals is in progress, per rival."""
 
 SURE = 0.9
-"""Probability of a task from which on the alternative that none is in progress is excluded."""
+"""Total probability of some rivals from which the alternative that none is in progress is excluded."""
 
 REPORTABLE = 0.3
 """A task less likely than this is not reported."""
@@ -107,7 +107,7 @@ def updated_activities(
 def _rivalling(
     before: Sequence[TaskActivity], gains: Sequence[float], dt: float
 ) -> Iterator[TaskActivity]:
-    """The same for rivals of which none has ended."""
+    """The updated activities of rivals of which none has ended; see `updated_activities`."""
     if not before:
         return
     begun = any(a.begun for a in before)
@@ -125,14 +125,19 @@ def _rivalling(
 
 
 def _counted(gains: Sequence[float], begun: bool) -> Sequence[float]:
-    """Negative evidence counts against a believed task only while a rival gains."""
+    """The evidence that counts: if a task is believed in, negative evidence only while some rival gains."""
     if not begun or max(gains) > 0.0:
         return gains
     return [0.0] * len(gains)
 
 
 def shares(evidence: Sequence[float], none: bool) -> list[float]:
-    """The probability of each of some rivals; with `none` they may sum to less than 1."""
+    """The probability of each of some rivals, from their log evidence.
+
+    Args:
+        evidence: Log-likelihood ratio of each.
+        none: Whether none of them may be in progress, so that the probabilities sum to less than 1.
+    """
     top = max(*evidence, 0.0) if none else max(evidence)
     masses = [math.exp(e - top) for e in evidence]
     idle = IDLE * len(masses) * math.exp(-top) if none else 0.0

@@ -1,10 +1,12 @@
 """Verification of one active step: observations of its action, and its status over time.
 
-Read in this order: `observe.py` (the current observation of an action), `passing.py` (outlines that meet
-while one body moves on), `stage_conditions.py` (conditions of the task on the beginning, end, progress and
-failure of a step), `step_monitor.py` (the status of a step over time), `recovery.py` (those who have come
-apart), `together.py` (actions joined by `&`), `setting_out.py` (motion onset), `reported.py` (relations of
-actors as reported), `step_model.py` (the likelihood of observations), `settings.py` (the time constants).
+Read in this order: `observation.py` and `observe.py` (the current observation of an action), `passing.py`
+(contact as opposed to passing by), `sudden.py` (trends that have just set in), `stage_conditions.py`
+(conditions of the task on the beginning, end, progress and failure of a step), `pauses.py` (working time),
+`step_monitor.py` (the status of a step over time), `recovery.py` (when a failing step has recovered),
+`together.py` (actions joined by `&`), `setting_out.py` (motion onset), `dating.py` (the onset of a stage),
+`reported.py` (relations that were reported), `step_model.py` (the likelihood of observations), `settings.py`
+(the time constants).
 """
 
 from visup.tasks.verification.observation import ActionObservation

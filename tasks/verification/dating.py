@@ -1,8 +1,8 @@
-"""When a stage began, as it looks once its beginning is believed.
+"""Estimates when a stage began, once its beginning has been confirmed.
 
-What is seen of a beginning is believed late: a trend must stand out and last, a coupling must prove itself.
-So the time at which a stage is reported to have begun and the time at which it most probably began are two
-things. This module estimates the latter from what has been seen up to the report.
+Confirmation takes time: a trend must be significant and last, a coupling must pass a test. So a stage is
+reported to have begun later than it most probably did. This module estimates its onset from the observations
+up to the report.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.step_monitor import StepMonitor
 
 Objects = Callable[[tuple[str, ...]], tuple[int, ...]]
-"""Ids of the objects of actors."""
+"""Actors -> ids of their objects, without unbound ones."""
 
 DATED = frozenset({"converging", "diverging", "decoupled", "coupled", "gone", "present"})
-"""Relations that are believed later than they come about.
+"""Relations that are confirmed later than they set in, so that their onset is estimated.
 
-A contact is not among them: outlines meet before bodies do (0.4 s in the mean of rendered worlds), so that
-its report comes nearer to the truth than its onset."""
+A contact is not among them: outlines meet before bodies do (by 0.4 s on average in rendered worlds), so that
+the time of its report is more accurate than its apparent onset."""
 
 
 def stage_onset(
@@ -33,20 +33,20 @@ def stage_onset(
     now: float,
     window: SampleWindow,
 ) -> float:
-    """When a stage most probably began that is believed to have begun now.
+    """When a stage most probably began whose beginning has been confirmed now.
 
-    A stage begins with the last of its steps. It is dated back only if that one is believed late, and not
-    beyond the time at which the stage before it began, or had lasted as long as it should.
+    A stage begins with the last of its steps. It is dated back only if the action of that step is confirmed
+    late (`DATED`), and no further than to when the previous stage began, or had lasted as long as required.
 
     Args:
         leaves: Its active steps with their monitors.
         actions: Action definitions by name.
         objects: Gives the objects of actors.
-        now: Seconds.
+        now: Current time, seconds.
         window: The samples of the last seconds.
 
     Returns:
-        Seconds, at most the present time.
+        The onset in seconds, at most `now`.
     """
     found = [_onset(x, actions[x.step.action], objects, window) for x in leaves]
     last, late = max((f for f in found if f is not None), default=(now, False))
@@ -59,7 +59,7 @@ def stage_onset(
 def _onset(
     leaf: Leaf[StepMonitor], meaning: ActionDefinition, objects: Objects, window: SampleWindow
 ) -> tuple[float, bool] | None:
-    """When an observed step set in, and whether that is believed late; None if it was not observed."""
+    """The onset of an observed step, and whether it is confirmed late; None if it was not observed."""
     name, since = leaf.payload.helped_by, leaf.payload.helped_since
     if name is None or since is None:
         return None
@@ -68,7 +68,7 @@ def _onset(
 
 
 def _departure(name: str, ids: tuple[int, ...], window: SampleWindow) -> float | None:
-    """When two began to draw nearer or apart, or None; what is no longer coupled draws apart."""
+    """When a trend between two objects set in, or None; that of `decoupled` is that they diverge."""
     trend = "diverging" if name == "decoupled" else name
     if trend not in TRENDS or len(ids) != 2:
         return None

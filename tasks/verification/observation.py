@@ -1,4 +1,4 @@
-"""The observation of an action at one moment, and what is kept of its facts until the next."""
+"""Records: the observation of an action at one moment, and the state of facts between moments."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class ActionObservation:
         observed: Whether anything is known about it; False while an actor is not found or its object
             is hidden.
         sudden: A trend by which it begins that has just set in, and has not lasted yet, or None.
-        round: Whether its entry is a trend between two of which one goes round the other.
+        round: Whether its entry is a trend that is due to one actor moving around the other.
         paused: Whether the work on it is paused: then there is no observation of it.
         pauses: All pauses of the task so far.
         absent: Whether one of its actors is optional and has no object: then the step is not due.
-        moves_on: Whether it is a contact at which neither has slowed down yet.
-        unreached: Since when it is an approach, or carrying, that is over without what it was for, or None.
-        distance: Gap of its two actors, pixels; None if unknown, or if it has not two.
-        carried_past: Whether it would begin by a contact, but one of the two is known now to be carried past.
+        moves_on: Whether it holds by a contact at which neither body has slowed down yet.
+        unreached: Time since when an approach, or carrying, is over without having reached its goal, or None.
+        distance: Gap between the outlines of its two actors, pixels; None if unknown, or without two actors.
+        carried_past: Whether it would begin by a contact, but one actor is only carried past the other.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -61,7 +61,7 @@ class ActionObservation:
 
     @property
     def settled(self) -> ActionObservation:
-        """What counts for a stage: no contact of two of which one moves on past the other."""
+        """The observation that counts for a stage: without a contact at which neither body slows down."""
         if not self.moves_on:
             return self
         return replace(self, holds=Truth.UNKNOWN, held_by=None, helps=None, entry=None)
@@ -86,8 +86,8 @@ class Kept:
     """State of the facts of a task at one moment, for the next.
 
     Attributes:
-        time: Seconds of that moment, or None before the first.
-        lasting: Since when each fact that is no plain relation of the mind has been true, by key.
+        time: Time of that moment, seconds; None before the first.
+        lasting: (key, time since when it has been true) of each fact that is not a relation of the mind.
         beats: Occurrences of periodic facts, by key.
         pauses: All pauses so far.
     """

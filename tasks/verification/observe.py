@@ -1,4 +1,4 @@
-"""Observation of one action at one moment: the relations for and against it."""
+"""The observation of one action at one moment: the relations for and against it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ CARRIED_SPEED = 0.005
 """Least speed at which coupled objects count as moving together, image diagonals per second."""
 
 REST_S = 0.3
-"""How long a relative speed must be low before one body that passed the other rests there."""
+"""How long the relative speed must be low for a body that passed another one to rest there, seconds."""
 
 
 class RelationLookup:
@@ -56,7 +56,7 @@ class RelationLookup:
 
     Args:
         mind: The mind; also an attribute.
-        looks: Evaluators of facts that are no plain relations of the mind (see `task_vocabulary`).
+        looks: Evaluators of facts that are not relations of the mind (see `task_vocabulary`).
         before: The state of the previous moment.
         rhythms: Periodic facts, by key.
     """
@@ -115,7 +115,7 @@ class RelationLookup:
         return derived or found or Relation(name, objects, Truth.UNKNOWN, self.mind.time)
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
-        """Whether one body has come to rest at the other, though it may be out of sight since it passed."""
+        """Whether one body has come to rest relative to the other, even if it is out of sight since."""
         speed = kinematics(self.mind).pair("relative_speed", *objects)
         slow = speed < ContactSettings().passing * image_diagonal(self.mind.frame_size)
         rest = self.lasting(
@@ -137,9 +137,9 @@ class RelationLookup:
     def unreached(
         self, action: str, objects: tuple[int, ...], contrary: Relation | None
     ) -> float | None:
-        """Since when an approach or carrying is over without what it was for, or None.
+        """Time since when an approach or carrying is over without having reached its goal, or None.
 
-        One has gone past the other, or what was carried has been put down.
+        One body has passed the other, or the carried one has been put down.
         """
         ways = {"moving_together": (objects, objects[::-1]), "converging": (objects,)}
         if any(put_down(self.mind, way) for way in ways.get(action, ())):
@@ -154,22 +154,22 @@ class RelationLookup:
         """The first true one of some relations, and a sudden trend among them; each may be None."""
         entry = self.first_true(names, objects)
         if entry is not None and entry.name == "coupled" and gapes(self.mind, *objects):
-            return None, None  # it is about to be doubted
+            return None, None  # there is a gap: the coupling will soon be doubted
         if entry is not None:
             return (None if self._sudden.ends(entry) else entry), None
         sudden = self._sudden.first(names, objects)
         return sudden, sudden
 
     def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:
-        """Whether a trend is rather one going round the other; False if unknown."""
+        """Whether a trend is due to one body moving around the other; False if unknown."""
         return goes_round(self.mind, trend, objects)
 
     def explains_away(self, trend: Relation, action: str, objects: tuple[int, ...]) -> bool:
         """Whether a trend contradicts an action only in appearance.
 
-        A body that passes over or round another recedes from it a little; and after two have met, closing
-        fingers or a rotating body move the outlines while the bodies stay in contact. What is coupled
-        moves together, however its outlines drift.
+        A body that passes over or around another one recedes from it a little. After two bodies have met,
+        closing fingers or a rotating body change the gap of the outlines while the bodies stay in contact.
+        Coupled bodies move together, however their outlines drift.
         """
         if trend.name not in TRENDS:
             return False
@@ -182,7 +182,7 @@ class RelationLookup:
 
     @property
     def time(self) -> float:
-        """Seconds of this moment."""
+        """Time of this moment, seconds."""
         return self.mind.time
 
     @cached_property
@@ -222,7 +222,7 @@ class RelationLookup:
         return Kept(self.time, tuple(lasting.items()), tuple(beats.items()), pauses)
 
     def _rhythm_relation(self, rhythm: Rhythm, name: str, objects: tuple[int, ...]) -> Relation:
-        """Whether a periodic fact keeps its rhythm, or is late."""
+        """The relation that a periodic fact keeps its rhythm, or is late, depending on `rhythm`."""
         key = f"{rhythm.key} {objects}"
         if key not in self._beats:
             held_by = self.first_true(rhythm.holds, objects)
@@ -316,7 +316,7 @@ Derive = Callable[[Mind, RelationLookup, tuple[int, ...]], Relation | None]
 def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     """Coupled according to the mind's couplings, when it has no relation of that name."""
     if mind.relation("coupled", *ids) is not None:
-        return None  # it is in doubt
+        return None  # the relation is in doubt, which prevails
     pair = tuple(sorted(ids))
     since = next((c.since for c in mind.couplings if c.objects == pair), None)
     return None if since is None else Relation("coupled", ids, Truth.TRUE, since)
@@ -329,8 +329,8 @@ def _decoupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> R
 def _moving_together(
     mind: Mind, relations: RelationLookup, ids: tuple[int, ...]
 ) -> Relation | None:
-    """Moving together when they are coupled and on the move, however much one of them sways."""
-    # One that is cut by the border, or hidden, moves as the other does.
+    """Moving together: they are coupled and the slower one moves, however much the other sways."""
+    # The speed of a body that is hidden, or cut by the border, may be unknown: it moves as the other does.
     speeds = [kinematics(mind).one("speed", i) for i in ids]
     slower = min((speed for speed in speeds if not math.isnan(speed)), default=0.0)
     moves = slower > CARRIED_SPEED * image_diagonal(mind.frame_size)

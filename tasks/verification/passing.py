@@ -1,7 +1,7 @@
-"""Outlines that meet in the image although the bodies do not touch: one moves on past the other.
+"""Outlines that meet in the image although the bodies are not in contact: one passes the other.
 
-What is carried touches where it comes to rest, or where it is let go of; until then its outline may pass over
-everything in its way.
+A carried body is in contact with another one where it comes to rest, or where it is released; until then its
+outline may pass over anything in its way.
 """
 
 from __future__ import annotations
@@ -27,23 +27,24 @@ LEAST_PATH = 0.05
 """Least length of a path past another body, image diagonals."""
 
 STRAIGHT = 0.85
-"""Least distance of its ends as a share of its length: who turns back comes near where he was."""
+"""Least distance between the ends of such a path, as a share of its length; less for a body that turns
+back."""
 
 STILL_MOVING = 0.5
-"""Least speed at the end of such a path, as a share of the mean one."""
+"""Least speed in the last third of such a path, as a share of the mean speed."""
 
 BEYOND = 0.2
-"""Least share of such a path that lies beyond the nearest point."""
+"""Least share of such a path that lies beyond the point nearest to the other body."""
 
 RADIAL_SHARE = 0.45
 """Least rate of change of distance, as a share of the relative speed, that counts as a trend; for a body that
-flies round another it reaches 0.4."""
+flies around another one it reaches 0.4."""
 
 RESTED_S = 0.6
-"""How long what is put down has rested, seconds."""
+"""How long a body must have rested to have been put down, seconds."""
 
 LET_GO_GAP = 0.01
-"""Gap of two coupled bodies from which on one has let go of the other, image diagonals."""
+"""Gap between coupled bodies from which one has released the other, image diagonals."""
 
 MEETING_PX = 1.0
 """Gap below which outlines meet, pixels."""
@@ -56,8 +57,8 @@ def goes_past(
 
     Args:
         mind: The mind.
-        objects: Two objects whose outlines meet.
-        rests: Whether one of two has come to rest at the other.
+        objects: Ids of two objects whose outlines meet.
+        rests: Whether two objects are at rest relative to each other.
     """
     contact = _contact(mind, objects)
     if contact is not None and contact.in_front:
@@ -66,18 +67,19 @@ def goes_past(
         on = contact is not None and (contact.passing or not contact.known)
         if not all(gapes(mind, *other) for other in held):
             return on
-        # What is let go of falls onto what it met, unless it has crossed that by more than its own size.
+        # A released body falls onto the one that it met, unless it has moved across that by more than the
+        # size of the smaller one.
         return on and contact is not None and contact.path > smaller_size(objects, mind)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
 
 
 def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether one of two whose outlines meet has not slowed down at the other, as far as is known.
+    """Whether the outlines of two bodies meet, but neither is known to have slowed down at the other.
 
-    What touches another body is stopped by it, or takes it along. Seen from above, outlines meet long
-    before a boat is alongside; so a stage that consists of a contact has not begun until then. An invariant
-    does not wait for it: what must not touch may do so at full speed. Nor does what is carried, which has
-    a rule of its own (`goes_past`).
+    A body that touches another one is stopped by it, or takes it along. Seen from above, outlines meet long
+    before a boat is alongside; so a stage that consists of a contact has not begun until it slows down. This
+    does not apply to invariants, since bodies that must not touch may collide at full speed, nor to carried
+    bodies, which have a rule of their own (`goes_past`).
     """
     contact = _contact(mind, objects)
     unsettled = contact is not None and contact.settled_since is None
@@ -85,11 +87,15 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
 
 
 def went_past(mind: Mind, recession: Relation) -> bool:
-    """Whether one of two that recede has just gone past the other and moves on, rather than turned back.
+    """Whether one of two receding bodies has just passed the other and moves on, rather than turned back.
 
-    Then their relative path of the last second or so is straight, its nearest point lies well within it,
-    and they have receded since then: an outline that leaps later, as parts of a body go out of view, is no
-    passage. What is carried past something may be on a detour.
+    It has if their relative path of the last second or so is straight, its point nearest to the other body
+    lies well within it, and they have receded since then. (A jump of the outline later, when parts of a body
+    go out of view, is not a passage.) False for a carried body, which may be on a detour.
+
+    Args:
+        mind: The mind.
+        recession: The relation that the two recede.
     """
     objects = recession.objects
     if len(objects) != 2 or holds_on(mind, objects):
@@ -111,16 +117,16 @@ def went_past(mind: Mind, recession: Relation) -> bool:
 
 
 def goes_round(mind: Mind, trend: str, objects: tuple[int, ...]) -> bool:
-    """Whether a trend is rather one of two going round the other now; False if unknown."""
+    """Whether a trend is due to one body moving around the other now; False if unknown."""
     now, pair = kinematics(mind), (objects[0], objects[1])
     rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
     return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
 
 
 def went_round(mind: Mind, trend: Relation) -> bool:
-    """Whether a trend was one of two going round the other, who may have come to rest since.
+    """Whether a trend was due to one body moving around the other, even if it has come to rest since.
 
-    Then the gap has changed by little of the way that one went past the other since it began.
+    It was if the gap has changed little, compared with their relative displacement since the trend began.
     """
     window, objects = sample_window(mind), trend.objects
     if not set(objects) <= set(window.ids):
@@ -137,9 +143,9 @@ def went_round(mind: Mind, trend: Relation) -> bool:
 
 
 def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether the first of some objects rests, and all that held it have let go of it just now.
+    """Whether the first of some objects has just been put down: it rests, and all that held it released it.
 
-    What is dropped falls first.
+    It must rest, since an object that is dropped falls first.
     """
     first, window = objects[0], sample_window(mind)
     held = {pair: at for pair, at in _held(mind).items() if first in pair}
@@ -151,12 +157,12 @@ def put_down(mind: Mind, objects: tuple[int, ...]) -> bool:
     path = path[~np.isnan(path).any(axis=1)]
     rests = len(path) > 1 and float(np.ptp(path, axis=0).max()) < least
     opened = all(_opened(window, pair, recent) > least for pair in held)
-    # An outline that leaps opens a gap, too, but nobody moves.
+    # Decoupling is required as well, since a jump of an outline also opens a gap.
     return rests and opened and all(mind.truth("coupled", *p) is not Truth.TRUE for p in held)
 
 
 def _held(mind: Mind) -> dict[tuple[int, ...], float]:
-    """The pairs that are coupled, or were until a moment ago, and until when, seconds."""
+    """Pairs that are coupled, or were at most `RESTED_S` ago -> until when, seconds."""
     held: dict[tuple[int, ...], float] = {c.objects: mind.time for c in mind.couplings}
     for pair, evidence in mind.recall(COUPLING).items():
         parted = evidence.decoupled_at
@@ -166,7 +172,7 @@ def _held(mind: Mind) -> dict[tuple[int, ...], float]:
 
 
 def _opened(window: SampleWindow, pair: tuple[int, ...], recent: NDArray[np.bool_]) -> float:
-    """By how much the gap of two bodies has grown lately, pixels; 0 if unknown."""
+    """Growth of the gap between two bodies since its minimum in the recent samples, pixels; 0 if unknown."""
     if not set(pair) <= set(window.ids):
         return 0.0
     i, j = (window.ids.index(o) for o in pair)
@@ -186,10 +192,10 @@ def _centres(mind: Mind, body: int) -> Floats:
 
 
 def vanished_into(mind: Mind, objects: tuple[int, ...]) -> float | None:
-    """Since when one of two has been hidden by the other, to which it came: a parcel in a bin; or None.
+    """Time since when one of two objects has been hidden by the other, which it approached; None otherwise.
 
-    *Approximation*: it may also have gone behind it. So this counts where a stage requires the contact, and
-    never against a task.
+    It counts as contact: a parcel has been dropped into a bin. *Approximation*: it may also have gone behind.
+    Therefore this is used where a stage requires the contact, and never against a task.
     """
     if len(objects) != 2:
         return None
@@ -201,21 +207,25 @@ def vanished_into(mind: Mind, objects: tuple[int, ...]) -> float | None:
 
 
 def stopped_at(mind: Mind, objects: tuple[int, ...]) -> float:
-    """When one of two whose outlines meet ceased to pass the other, seconds; minus infinity if it did not."""
+    """When one of two bodies ceased to pass the other, seconds; minus infinity if it still does.
+
+    Also minus infinity if their outlines do not meet.
+    """
     contact = _contact(mind, objects)
     return -math.inf if contact is None or contact.passing else contact.changed_at
 
 
 def holds_on(mind: Mind, objects: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """The couplings of one of two bodies to a third one."""
+    """The couplings (pairs of ids) of either of two bodies to a third one."""
     pair = set(objects)
     return [c.objects for c in mind.couplings if len(pair & set(c.objects)) == 1]
 
 
 def came_apart(mind: Mind, objects: tuple[int, ...]) -> Relation | None:
-    """That two have been decoupled and are apart, or None: what is left behind is carried no longer.
+    """The relation `decoupled` of two bodies that were coupled, are apart now, and do not move together.
 
-    It may well stay as near as it is: a gripper goes after what it has dropped.
+    None otherwise. It contradicts `moving_together` where no diverging trend does, since the two may stay
+    near each other: a gripper goes after an object that it has dropped.
     """
     evidence = mind.recall(COUPLING).get((min(objects), max(objects)))
     apart = {mind.truth(name, *objects) for name in ("touching", "coupled")} == {Truth.FALSE}
@@ -227,9 +237,9 @@ def came_apart(mind: Mind, objects: tuple[int, ...]) -> Relation | None:
 
 
 def still_meet(mind: Mind, objects: tuple[int, ...]) -> bool:
-    """Whether two are in contact and their outlines meet, whatever the extents of these do.
+    """Whether two bodies are in contact and their outlines still meet, so that an observed trend is spurious.
 
-    Fingers that close, and an arm that comes further into view, seem to recede from what they hold.
+    Fingers that close, and an arm that comes further into view, seem to recede from the object they hold.
     """
     gap = gap_between(mind, objects)
     touches = mind.truth("in_contact", *objects) is Truth.TRUE

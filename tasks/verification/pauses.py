@@ -1,7 +1,7 @@
-"""Pauses of work, and elapsed time without them.
+"""Pauses of work, and working time: elapsed time without pauses.
 
-Times stay those of the recording, so that reports of them are correct. Durations are working time: the
-spans in which a pause condition held are left out.
+Points in time are those of the recording, so that they are reported correctly. Durations are working time,
+without the spans in which a pause condition held.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Pause:
         condition: The condition.
         spans: Pauses caused by it, in order.
         paused: Whether it pauses work now.
-        since: Since when the condition holds, if it pauses now, seconds.
-        known: When it was last observed, seconds.
+        since: Time since when the condition holds, if it pauses work now, seconds.
+        known: Time when the condition was last observed, seconds.
     """
 
     condition: StageCondition
@@ -44,7 +44,7 @@ class Pause:
         Args:
             seen: Whether the condition holds, and since when.
             before: Time of the previous update, seconds.
-            now: Seconds.
+            now: Current time, seconds.
             patience: How long a pause continues while its condition is not observed, seconds.
         """
         if seen.truth is Truth.UNKNOWN:

@@ -1,6 +1,6 @@
-"""Recovery of those who have come apart: together again, or on their way back.
+"""Recovery of a failing step: whether its actors, having separated, have come back far enough.
 
-What bobs on the water, or passes at a distance, draws nearer for a while as well; that mends nothing.
+A body that bobs on the water, or passes at a distance, also approaches for a while; that is not a recovery.
 """
 
 from __future__ import annotations
@@ -9,25 +9,30 @@ from visup.agent import Truth
 from visup.tasks.verification.observation import ActionObservation
 
 REGAINED = 0.5
-"""Greatest gap at which drawing nearer counts as recovery, as a share of the greatest since a step fails."""
+"""Greatest gap at which an approach counts as recovery, as a share of the greatest gap since the failure."""
 
 
 def farthest(before: float | None, seen: ActionObservation) -> float | None:
-    """The greatest gap of the actors of a failing step so far, pixels; None if unknown."""
+    """The greatest gap between the actors of a failing step so far, pixels; None if unknown.
+
+    Args:
+        before: The greatest gap before this observation.
+        seen: The observation.
+    """
     if seen.distance is None or before is None:
         return before if seen.distance is None else seen.distance
     return max(before, seen.distance)
 
 
 def regained(farthest_px: float | None, seen: ActionObservation) -> bool:
-    """Whether an action that helps is a recovery.
+    """Whether observed progress of a failing step counts as recovery.
 
     Args:
-        farthest_px: Greatest gap of its actors since the step fails, pixels; None if unknown.
+        farthest_px: Greatest gap between its actors since it fails, pixels; None if unknown.
         seen: The observation.
 
     Returns:
-        Whether it holds, or they have made good half of the way at least, or nothing is known of it.
+        True if the action holds, if the gap is at most half of the greatest, or if either gap is unknown.
     """
     if seen.holds is Truth.TRUE or farthest_px is None or seen.distance is None:
         return True

@@ -1,7 +1,8 @@
-"""Reported relations of actors with their end times: an incompatible one is never reported to begin sooner.
+"""Reported relations of actors with their end times, so that incompatible ones are not reported to overlap.
 
 Relations are detected late and backdated, so two incompatible ones may overlap by some tenths of a second.
-Each is correct by itself, but reported together they contradict each other. The first report prevails.
+Each is correct by itself, but reported together they contradict each other. The first report prevails: an
+incompatible relation is reported to begin no sooner than that ended.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 ReportedRelations = tuple[tuple[tuple[str, ...], str, float], ...]
-"""Actors in alphabetical order, a relation, and the time until which it was reported, seconds."""
+"""(actors in alphabetical order, relation, time until which it was reported in seconds) of each report."""
 
 _JOINED = frozenset({"coupled", "held_by", "moving_together"})
 _EXCLUDED: Mapping[str, frozenset[str]] = MappingProxyType(
@@ -51,6 +52,6 @@ def joined(parts: Iterable[ReportedRelations]) -> ReportedRelations:
 def since_reported(
     reported: ReportedRelations, actors: Iterable[str], relation: str, since: float
 ) -> float:
-    """The begin at which to report a relation, given the one that is known, seconds."""
+    """When to report that a relation began, given when it did (`since`), seconds."""
     who = tuple(sorted(actors))
     return max((since, *(t[2] for t in reported if t[0] == who and excludes(t[1], relation))))

@@ -1,8 +1,8 @@
-"""Motion onset: bodies that begin to move, as a whole or in part, relative to the camera's motion.
+"""Motion onset: bodies that begin to move, as a whole or in part, independently of the camera.
 
 The tip of an articulated body moves long before the whole: the centre of an arm hardly moves while its hand
-approaches. The support of the outline in each direction shows both. Motion common to all bodies is due to
-the camera, so each is compared with the median of the others.
+approaches. The support function of the outline (its extent in each direction) shows both. Motion common to
+all bodies is due to the camera, so each is compared with the median of the others.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ REACH = 0.012
 most 0.009 before anything moves, and a robot's by 0.03 within 0.6 s after it sets out."""
 
 FARTHER = 2.0
-"""A slow body moves by itself when it has come this many times as far as another: a swaying camera moves all
-bodies alike, but for parallax."""
+"""Least ratio of the change of a slow body's extent to that of some other body for it to move by itself: a
+swaying camera moves all bodies alike, but for parallax."""
 
 MOVING_SIGMAS = 3.0
 """Least speed of a moving body, in standard deviations of its velocity."""
@@ -73,9 +73,9 @@ def farther_than_others(window: SampleWindow) -> Marks:
 
 
 def reaching_out(window: SampleWindow, limit: float) -> Marks:
-    """Bodies whose outlines have just advanced somewhere, unlike the others.
+    """Bodies whose outlines have just advanced in some direction, unlike those of the others.
 
-    What moves advances on one side at least; what something else begins to cover only recedes.
+    The outline of a moving body advances on at least one side; that of a body being covered only recedes.
 
     Args:
         window: The last samples.

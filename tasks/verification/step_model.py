@@ -37,7 +37,14 @@ class StepModel:
     def looked_at(
         self, leaf: Leaf[StepMonitor], seen: ActionObservation, moment: Moment, done: bool
     ) -> Leaf[StepMonitor]:
-        """A step with its monitor updated, unless work is paused; `done` when the task is."""
+        """A step with its monitor updated by an observation, unless work is paused.
+
+        Args:
+            leaf: An active step.
+            seen: Its observation.
+            moment: Time of the observation.
+            done: Whether the task is completed.
+        """
         if seen.paused:
             return leaf
         # A `within` no longer matters once the task is done.
@@ -49,12 +56,12 @@ class StepModel:
     def held_before(
         self, leaf: Leaf[StepMonitor], seen: ActionObservation, held_by: Relation, now: float
     ) -> Leaf[StepMonitor]:
-        """A step that begins now, and held just before by a relation that is uncertain now."""
+        """A step that begins now, updated as if a relation still held that has just become uncertain."""
         then = replace(seen, observed=True, holds=Truth.TRUE, held_by=held_by, helps=held_by)
         return self.looked_at(leaf, then, Moment(now, 0.0), False)
 
     def together(self, state: State[StepMonitor], observe: Observe) -> State[StepMonitor]:
-        """A state in which actions joined by `&` have held only if they did at the same time."""
+        """The state with monitors corrected so that actions joined by `&` must have held at the same time."""
 
         def gap(step: TaskStep, since: float, until: float) -> float:
             return observe(step).elapsed(step, since, until) if until > since else 0.0
@@ -69,8 +76,8 @@ class StepModel:
     ) -> float:
         """Likelihood of `dt` seconds of the observations of all active steps; see `fit`.
 
-        What contradicts several actions that one stage requires is one event: a tug that leaves without its
-        cart neither moves together with it nor moves it. So it counts once.
+        An event that contradicts several actions of one stage counts once: a tug that leaves without its cart
+        neither moves together with it nor moves it.
         """
         active = leaves(state)
         failing = {x.step.stage for x in active if x.payload.status in BAD}
@@ -98,8 +105,8 @@ class StepModel:
         Args:
             leaf: An active step.
             seen: Its observation.
-            done: Whether the task is.
-            dt: Seconds.
+            done: Whether the task is completed.
+            dt: Duration of the observation, seconds.
             failing: Whether its stage fails, by this step or by another one that it requires as well.
         """
         if seen.paused:
@@ -119,7 +126,7 @@ class StepModel:
         return self.hmm.fit(ActionStatus.NEITHER, 1.0, dt)
 
     def over(self, leaf: Leaf[StepMonitor]) -> bool:
-        """Whether a step is over by itself, whatever comes next."""
+        """Whether a step is over by itself, without the next one having begun."""
         return over(leaf.payload, leaf.step, self.actions[leaf.step.action])
 
     def phase(self, leaf: Leaf[StepMonitor]) -> int:
@@ -144,5 +151,5 @@ class StepModel:
 
 
 def _counts(seen: ActionObservation) -> bool:
-    """Whether a contrary counts: holding outweighs it unless the course itself names it."""
+    """Whether a contrary counts: not while the action holds, unless the course itself states the contrary."""
     return seen.decisive or seen.holds is not Truth.TRUE

@@ -36,8 +36,8 @@ class StepMonitor:
 
     Attributes:
         entered: When the step was entered.
-        turn: Relations that became true before this are no evidence: the previous stage required the same,
-            or had not begun then.
+        turn: Time before which relations that became true are not evidence: the previous stage required the
+            same, or had not begun then.
         status: Current status.
         since: Since when it has that status.
         begun: When it was first observed to hold or progress, or was missed, or None.
@@ -64,17 +64,16 @@ class StepMonitor:
         unseen_s: How long nothing was known about it since it was entered.
         denied: Whether the end condition of the course was last observed not to hold.
         opened: Whether the begin condition of the course was observed (see `StageCondition`).
-        confidence: Of the last observation, 0 to 1.
-        early: Whether it has held since before its turn without a break: a stage requires a change
-            within it.
-        parted_s: How long it has been observed not to hold since its turn.
+        confidence: Confidence of the last observation, 0 to 1.
+        early: Whether it has held since before its turn without a break: then it must cease, and begin again.
+        parted_s: How long an `early` action has been observed not to hold without a break.
         after: When the previous step was over; for the first step, the start.
         hasty_s: Delay after which it began, if the course requires a longer one; else None.
         fulfilled_at: When it was first fulfilled, or None.
-        told: Reported relations of it and of earlier steps; incompatible ones are reported to begin later.
+        told: Reported relations of this and of earlier steps; incompatible ones are reported to begin later.
         earliest: The earliest time at which it can have begun: when the previous step was first observed, or
             had lasted as long as required.
-        farthest: Greatest gap of its actors since it fails, pixels; None while it does not, or if unknown.
+        farthest: Greatest gap between its actors since it fails, pixels; None if it does not, or if unknown.
     """
 
     entered: float
@@ -165,7 +164,7 @@ def update(
     noted = _note_reported(noted, step, status, now)
     if status is not Status.FAILING:
         return replace(noted, status=status, since=now)
-    # Progress is lost; the failure is dated from the onset of the contrary, not from its confirmation.
+    # Progress is reset. The failure is dated to the onset of the contrary, not to its confirmation.
     since = now if noted.contrary_since is None else noted.contrary_since
     return replace(
         noted,
@@ -181,7 +180,7 @@ def update(
 def _beginning(
     monitor: StepMonitor, step: TaskStep, seen: ActionObservation
 ) -> tuple[StepMonitor, ActionObservation]:
-    """What counts until a step has begun: nothing before its begin condition, then also a sudden trend."""
+    """What counts until a step has begun: nothing before its begin condition; then also a sudden trend."""
     if monitor.begun is not None:
         return monitor, seen
     if step.condition("begins") is not None and not monitor.opened:
@@ -233,7 +232,7 @@ def _disregard_early(
     settings: TaskSettings,
     worked: Worked,
 ) -> tuple[StepMonitor, ActionObservation]:
-    """Disregard an action that held before its turn, until it has ceased; after a while that is a failure."""
+    """Disregard an action that held before its turn, until it ceases; after a while that is a contrary."""
     if not seen.observed:
         return monitor, seen
     if seen.holds is not Truth.TRUE:
@@ -246,7 +245,7 @@ def _disregard_early(
     beyond = worked(monitor.entered, moment.now) - settings.early_s
     if held_by is None or beyond < 0.0:
         return monitor, seen
-    # Reckoned back from now, because there may have been pauses before.
+    # Counted back from now, because there may have been pauses before.
     return monitor, replace(seen, contrary=replace(held_by, since=moment.now - beyond))
 
 
@@ -256,7 +255,7 @@ def without_hold(monitor: StepMonitor) -> StepMonitor:
 
 
 def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> bool:
-    """Whether a step is over by itself, whatever comes next."""
+    """Whether a step is over by itself, without the next one having begun."""
     explicit = step.hold_s is not None or step.condition("ends") is not None
     return monitor.fulfilled and (not meaning.lasts or explicit)
 
@@ -281,7 +280,7 @@ def _note_progress(
             # Time for which it held before the step began counts too.
             held = max(held, seen.elapsed(step, seen.held_by.since, now))
         elif seen.held_by is not None:
-            # It has held for longer than that has been certain.
+            # It has held for longer than it has been known to.
             since = max(seen.held_by.since, monitor.entered)
             held = max(held, seen.elapsed(step, since, now) - monitor.unseen_s)
     elif seen.holds is Truth.FALSE:
@@ -320,7 +319,7 @@ def _note_progress(
 
 
 def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
-    """Record a contrary, from its onset within this step, unless it holds, or held and is over."""
+    """Record a contrary, from its onset within this step, unless the action holds, or held and is over."""
     if not seen.observed:
         return monitor
     holds = seen.holds is Truth.TRUE and not seen.decisive

@@ -1,7 +1,7 @@
-"""Trends that have just set in beyond doubt, though they have not lasted yet.
+"""Trends that have just set in and are significant, although they have not lasted yet.
 
 A trend counts once it has lasted (`trend.py`), which is late for the beginning of a stage. Where the
-distance of two bodies changes much faster than it is noisy, a few samples tell (`rise.py`).
+distance of two bodies changes much faster than its noise, a few samples are sufficient (`rise.py`).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from visup.rules.relations.trend import SIGNS
 OPPOSITE = {"converging": "diverging", "diverging": "converging"}
 
 HEIGHT = 0.0067
-"""Least change of the distance, image diagonals: four pixels of a picture of 480 x 360. Closing
-fingers change it by two."""
+"""Least change of the distance, image diagonals: four pixels in an image of 480 x 360. Closing fingers change
+it by two."""
 
 SWAY = 0.2
-"""Least rate, as a share of the speed at which both move: what is carried sways and turns."""
+"""Least rate, as a share of the speed of the slower body: a carried body sways and rotates."""
 
 CONFIDENCE = 0.7
-"""Of a trend that has not lasted yet."""
+"""Confidence of a trend that has not lasted yet."""
 
 
 class SuddenTrends:
@@ -45,7 +45,8 @@ class SuddenTrends:
     def first(self, names: Iterable[str], ids: tuple[int, ...]) -> Relation | None:
         """The first of some relations that is a trend which has just set in, or None.
 
-        Who is named first is the one that comes or goes. While only the other one moves, the trend must last.
+        The object named first is the one that should come or go: while only the other one moves, a trend must
+        last to count.
         """
         found = (self._trend(name, ids) for name in names if name in SIGNS)
         sudden = next((t for t in found if t is not None), None)

@@ -1,7 +1,7 @@
-"""Actions of one stage joined by `&`: having held one after the other is not holding at the same time.
+"""Actions of one stage joined by `&`: they must hold at the same time, not one after the other.
 
-Each action has a monitor of its own. The one that ceased before another one began has to hold once more. Of
-actions that must hold for as long, in one stage, none has held for longer than all of them have together.
+Each action has a monitor of its own. An action that ceased before another one began must hold again. Actions
+of a stage with the same `for` are credited with the time for which all of them have held together.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ Gap = Callable[[TaskStep, float, float], float]
 def at_the_same_time(
     state: State[StepMonitor], judged: Callable[[TaskStep], bool], gap: Gap, tolerance_s: float
 ) -> State[StepMonitor]:
-    """A state in which actions that ceased before those beside them began have not held.
+    """The state with the monitors of actions reset that ceased before an action joined to them began.
 
     Args:
         state: The active steps with their monitors.
         judged: Whether an action must hold at the same time as others; those that last until something else
             begins need not.
-        gap: Measures the time between the end of one and the beginning of another.
-        tolerance_s: Relations are believed with delays, by which what held at the same time may seem apart.
+        gap: Measures the working time between the end of one action and the beginning of another.
+        tolerance_s: Longest gap that is tolerated, seconds, since relations are confirmed with different
+            delays.
     """
     match state:
         case SequenceState(head=head):
@@ -51,7 +52,7 @@ def at_the_same_time(
 
 
 def _for_as_long(state: State[StepMonitor]) -> State[StepMonitor]:
-    """A state in which a `for` counts while all actions hold that must hold for as long."""
+    """The state in which actions with the same `for` have held for the shortest time of them all."""
     groups: dict[tuple[str, float], list[Leaf[StepMonitor]]] = {}
     for part in state.parts if isinstance(state, ParallelState) else ():
         if isinstance(part, Leaf) and part.step.hold_s is not None and not part.step.is_told:

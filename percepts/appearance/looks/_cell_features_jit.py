@@ -1,4 +1,4 @@
-"""Compiled loops of `cell_features`: histograms of a patch's cells."""
+"""Compiled loops of `cell_features`: gradient histograms and mean colours of a patch's cells."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from visup.compiled import compiled
 
 Floats = NDArray[np.float32]
 
-BINS = 9  # orientations of edges, unsigned, over half a turn
-COLOURS = 3  # mean lightness and colour of a cell
-SPARE = 1  # how far a cell has the object's colours
+BINS = 9  # channels for gradient orientations, modulo 180 degrees
+COLOURS = 3  # channels for the mean L, a and b of a cell
+SPARE = 1  # channel for the mean log odds that the colours of a cell are the object's
 
 
 @compiled
 def _turn(x: np.float32, y: np.float32) -> np.float32:
-    """The orientation of an edge as a share of half a turn, 0 to 1, accurate to a thousandth."""
+    """The orientation of a gradient as a fraction of 180 degrees, 0 to 1, accurate to 0.001.
+
+    A polynomial in place of `arctan2`, which would dominate the loop.
+    """
     a, b = abs(x), abs(y)
     t = (b if b < a else a) / (a if b < a else b)
     turn = t * (np.float32(0.30952) - np.float32(0.06108) * t * t)
@@ -29,11 +32,11 @@ def _turn(x: np.float32, y: np.float32) -> np.float32:
 
 @compiled
 def cell_histograms(lab: NDArray[np.uint8], odds: Floats, side: int) -> Floats:
-    """Histograms of each cell of a patch: edges by orientation, colours, and odds.
+    """Features of each cell of a patch: histogram of gradient orientations, mean Lab, mean log odds.
 
     Args:
         lab: (h, w, 3) uint8, CIE Lab as OpenCV codes it; h and w are multiples of `side`.
-        odds: (h, w) float32.
+        odds: (h, w) float32, log odds of each pixel's colour.
         side: Side of a cell, pixels.
 
     Returns:
@@ -72,14 +75,14 @@ def cell_histograms(lab: NDArray[np.uint8], odds: Floats, side: int) -> Floats:
 
 @compiled
 def normalise_edges(cells: Floats, least: float) -> Floats:
-    """Normalise edges by the strength of edges around, for robustness to lighting.
+    """Normalise orientation histograms by the energy of the 3 x 3 cells around, against changes of lighting.
 
     Args:
         cells: From `cell_histograms`.
-        least: Strength below which edges are not amplified.
+        least: Summed gradient magnitude of a cell below which edges are not amplified.
 
     Returns:
-        The cells with edges from 0 to about 0.5; the rest unchanged.
+        The cells with orientation channels from 0 to 0.5; the others unchanged.
     """
     rows, cols = cells.shape[1:]
     energy = np.zeros((rows, cols), np.float32)

@@ -1,4 +1,4 @@
-"""Pixels of the working picture that belong to something."""
+"""Blobs: binary masks within a window of the working picture (`looks/scene.py`)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from visup.percepts.appearance.looks.pose import Window
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blob:
-    """Pixels of the working picture.
+    """A set of pixels of the working picture.
 
     Attributes:
-        window: (left, top, right, bottom), half open.
+        window: (left, top, right, bottom), working pixels, half open.
         mask: (bottom - top, right - left) bool.
     """
 
@@ -29,7 +29,7 @@ class Blob:
 
 
 def common_part(a: Blob, b: Blob) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
-    """Views of the masks of two blobs where their windows meet; None where they do not."""
+    """The masks of two blobs, cropped (not copied) to where their windows overlap; None if they do not."""
     left, top = max(a.window[0], b.window[0]), max(a.window[1], b.window[1])
     right, bottom = min(a.window[2], b.window[2]), min(a.window[3], b.window[3])
     if right <= left or bottom <= top:
@@ -42,7 +42,7 @@ def common_part(a: Blob, b: Blob) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 def overlap(a: Blob, b: Blob) -> float:
-    """Intersection of two blobs as a share of the smaller."""
+    """Intersection of two blobs as a share of the smaller one, 0 to 1 (not IoU)."""
     part = common_part(a, b)
     if part is None:
         return 0.0
@@ -50,7 +50,7 @@ def overlap(a: Blob, b: Blob) -> float:
 
 
 def without(a: Blob, b: Blob) -> Blob:
-    """What a blob has that another one has not; the blob itself where they do not meet."""
+    """Blob `a` minus the pixels of `b`; `a` itself if they share no pixel."""
     left = Blob(a.window, a.mask.copy())
     part = common_part(left, b)
     if part is None or not (part[0] & part[1]).any():

@@ -1,4 +1,7 @@
-"""Bodies that move by themselves, and their colours: their outline is known, whatever their posture."""
+"""Independently moving bodies, and how well their colours agree with those of a taught object.
+
+Motion segmentation gives the outline of a body, so that its colours can be compared whatever its posture.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,17 @@ from visup.percepts.appearance.looks.colours import OWN, colour_bins, learn_colo
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
 
-RING = 0.25  # width of the surroundings of a body, in its sides
+RING = 0.25  # width of the surroundings of a body, as a share of the square root of its area
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingBody:
-    """A body that moves by itself.
+    """A region that moves independently of the camera.
 
     Attributes:
         id: Id of its region.
-        blob: Its pixels.
-        cut: Whether the border of the picture cuts it.
+        blob: Its pixels, working picture.
+        cut: Whether it is cut off by the border of the picture.
     """
 
     id: int
@@ -31,7 +34,17 @@ class MovingBody:
 
 
 def body_colours(scene: Scene, it: Appearance, blob: Blob) -> tuple[float, float]:
-    """Excess of an object's colours in a blob over its surroundings, and the common share of colours."""
+    """How well the colours of a blob agree with those of a taught object.
+
+    Args:
+        scene: The frame.
+        it: Appearance of the taught object.
+        blob: Pixels of the working picture.
+
+    Returns:
+        The share of the blob's pixels with colours of the object minus that of a ring around it, -1 to 1,
+        and the intersection of the colour histograms of blob and object, 0 to 1.
+    """
     wide = max(4, round(RING * np.sqrt(blob.area)))
     left, top, right, bottom = blob.window
     width, height = scene.size

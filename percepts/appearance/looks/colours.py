@@ -35,7 +35,7 @@ class ColourModel:
     table: Floats
 
     def odds(self, bins: NDArray[np.int32]) -> Floats:
-        """Log odds that pixels of these colours are the object's.
+        """Log odds that pixels of these colours are the object's, float32 in the shape of `bins`.
 
         Args:
             bins: From `colour_bins`, any shape.
@@ -43,7 +43,7 @@ class ColourModel:
         return self.table[bins]
 
     def shared(self, other: ColourModel) -> float:
-        """Common share of the colours of two objects, 0 to 1."""
+        """Intersection of the colour histograms of two objects, 0 to 1."""
         return float(np.minimum(self.thing, other.thing).sum())
 
     def blended(self, other: ColourModel, thing: float, around: float) -> ColourModel:
@@ -70,7 +70,7 @@ def colour_bins(lab: Bytes) -> NDArray[np.int32]:
 
 
 def colour_model(thing: Floats, around: Floats) -> ColourModel:
-    """A model from two histograms."""
+    """A model from the histograms of an object and of its surroundings, (4096,) float32 each."""
     table = np.log((thing + _RARE) / (around + _STRANGE))
     return ColourModel(thing, around, np.clip(table, -_CLIP, _CLIP).astype(np.float32))
 
@@ -88,7 +88,7 @@ def learn_colours(lab: Bytes, thing: Floats, around: Floats) -> ColourModel:
 
 
 def summed_colours(models: list[ColourModel]) -> ColourModel:
-    """The colours of several views of one object."""
+    """The mean of the colour models of several views of one object."""
     share = np.float32(1 / len(models))
     thing = reduce(np.add, [m.thing for m in models]) * share
     return colour_model(thing, reduce(np.add, [m.around for m in models]) * share)

@@ -1,8 +1,8 @@
 """A discriminative correlation filter that localises an object in a patch.
 
 With spatial reliability (Lukezic et al., CSR-DCF, 2017): one filter per feature channel, restricted to cells
-that show the object, found by alternating between the frequency domain, where the filter is fitted, and
-space, where it is masked.
+that show the object, found by alternating (ADMM) between the frequency domain, where the filter is fitted,
+and space, where it is masked.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 Spectrum = NDArray[np.complex64]
 
-_ROUNDS = 4
-_PENALTY, _GROWTH = np.float32(5.0), np.float32(3.0)
-_RIDGE = np.float32(0.01)
+_ROUNDS = 4  # iterations of ADMM
+_PENALTY, _GROWTH = np.float32(5.0), np.float32(3.0)  # of ADMM; its factor per iteration
+_RIDGE = np.float32(0.01)  # regularisation of the filter
 _SHARP = 0.06  # width of the target peak, as a share of the object's size in cells
 
 
@@ -107,7 +107,7 @@ def peak_of(response: Floats) -> tuple[float, float, float]:
         response: (h, w) float32, shift 0 in the middle.
 
     Returns:
-        (dx, dy) in cells, and its height.
+        (dx, dy, height): the shift in cells, and the response at its maximum.
     """
     rows, cols = response.shape
     r, c = divmod(int(response.argmax()), cols)

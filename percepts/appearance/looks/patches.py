@@ -1,8 +1,8 @@
-"""Patches of the picture that have a thing's colours: where it is, whatever it looks like else.
+"""Localisation of a taught object by colour alone, for when its shape and texture match no taught view.
 
-A thing that rests as it was not taught (in other light, turned, or cut by the border of the picture) matches
-no taught view. Where its colours make up one patch of about its size, stand out from all around it, and are
-found like that in no other place, it is there.
+An object at rest in another light, turned, or cut off by the border of the picture matches no taught view.
+It is accepted where its colours form one connected patch of about its size that stands out from its
+surroundings, provided that no other patch of the picture is nearly as good.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
 
 EXCESS = 0.85
-"""Least share of its colours in a patch beyond that around it."""
+"""Least share of a patch's pixels with the object's colours, in excess of that of its surroundings."""
 
 ALIKE = 0.45
-"""Least common share of the colours of a patch and of the thing. In 54 rendered and real clips no patch of
-another thing passes both, but for equal bottles."""
+"""Least intersection of the colour histograms of a patch and of the object. In 54 rendered and real clips no
+patch of another object passes both this and `EXCESS`, but for identical bottles."""
 
 APART = 1.5
-"""Least agreement of its colours in a patch, as a multiple of that in any other."""
+"""Least ratio of the best patch's agreement to that of the second best."""
 
 SIDES = (0.5, 1.6)
-"""Sides of a patch that may be a thing, in its own."""
+"""Least and greatest size (square root of the area) of a patch, relative to the object's."""
 
-_SPECK = np.ones((3, 3), np.uint8)
-_GAP = np.ones((5, 5), np.uint8)
+_SPECK = np.ones((3, 3), np.uint8)  # smaller patches are noise
+_GAP = np.ones((5, 5), np.uint8)  # narrower gaps are closed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundPatch:
-    """A patch with a thing's colours.
+    """A patch with the colours of a taught object.
 
     Attributes:
-        pose: Pose of the thing.
+        pose: Pose of the object, working pixels.
         share: How well the colours agree, 0 to 1.
-        blob: Its pixels.
+        blob: Pixels of the patch.
     """
 
     pose: PatchPose
@@ -56,16 +56,16 @@ class FoundPatch:
 def only_patch(
     scene: Scene, it: Appearance, unit: float, where: NDArray[np.bool_] | None = None
 ) -> FoundPatch | None:
-    """The only patch of the picture with a thing's colours and about its size, if there is one.
+    """The only patch of the picture with an object's colours and about its size, if there is one.
 
     Args:
         scene: The frame.
-        it: The thing, as it was taught.
-        unit: Working pixels per pixel of its taught patch.
+        it: Appearance of the object, as taught or as last seen.
+        unit: Expected scale: working pixels per pixel of the appearance's patch.
         where: (h, w) bool, of any size: parts of the picture that may hold it; None for all.
 
     Returns:
-        The patch; None where there is none, or more than one.
+        The patch; None if there is none, or if a second one is nearly as good.
     """
     least, most = SIDES
     found: list[tuple[float, Blob]] = []
@@ -82,13 +82,13 @@ def only_patch(
 
 
 def looks_alike(scene: Scene, it: Appearance, blob: Blob) -> bool:
-    """Whether a patch of the picture has the colours of a thing, and what is around it has not."""
+    """Whether a blob has the colours of an object and its surroundings do not."""
     excess, alike = body_colours(scene, it, blob)
     return excess > EXCESS and alike > ALIKE
 
 
 def _patches(scene: Scene, it: Appearance, where: NDArray[np.bool_] | None) -> Iterator[Blob]:
-    """The connected patches of a thing's own colours, without specks and narrow gaps."""
+    """The connected components of pixels with an object's colours, after opening and closing."""
     own = it.colours.odds(colour_bins(scene.lab[0])) > OWN
     if where is not None:
         near = cv2.resize(where.view(np.uint8), scene.size, interpolation=cv2.INTER_NEAREST)
@@ -103,7 +103,7 @@ def _patches(scene: Scene, it: Appearance, where: NDArray[np.bool_] | None) -> I
 
 
 def _pose_of(blob: Blob, it: Appearance, unit: float, size: tuple[int, int]) -> PatchPose:
-    """The pose of a thing of which a patch shows all, or all but what the border cuts off."""
+    """The pose of an object that a patch shows completely, except for what the border cuts off."""
     box = cv2.boundingRect((it.mask > 0.5).astype(np.uint8))
     middle = (it.shape[1] - 1) / 2, (it.shape[0] - 1) / 2
     at = [
@@ -115,7 +115,10 @@ def _pose_of(blob: Blob, it: Appearance, unit: float, size: tuple[int, int]) -> 
 
 
 def _along(low: int, high: int, limit: int, extent: float) -> float:
-    """Middle of a thing along one axis: where one side is cut, the other one tells."""
+    """The centre of an object along one axis, working pixels.
+
+    If exactly one side is cut off by the border, it follows from the other side and the object's extent.
+    """
     cut = low <= 0, high >= limit
     if cut == (True, False) and high < extent:
         return high - 0.5 - extent / 2

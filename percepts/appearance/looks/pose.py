@@ -64,7 +64,7 @@ class PatchPose:
         return PatchPose(self.x, self.y, self.scale * by, self.angle + turn)
 
     def apart(self, other: PatchPose, radius: float) -> float:
-        """Distance between two poses of a point at a radius (patch pixels), picture pixels."""
+        """How far a point at a radius (patch pixels) moves from one pose to the other, picture pixels."""
         shift = float(np.hypot(self.x - other.x, self.y - other.y))
         bend = np.hypot(self.scale - other.scale, self.scale * (self.angle - other.angle))
         return shift + float(bend) * radius

@@ -1,4 +1,7 @@
-"""Scenes: frames of bounded size in which taught objects are searched."""
+"""Scenes: frames reduced to a working size, in which taught objects are searched.
+
+The reduced frame is called the *working picture*, its pixels *working pixels*.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from visup.percepts.appearance.looks.pose import Bytes, PatchPose, cut_patch
 WORK_SIZE = 640
 """Most pixels along the longer side of the searched picture."""
 
-_LEVELS = 3
+_LEVELS = 3  # most levels of the pyramid
 
 
 @dataclass(frozen=True, slots=True, eq=False)

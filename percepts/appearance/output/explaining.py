@@ -15,7 +15,7 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 
 SMALL = 384  # longer side of the picture for comparing regions, pixels
-RIM = 0.12  # tolerance of a moving region around an object's outline, as a share of its side
+RIM = 0.12  # tolerance around an object's outline, as a share of the square root of its area
 MAINLY = 0.5  # share of a region inside an object from which the object explains it
 LEFT = 0.35  # least share of a region that remains when reported without the object
 LEAST = 0.0004  # least remaining area, as a share of the picture

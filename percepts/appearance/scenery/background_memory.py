@@ -1,7 +1,8 @@
-"""What the picture looked like while an object was seen elsewhere: there it is background.
+"""Past frames of the scene, which rule out places where a lost object cannot be.
 
-A dark gripper that is lost looks like any dark corner of the room, and a wall that an arm uncovers may look
-like what the arm carries. Where a place looks as it did while the object was somewhere else, it is not there.
+A lost dark gripper resembles any dark corner of the room, and a wall that an arm uncovers may resemble what
+the arm carries. A place that looks now as it did while the object was seen elsewhere is background, so the
+object is not there.
 """
 
 from __future__ import annotations
@@ -33,18 +34,18 @@ NOISE = 10
 """Largest difference of any channel that noise makes, levels of 8-bit Lab."""
 
 CHANGED = 0.2
-"""Least share of a place that has changed, if the object is there."""
+"""Share of a place that must have changed for the object to be there."""
 
 _SAME = np.eye(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptPicture:
-    """The picture at one moment, and where each object was seen in it.
+    """A past frame, and where each object was seen in it.
 
     Attributes:
         lab: (h, w, 3) uint8, CIE Lab, a quarter of the working size.
-        covered: Name -> (h, w) bool, where it was seen, or near.
+        covered: Name of an object -> (h, w) bool, the pixels that it covered, dilated by one.
         motion: (3, 3) similarity from its working pixels to those of the last frame.
     """
 
@@ -53,15 +54,15 @@ class KeptPicture:
     motion: Doubles
 
     def moved(self, camera: Doubles) -> KeptPicture:
-        """The same one frame later, by the (2, 3) similarity of the picture between them."""
+        """The same with the camera's motion into the next frame, a (2, 3) similarity, added to `motion`."""
         return replace(self, motion=np.vstack((camera, (0.0, 0.0, 1.0))) @ self.motion)
 
 
 class BackgroundMemory:
     """Pictures of the last minutes, moved with the camera; one per video.
 
-    They are forgotten where its motion is unknown. An error of the motion makes a place look changed, so that
-    nothing is known about it.
+    They are discarded when the camera's motion is unknown. An error in the motion makes places look changed,
+    which is safe: changed places are searched.
 
     Attributes:
         kept: The pictures, oldest first; the first one stays.
@@ -99,14 +100,15 @@ class BackgroundMemory:
             self.kept = tuple(k.moved(camera) for k in self.kept)
 
     def changed(self, scene: Scene, name: str) -> Mask | None:
-        """Where the picture does not look as it did while an object was seen elsewhere.
+        """Where the frame differs from all kept pictures that show an object elsewhere.
 
         Args:
             scene: The frame.
             name: Name of the object.
 
         Returns:
-            (h, w) bool, a quarter of the working size: the parts that may hold it; None where none is known.
+            (h, w) bool, a quarter of the working size: the parts that may hold the object; None if no kept
+            picture shows it.
         """
         kept = [k for k in self.kept if name in k.covered]
         if not kept:
@@ -122,8 +124,8 @@ def holds(changed: Mask, place: Blob) -> bool:
     """Whether enough of a place has changed for an object to be there.
 
     Args:
-        changed: (h, w) bool, a quarter of the working size.
-        place: The pixels that it would cover.
+        changed: (h, w) bool, a quarter of the working size, from `BackgroundMemory.changed`.
+        place: The pixels that the object would cover.
     """
     left, top, _, _ = place.window
     ys, xs = np.nonzero(place.mask)
@@ -138,7 +140,7 @@ def _small(scene: Scene) -> Bytes:
 
 
 def _covered(scene: Scene, blob: Blob) -> Mask:
-    """(h, w) bool: the pixels of a kept picture that an object touches, and those beside."""
+    """(h, w) bool, a quarter of the working size: the pixels that an object touches, dilated by one."""
     left, top, right, bottom = blob.window
     whole = np.zeros(scene.size[::-1], dtype=np.uint8)
     whole[top:bottom, left:right] = blob.mask
@@ -148,13 +150,13 @@ def _covered(scene: Scene, blob: Blob) -> Mask:
 
 
 def _unchanged(now: Bytes, kept: KeptPicture, name: str) -> Mask:
-    """(h, w) bool: what looks as in a kept picture, away from where an object was seen in it."""
+    """(h, w) bool: pixels that equal a kept picture where that shows background instead of an object."""
     before, known = _now(kept, kept.lab), _now(kept, (~kept.covered[name]).view(np.uint8))
     return np.asarray((cv2.absdiff(now, before).max(axis=2) <= NOISE) & (known > 0))
 
 
 def _now(kept: KeptPicture, picture: Bytes) -> Bytes:
-    """A kept picture, or a mask in it, as the camera sees it now; 0 where it was out of view."""
+    """A kept picture, or a mask in it, warped to the current camera view; 0 where it was out of view."""
     if np.array_equal(kept.motion, _SAME):
         return picture
     motion = kept.motion[:2].copy()

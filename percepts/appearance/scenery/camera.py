@@ -1,8 +1,9 @@
 """Camera motion, from points of the static scene.
 
 Points all over the picture, away from objects, are tracked from a key frame on, so that slow drift
-accumulates until it exceeds the noise. Points that have long moved with the scene outweigh new ones: an arm
-that comes into view is not taken for the scene, even where it fills most of it.
+accumulates until it exceeds the noise. If enough points have moved with the scene during an earlier key
+frame, only those are used: an arm that comes into view is not taken for the scene, even if it fills most of
+the picture.
 """
 
 from __future__ import annotations
@@ -33,12 +34,13 @@ LEAST = 8  # fewest points for an estimate
 class CameraTrack:
     """Points of the scene since a key frame.
 
-    since: Time of the key frame, seconds.
-    key: (N, 2) float32, positions in the key frame, working pixels.
-    now: (N, 2) float32, positions in the last frame.
-    proven: (N,) bool, points that moved with the scene during an earlier key frame.
-    motion: (2, 3) similarity of the picture from the key frame to the last one; `STILL` itself while
-        the camera rests; None while unknown.
+    Attributes:
+        since: Time of the key frame, seconds.
+        key: (N, 2) float32, positions in the key frame, working pixels.
+        now: (N, 2) float32, positions in the last frame.
+        proven: (N,) bool, points that moved with the scene during an earlier key frame.
+        motion: (2, 3) similarity of the picture from the key frame to the last one; `STILL` itself while
+            the camera rests; None while unknown.
     """
 
     since: float = -np.inf

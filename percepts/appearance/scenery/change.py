@@ -13,10 +13,10 @@ from visup.percepts.appearance.scenery.points import STILL
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
-COARSER = 4  # working pixels per pixel of what is compared
+COARSER = 4  # working pixels per pixel of the compared pictures
 APART_S = 0.2  # interval between two compared pictures
-LATELY_S = 0.6  # how long a change counts
-LEAST = 12  # steps of lightness above the noise
+LATELY_S = 0.6  # how long a change counts as recent
+LEAST = 12  # greatest difference of lightness that is noise, 8-bit levels
 NEVER = np.float32(-1e6)
 
 
@@ -60,7 +60,10 @@ class ChangeMap:
         self._was, self._time = now, scene.time
 
     def lately(self, scene: Scene) -> NDArray[np.bool_] | None:
-        """(h, w) bool, of any size: the parts that changed recently; None when none did."""
+        """(h, w) bool, a quarter of the working size: the parts that changed recently.
+
+        None if nothing did, or if most of the picture did, which guides no search.
+        """
         if self._when is None:
             return None
         out = np.asarray(scene.time - self._when < LATELY_S)

@@ -17,9 +17,9 @@ from visup.percepts.appearance.tracking.verification import Match, verify
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-COARSE = 13.0  # side of an object in a search of the whole picture, pixels
+COARSE = 13.0  # side to which an object is reduced for a search of the whole picture, pixels
 _MOST = 6  # most positions to verify
-_EACH = 3  # most of one scale and rotation
+_EACH = 3  # most candidate positions per scale and rotation
 
 
 def search(
@@ -63,7 +63,8 @@ def colour_peaks(
         where: (h, w) bool, of any size: parts of the picture that may hold the object's centre.
 
     Returns:
-        The two best positions: their excess of its colours over the surroundings, and the pose.
+        The two best positions as (excess, pose): share of pixels with the object's colours inside the pose
+        minus that around it, -1 to 1; best first.
     """
     small = min(1.0, COARSE / (2 * it.radius * pose.scale))
     width, height = scene.size
@@ -88,7 +89,10 @@ def colour_peaks(
 def _gathering(
     it: Appearance, pose: PatchPose, small: float
 ) -> tuple[tuple[float, float], Floats, Floats]:
-    """Weights within an object and around it, each summing to 1, and the patch's centre in them."""
+    """The offset of the patch's centre from the kernels' centre, and two kernels that each sum to 1.
+
+    The first kernel weighs pixels within the object, the second those around it.
+    """
     _, mask, middle = _small_template(it, pose, small)
     wide = np.pad(mask, 5)
     soft = cv2.GaussianBlur(wide, (0, 0), 1.5)
@@ -138,7 +142,7 @@ def _coarse(
 def _middles(
     where: Mask, size: tuple[int, int], shape: tuple[int, ...], middle: tuple[float, float]
 ) -> Mask:
-    """(h, w) bool: template corners for which the centre lies inside `where`."""
+    """(h, w) bool, of `shape`: positions of the template's corner for which its centre is in `where`."""
     small = cv2.resize(where.view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     ys = np.clip(np.arange(shape[0]) + round(middle[1]), 0, size[1] - 1)
     xs = np.clip(np.arange(shape[1]) + round(middle[0]), 0, size[0] - 1)

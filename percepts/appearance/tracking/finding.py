@@ -19,20 +19,20 @@ from visup.percepts.appearance.tracking.detection import colour_peaks, search
 from visup.percepts.appearance.tracking.track import ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
-SURE = 0.6  # score that other objects were not observed to reach
-FAIR, APART = 0.42, 1.5  # sufficient score if it exceeds those of other positions by this factor
-GATHERED = 0.45  # least excess of its colours over the surroundings
+SURE = 0.6  # score that suffices by itself: no other object was observed to reach it
+FAIR, APART = 0.42, 1.5  # score that suffices if it exceeds those of other positions by a factor
+GATHERED = 0.45  # least excess of the object's colours at a position over those around it
 NOISE = 0.15  # score that any position may have by chance
 MOVING_FAIR, MOVING_APART = 0.45, 1.2  # as FAIR and APART, among positions that changed recently
 AT_HOME = 0.1  # bonus of the position where an object was taught
 RECENT_SIZES = (0.85, 1.0, 1.18)
 SIZES = (0.75, 0.87, 1.0, 1.15, 1.32)
 TURNS = (-0.4, 0.4)
-BODY_ALIKE = 0.5  # least common share of the colours of a moving body and of an object
-BODY_SIZES = (0.5, 1.8)  # sides of a moving body that may be an object, in its own
-BODY_CUT = 0.25  # the least one of a body that the border cuts
-BEFORE = -0.5  # excess of an object's colours where something else lies before it
-TAKEN = 0.5  # share of a position covered by another object from which it is taken
+BODY_ALIKE = 0.5  # least intersection of the colour histograms of a moving body and of an object
+BODY_SIZES = (0.5, 1.8)  # size (root of the area) of a moving body, relative to the object's
+BODY_CUT = 0.25  # least relative size of a moving body that the border cuts off
+BEFORE = -0.5  # excess of an object's colours in a blob over it, up to which the blob occludes it
+TAKEN = 0.5  # share of a position covered by another object from which that position is occupied
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,10 +140,10 @@ def moving_places(
 def body_places(
     scene: Scene, view: ViewModel, number: int, bodies: Sequence[MovingBody]
 ) -> list[ThingPlace]:
-    """Bodies in motion that have the colours of an object and about its size.
+    """Moving bodies that have the colours of an object and about its size.
 
-    What moves by itself is one thing, and its outline is known. So its colours are sufficient, though it was
-    taught in another posture, or from another side.
+    A body that moves independently is one object with a known outline. Its colours are therefore sufficient,
+    even if the object was taught in another posture, or from another side.
 
     Args:
         scene: The frame.
@@ -184,9 +184,9 @@ def coloured_places(scene: Scene, view: ViewModel, number: int) -> list[ThingPla
 
 
 def has_distinctive_colours(view: ViewModel) -> bool:
-    """Whether an object's colours alone find it in the picture in which it was taught.
+    """Whether an object can be located by its colours alone in the picture in which it was taught.
 
-    Where they do not, as those of a black gripper before dark furniture, they find it nowhere else.
+    If not (a black gripper in front of dark furniture), it is not searched by colours alone anywhere else.
     """
     scene = prepare_scene(view.scene, 0.0)
     home = footprint(scene, home_of(scene, view), view.appearance)
@@ -250,12 +250,15 @@ def _outstanding(matches: Sequence[Match], it: Appearance, apart: float = APART)
 def assigned(
     scene: Scene, found: Sequence[ThingPlace], taken: Sequence[tuple[Blob, Appearance]]
 ) -> dict[str, ThingPlace]:
-    """Assign the best position to each object, at most one object to each.
+    """Assign positions to objects greedily, by score; an object gets at most one, and none that is taken.
 
     Args:
         scene: The frame.
         found: Candidates of all searched objects.
-        taken: Blobs of objects already located, and how those were taught.
+        taken: Blobs of objects already located, and their appearances.
+
+    Returns:
+        Name of an object -> its position.
     """
     out: dict[str, ThingPlace] = {}
     full = list(taken)
@@ -273,7 +276,15 @@ def assigned(
 def _belongs(
     scene: Scene, place: ThingPlace, blob: Blob, other: Blob, other_looks: Appearance
 ) -> bool:
-    """Whether a position is that of another object: it lies within it, and is not put before it."""
+    """Whether a position is occupied by another object: it overlaps that object and does not occlude it.
+
+    Args:
+        scene: The frame.
+        place: The candidate position.
+        blob: Pixels of the candidate.
+        other: Pixels of the other object.
+        other_looks: Appearance of the other object.
+    """
     if overlap(blob, other) <= TAKEN:
         return False
     return place.seen is None or body_colours(scene, other_looks, blob)[0] > BEFORE

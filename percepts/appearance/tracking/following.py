@@ -24,17 +24,17 @@ from visup.percepts.appearance.tracking.verification import (
 
 Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 
-AS_IT_WAS = 0.97  # unchanged share of a window from which nothing happened
+AS_IT_WAS = 0.97  # unchanged share of an object's window from which the object has not moved
 LOSE_S = 0.5  # how long an object is tracked without being observed
 LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # least filter peak and explained share of a tracked object
 UNSURE_PEAK = 0.4  # filter peak below which colours localise the object
 OWN_COLOURS = 0.25  # least excess of the object's colours over the surroundings
 MOVED_PX = 1.0  # least motion that ends rest, working pixels
-CARRIED = 0.6  # least explained share of a move on which many points agree
-BETTER = 0.04  # share of pixels by which a move must explain more than rest
+CARRIED = 0.6  # share of an object's pixels that a move must explain if many points agree on it
+BETTER = 0.04  # otherwise: share of pixels by which the move must explain more than rest does
 COVERED = 0.2  # unchanged share below which an object at rest is covered
-UNCOVERED = 0.5
-FOUND_AGAIN = 0.6
+UNCOVERED = 0.5  # unchanged share above which a hidden object is seen at rest again
+FOUND_AGAIN = 0.6  # match score above which a hidden object is seen again, not at rest
 PLAIN = 0.8  # share of the last peak from which agreeing points need no scale and rotation search
 LOOK_CLOSER = 4  # frames between two such searches in any case
 _GROWTH, _TURN = 1.035, 0.07  # scale factor and rotation (radians) per frame that are tried
@@ -84,7 +84,7 @@ def followed(track: ThingTrack, owner: int, motion: FrameMotion) -> ThingTrack:
 
 
 def noted(track: ThingTrack, time: float, pose: PatchPose) -> ThingTrack:
-    """The track, observed at a pose."""
+    """The track with an observation at a pose and time (seconds) added to its path."""
     path = tuple(p for p in track.path if time - p[0] <= PATH_S)
     return replace(track, pose=pose, path=(*path, (time, pose)), seen=time)
 

@@ -17,12 +17,13 @@ from visup.percepts.appearance.tracking.track import RestMemory, State, ThingTra
 Floats = NDArray[np.float32]
 
 SURE_PEAK, SURE_SHARE = 0.4, 0.5  # no adaptation below these: it may be another object
-SURE_COLOURS = 0.35
-GROW_RATE, SHRINK_RATE = 0.08, 0.05
-ANCHOR = np.float32(0.02)
+SURE_COLOURS = 0.35  # colour excess from which the appearance is adapted all the same
+# The rates below are shares of the new observation per update.
+GROW_RATE, SHRINK_RATE = 0.08, 0.05  # of the mask, where it grows and where it shrinks
+ANCHOR = np.float32(0.02)  # share by which the mask returns to the taught one
 PIXEL_RATE, FILTER_RATE = 0.12, 0.04
-COLOUR_RATE, AROUND_RATE = 0.02, 0.1
-PATH_S = 0.4
+COLOUR_RATE, AROUND_RATE = 0.02, 0.1  # of the colours of the object, and of its surroundings
+PATH_S = 0.4  # length of a track's path, seconds
 REST_SHARE = 0.7  # share of `PATH_S` for which an object must have been tracked to be at rest
 STILL_PX, STILL_SHARE = 0.6, 0.01  # most apparent motion at rest: pixels, and share of its size
 
@@ -30,13 +31,13 @@ STILL_PX, STILL_SHARE = 0.6, 0.01  # most apparent motion at rest: pixels, and s
 def learned(
     track: ThingTrack, scene: Scene, claim: tuple[Window, Floats], blob: Blob, taught: Appearance
 ) -> ThingTrack:
-    """A track with its adapted appearance.
+    """A track with its appearance adapted to the frame.
 
     Args:
         track: The track of a moving object.
         scene: The frame.
-        claim: Its window and log odds before the competition.
-        blob: The pixels it won.
+        claim: Its window and the log odds of the pixels there, before `compete`.
+        blob: The pixels assigned to it by `compete`.
         taught: The taught view that it matches.
     """
     it, pose = track.looks, track.pose
@@ -63,7 +64,7 @@ def learned(
 
 
 def relearned(it: Appearance, pose: PatchPose, blob: Blob, scene: Scene) -> Appearance:
-    """The appearance of an object that looks new, but for its colours: it has turned, or is in another light.
+    """A new appearance of an object of which only the colours still match: turned, or in another light.
 
     Args:
         it: Its appearance so far.

@@ -32,7 +32,7 @@ def look_alikes(views: Sequence[ViewModel]) -> LookAlikes:
 
 def _like(it: Appearance, other: Appearance) -> bool:
     if it.colours.shared(other.colours) < ALIKE:
-        return False  # one is seen beside the other in its view, say
+        return False  # without this, an object that is merely visible beside the other would match
     height, width = other.shape
     shown = Scene(0.0, [other.lab], np.ascontiguousarray(other.lab[..., 0]), (width, height))
     middle = PatchPose((width - 1) / 2, (height - 1) / 2, other.radius / it.radius)

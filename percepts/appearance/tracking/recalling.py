@@ -18,7 +18,7 @@ from visup.percepts.appearance.tracking.following import noted
 from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
-MOVING_S, RESTING_S = 0.3, 2.0  # between two comparisons
+MOVING_S, RESTING_S = 0.3, 2.0  # interval of comparisons of a moving and of a resting object
 BETTER = 0.15  # score by which another position must match the taught views better
 DOUBTFUL = 0.4  # score at rest below which a track that was never proven is dropped
 REACH = 2.5  # search radius, in radii of the object
@@ -56,7 +56,7 @@ def recalled(
     blob = footprint(scene, best.pose, taught)
     doubtful = best.score < DOUBTFUL and track.state is State.RESTING and not track.proven
     if doubtful and not _has_colours(track, views, scene):
-        # It passed for the object while it moved; at rest it does not look like it.
+        # What was tracked resembled the object only while it moved: it is something else.
         return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
     if best.score <= SURE or blob is None or any(overlap(blob, o) > 0.5 for o in others):
         return track
@@ -81,7 +81,7 @@ def _elsewhere(
 ) -> tuple[int, Match]:
     """A position that clearly matches a taught view better: nearby, or anywhere for a track never proven.
 
-    By its colours alone a body may have passed for the object while that is elsewhere.
+    A body that was accepted by its colours alone may be something else, the object being anywhere.
     """
     assert track.pose is not None
     it = views[number].appearance

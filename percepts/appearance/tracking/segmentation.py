@@ -1,4 +1,4 @@
-"""Segmentation among objects: each pixel goes to the object that explains it best."""
+"""Segmentation into objects: each pixel is assigned to the object that explains it best."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ _SHAPE = np.float32(3.0)  # log odds of a pixel well within an object, or well o
 _COLOUR = np.float32(2.0)  # most log odds of a colour
 _LIKE, _UNLIKE = np.float32(1.0), np.float32(-1.5)  # log odds of a match with the template, or none
 _INNER = np.float32(4.0)  # distance to the outline of a pixel well in or out, patch pixels
-_LIMB = 11.0  # reach of a limb beyond the outline, patch pixels
-_UNLIKE_ALL = 2.5  # log odds of a colour unique to the object
+_LIMB = 11.0  # how far a limb may extend beyond the outline, patch pixels
+_UNLIKE_ALL = 2.5  # log odds above which a colour is unique to the object
 _CHANGED = 14, 7  # tolerance of lightness and of colour of a pixel at rest, steps
-# Log odds of unchanged and of changed pixels: an exact match is not an occluder.
+# Log odds of unchanged and of changed pixels of an object at rest. An unchanged pixel shows no occluder, so
+# it outweighs any claim of another object.
 _SAME, _DIFFERENT = np.float32(5.0), np.float32(-2.0)
-NOWHERE = np.float32(-9.0)
+NOWHERE = np.float32(-9.0)  # log odds of pixels outside an object's patch
 
 
 def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | None:
@@ -85,7 +86,7 @@ def rest_scores(rest: RestMemory, same: Mask) -> Claim:
 
 
 def unchanged(scene: Scene, rest: RestMemory) -> Mask:
-    """(h, w) bool: unchanged pixels of a window, whatever the light."""
+    """(h, w) bool: pixels of a resting object's window that equal its memory but for lighting."""
     left, top, right, bottom = rest.blob.window
     now = np.ascontiguousarray(scene.lab[0][top:bottom, left:right])
     same = like_before(now, rest.lab, *_CHANGED)
@@ -124,7 +125,7 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
 
 
 def cleaned(blob: Blob) -> Blob | None:
-    """The blob without specks."""
+    """The blob without small connected components; None if it is empty."""
     mask = blob.mask.view(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
     if count < 2:

@@ -29,7 +29,7 @@ IN_VIEW = (State.MOVING, State.RESTING)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestMemory:
-    """The picture at an object at rest.
+    """The pixels of an object at rest, to be compared with later frames.
 
     Attributes:
         blob: The object, as completely as observed.
@@ -52,8 +52,8 @@ class ThingTrack:
         pose: Its current or last pose, working pixels.
         looks: Its current appearance.
         visible: Its visible part; None when there is none.
-        rest: Its memory while it rests.
-        path: (time, pose) of the last half second, oldest first.
+        rest: Its rest memory; kept when it is covered at rest.
+        path: (time, pose) of the last `PATH_S`, oldest first.
         peak: Last peak of its filter.
         explained: Share of its pixels that looked as expected.
         colours: Excess of its colours over those of the surroundings.

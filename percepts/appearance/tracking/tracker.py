@@ -1,4 +1,4 @@
-"""The tracker of taught objects, all of them together."""
+"""The tracker that follows all taught objects of one video together."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class ThingTracker:
 
     @property
     def seeks_new(self) -> bool:
-        """Whether an object has never been in view: only such are sought among moving bodies."""
+        """Whether some object has not been detected yet: only those are compared with moving bodies."""
         return any(not t.id for t in self.tracks)
 
     def save(self) -> Mapping[str, Any]:
@@ -121,7 +121,7 @@ class ThingTracker:
         Args:
             scene: The frame.
             new_id: Returns the id of an object detected for the first time.
-            bodies: What moves by itself in it, as far as that is segmented; see `seeks_new`.
+            bodies: Segmented moving bodies of the frame; not needed unless `seeks_new`.
 
         Returns:
             One track for each name, in the order of teaching.
@@ -182,8 +182,9 @@ class ThingTracker:
     def _find(self, scene: Scene, bodies: Sequence[MovingBody]) -> None:
         """Search for objects that are not in view: all of them at first, then one at a time.
 
-        Bodies in motion are compared in every frame with those that have never been in view. One that was is
-        sought by how it looked; a body with its colours may be another one that was there all the time.
+        In every frame, moving bodies are compared with the objects that have not been detected yet. An object
+        that was detected before is searched by its last appearance instead: a moving body with its colours
+        may be another object that was in view all the time.
         """
         lost = sorted((t for t in self.tracks if t.state not in IN_VIEW), key=lambda t: t.asked)
         first = self._count == 1
@@ -206,9 +207,9 @@ class ThingTracker:
         self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in rest)
 
     def _searched(self, scene: Scene, due: Sequence[ThingTrack]) -> list[ThingPlace]:
-        """Places of objects in the whole picture, and in what has changed recently.
+        """Candidate positions in the whole picture, or else where it has changed recently.
 
-        What looks as it did while an object was seen elsewhere is left out.
+        Places that look as they did while the object was seen elsewhere are left out.
         """
         lately = self._change.lately(scene)
         found: list[ThingPlace] = []
@@ -220,13 +221,13 @@ class ThingTracker:
     def _moving(
         self, scene: Scene, bodies: Sequence[MovingBody], names: Collection[str]
     ) -> list[ThingPlace]:
-        """Places of objects among the bodies that are not known to be one."""
+        """Candidate positions of objects at moving bodies that are not tracked objects already."""
         known = {t.id for t in self.tracks}
         free = [b for b in bodies if b.id not in known]
         return [c for k, v in self._views_of(names) for c in body_places(scene, v, k, free)]
 
     def _coloured(self, scene: Scene, names: Collection[str]) -> list[ThingPlace]:
-        """Places of objects by their colours alone; these do not tell look-alikes apart."""
+        """Candidate positions by colours alone, for objects with distinctive colours and no look-alikes."""
         views = self._views_of(names)
         sought = [(k, v) for k, v in views if self._distinctive[k] and not self._alike[k]]
         return [c for k, v in sought for c in coloured_places(scene, v, k)]
@@ -292,7 +293,12 @@ def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTr
 
 
 def _uncovered(track: ThingTrack, before: Sequence[Blob]) -> ThingTrack:
-    """A track whose rest memory has nothing of what was found to lie before it."""
+    """A track without the pixels of newly found objects in its rest memory, since those occlude it.
+
+    Args:
+        track: The track of any object.
+        before: Pixels of the newly found objects.
+    """
     if track.rest is None:
         return track
     blob = track.rest.blob

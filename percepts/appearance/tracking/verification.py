@@ -50,7 +50,15 @@ def respond(
     colours: ColourModel,
     it: CorrelationFilter,
 ) -> tuple[PatchPose, float]:
-    """Position and height of a filter's peak near a pose."""
+    """The pose shifted to the peak of a filter's response near it, and the height of the peak.
+
+    Args:
+        scene: The frame.
+        pose: Expected pose, working pixels.
+        shape: (height, width) of the filter's patch.
+        colours: Colours of the object.
+        it: Filter of the object.
+    """
     lab = scene.patch(pose, shape)
     features = cell_features(lab, colours.odds(colour_bins(lab)))
     dx, dy, peak = peak_of(it.response(features))
@@ -132,7 +140,7 @@ def _ring(mask: Floats) -> Floats:
 
 
 def verify(scene: Scene, it: Appearance, pose: PatchPose) -> Match:
-    """Match an object at a position, after a local search."""
+    """Match an object near a pose, after a local search over position and scale."""
     pose, peak = respond(scene, pose, it.shape, it.colours, it.filter)
     for by in (1.0, 0.93, 1.075):
         at, height = respond(scene, pose.resized(by), it.shape, it.colours, it.filter)

@@ -1,4 +1,4 @@
-"""A body before a dark sky: its outline, its picture, and where it has been."""
+"""The state of a body tracked in front of a dark sky: appearance template, position, path and velocity."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.dark_sky.sky import Mask
 
 PATH_S = 3.0  # how long a path is kept, seconds
-SPEED_S = 0.5  # time over which a speed is measured, seconds
-DRIFT = 0.0006  # way, as a share of the image diagonal, from which a body has moved by itself
-STEADY = 4.0  # the same, in root mean squares of its deviations from a steady course
-LEAST_S = 0.5  # time over which a drift is measured at least, seconds
-SETTLED_S = 1.0  # time alone from which a body is no part of what it touches later, seconds
-LARGE = 0.004  # share of the picture that a body at rest must fill: captions and the like fill less
+SPEED_S = 0.5  # time over which a velocity is measured, seconds
+DRIFT = 0.0006  # displacement, as a share of the image diagonal, from which a body has drifted
+STEADY = 4.0  # the same, as a multiple of the RMS deviation from uniform motion
+LEAST_S = 0.5  # shortest path from which a drift is measured, seconds
+SETTLED_S = 1.0  # time alone after which a body is not taken for a part of what it touches later
+LARGE = 0.004  # share of the image that a body at rest must fill; captions fill less
 
 Point = tuple[float, float]
 Corner = tuple[int, int]
@@ -28,12 +28,12 @@ Slices = tuple[slice, slice]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyLook:
-    """How a body looked when it was last seen alone, or whole.
+    """Appearance template of a body, taken when it was last seen alone, or whole.
 
     Attributes:
-        mask: (h, w) bool, cropped to its box.
-        tone: (h, w) uint8 brightness in the box.
-        corner: (x, y) of the box then, frame pixels.
+        mask: (h, w) bool, its silhouette within its bounding box.
+        tone: (h, w) uint8, brightness in the box.
+        corner: (x, y) of the upper left corner of the box at that time, frame pixels.
     """
 
     mask: Mask
@@ -43,23 +43,23 @@ class BodyLook:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyBody:
-    """What is known of one body.
+    """The track of one body.
 
     Attributes:
-        key: Its number.
-        look: How it looked when it was last seen alone, or whole.
-        corner: (x, y) of the box of that look in the last frame, frame pixels.
-        visible: (H, W) bool: its pixels in the last frame in which it was seen.
+        key: Number of the track, in order of initiation.
+        look: Its appearance template.
+        corner: (x, y) of the template's box in the last frame, frame pixels.
+        visible: (H, W) bool, its visible pixels in the last frame in which it was seen.
         seen: Time of that frame, seconds.
-        alone: Whether it was a component of its own in that frame.
-        sides: Whether its look touches the left, upper, right and lower border of the image.
+        alone: Whether it was a connected component of its own in that frame.
+        sides: Whether its template touches the left, upper, right and lower border of the image.
         born: Time when it came into view, seconds; minus infinity if it was there from the first frame on.
-        path: (time, x, y, ground x, ground y) of its anchor, frame pixels, since it has been alone, or not,
-            and cut at these sides.
+        path: (time, x, y, ground x, ground y) of its anchor, seconds and frame pixels, of the last `PATH_S`.
+            It starts anew whenever `alone` or `sides` changes, since that displaces the anchor.
         velocity: (vx, vy) in the image, frame pixels per second.
-        covers: Keys of bodies that were last seen behind it.
+        covers: Keys of the bodies that it was last seen in front of.
         whole: Whether it has ever been alone and not cut by the border.
-        settled: Whether it has been alone for long enough not to be a part of something else.
+        settled: Whether it has been alone for `SETTLED_S`, so that it is not a part of another body.
         id: Public id of its region; 0 while it has none.
     """
 
@@ -85,27 +85,33 @@ class SkyBody:
 
     @property
     def has_speed(self) -> bool:
-        """Whether its velocity was measured since it has been alone, or not."""
+        """Whether its path is long enough for its velocity to have been measured on it."""
         return self.path[-1][0] - self.path[0][0] >= LEAST_S / 2
 
     @property
     def stands_alone(self) -> bool:
-        """Whether it has been alone for long, in full view, and is larger than a caption."""
+        """Whether it is settled, alone and in full view, and larger than a caption."""
         whole = self.settled and self.alone and not self.cut
         return whole and self.area >= LARGE * self.visible.size
 
     @property
     def area(self) -> int:
-        """Pixels of its look."""
+        """Area of its template, pixels."""
         return int(np.count_nonzero(self.look.mask))
 
     def expected(self, now: float) -> Corner:
-        """The corner of its box at a time soon after it was seen."""
+        """The corner (x, y) of its box at a time, predicted by constant velocity, frame pixels."""
         ahead, (vx, vy) = now - self.seen, self.velocity
         return round(self.corner[0] + vx * ahead), round(self.corner[1] + vy * ahead)
 
     def drifted(self, diagonal: float) -> bool:
-        """Whether it has moved steadily against the ground while it was alone, beyond its wobble."""
+        """Whether it has moved uniformly relative to the ground, by more than its deviations from that.
+
+        A line is fitted to its path by least squares; False unless it is alone and in full view.
+
+        Args:
+            diagonal: Of the image, frame pixels.
+        """
         way = np.asarray(self.path)
         if self.cut or not self.alone or way[-1, 0] - way[0, 0] < LEAST_S:
             return False
@@ -116,13 +122,13 @@ class SkyBody:
         return float(np.hypot(*course[1])) > max(DRIFT * diagonal, STEADY * wobble)
 
     def looking(self, look: BodyLook, ground: Point, now: float, *, alone: bool) -> SkyBody:
-        """The body in the next frame, when it looks like this.
+        """The track updated with a new appearance template.
 
         Args:
-            look: How it looks, and where.
-            ground: (x, y) way of the ground since the first frame.
+            look: The template, from this frame.
+            ground: (x, y) displacement of the ground since the first frame, frame pixels.
             now: Time of the frame, seconds.
-            alone: Whether it is a component of its own.
+            alone: Whether it is a connected component of its own.
         """
         sides = sides_of(look, self.visible.shape)
         same = (alone, sides) == (self.alone, self.sides)
@@ -130,13 +136,13 @@ class SkyBody:
         return body.moved_to(look.corner, ground, now, follows=same)
 
     def moved_to(self, corner: Corner, ground: Point, now: float, *, follows: bool) -> SkyBody:
-        """The body with its path continued, or begun anew.
+        """The track updated with a new position of its template.
 
         Args:
-            corner: (x, y) of the box of its look.
-            ground: (x, y) way of the ground since the first frame.
+            corner: (x, y) of the template's box, frame pixels.
+            ground: (x, y) displacement of the ground since the first frame, frame pixels.
             now: Time of the frame, seconds.
-            follows: Whether its path is continued.
+            follows: Whether its path is continued; otherwise it starts anew.
         """
         kept = [p for p in self.path if now - p[0] <= PATH_S] if follows else []
         path = (*kept, (now, *_anchor(self.look, corner, self.sides), *ground))
@@ -148,13 +154,17 @@ class SkyBody:
 
 
 def sides_of(look: BodyLook, shape: tuple[int, ...]) -> Sides:
-    """Whether a look touches the left, upper, right and lower border of the image."""
+    """Whether a template touches the left, upper, right and lower border of an image of `shape` (h, w)."""
     (x, y), (h, w) = look.corner, look.mask.shape
     return x <= 0, y <= 0, x + w >= shape[1], y + h >= shape[0]
 
 
 def _anchor(look: BodyLook, corner: Corner, sides: Sides) -> Point:
-    """A point that moves as the body does: its centre, or its ends in view while the border cuts it."""
+    """(x, y) of a point that moves with the body, frame pixels.
+
+    Along each axis it is the centroid, or the end in view while the border cuts off the other end: the
+    centroid of what is in view moves less than the body.
+    """
     sums = cv2.moments(look.mask.view(np.uint8), binaryImage=True)
     (h, w), (left, top, right, bottom) = look.mask.shape, sides
     x = sums["m10"] / sums["m00"] if left == right else w if left else 0
@@ -172,11 +182,11 @@ def _speed(path: Path) -> Point | None:
 
 
 def look_at(mask: Mask, tone: NDArray[np.uint8]) -> BodyLook:
-    """How a body looks.
+    """The appearance template of a mask: both cropped to its bounding box.
 
     Args:
         mask: (H, W) bool, not empty.
-        tone: (H, W) uint8.
+        tone: (H, W) uint8, brightness of the frame.
     """
     x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
@@ -186,14 +196,14 @@ def look_at(mask: Mask, tone: NDArray[np.uint8]) -> BodyLook:
 def renewed(
     look: BodyLook, corner: Corner, visible: Mask, tone: NDArray[np.uint8], bright: Mask
 ) -> BodyLook:
-    """How a body looks when a part of it may be hidden: there as it looked before.
+    """The template of a partly hidden body, updated where it is visible and kept where it is not.
 
     Args:
-        look: How it looked before.
-        corner: (x, y) of its box now.
-        visible: (H, W) bool: its pixels that are not hidden.
-        tone: (H, W) uint8.
-        bright: (H, W) bool: where there is something.
+        look: The previous template.
+        corner: (x, y) of its box now, frame pixels.
+        visible: (H, W) bool, its visible pixels.
+        tone: (H, W) uint8, brightness of the frame.
+        bright: (H, W) bool, pixels brighter than the sky: elsewhere nothing can hide it, so it is not there.
     """
     shape = (tone.shape[0], tone.shape[1])
     inside, part = overlap(look, corner, shape)
@@ -204,7 +214,7 @@ def renewed(
 
 
 def pasted(look: BodyLook, corner: Corner, shape: tuple[int, int]) -> Mask:
-    """The mask of a look in the image, when its box has this corner; (H, W) bool."""
+    """(H, W) bool: the silhouette of a template placed in the image with its box at a corner (x, y)."""
     out = np.zeros(shape, bool)
     inside, part = overlap(look, corner, shape)
     out[inside] = look.mask[part]
@@ -212,7 +222,7 @@ def pasted(look: BodyLook, corner: Corner, shape: tuple[int, int]) -> Mask:
 
 
 def overlap(look: BodyLook, corner: Corner, shape: tuple[int, int]) -> tuple[Slices, Slices]:
-    """The part of the image that the box of a look covers, and the same part of the box."""
+    """Slices of the image that the box of a template covers, and the same part as slices of the template."""
     (x, y), (h, w) = corner, look.mask.shape
     left, top = min(max(x, 0), shape[1]), min(max(y, 0), shape[0])
     right, bottom = max(min(x + w, shape[1]), left), max(min(y + h, shape[0]), top)

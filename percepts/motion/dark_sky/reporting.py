@@ -1,4 +1,4 @@
-"""Regions of bodies before a dark sky: with the outlines of the bodies, one for each."""
+"""Reporting: one region for each body, with the body's outline in place of those of its moving regions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from visup.percepts.motion.dark_sky.tracking import Bodies
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-OVER = 0.5  # share of a region's bright pixels that are a body's, from which it is this body
+OVER = 0.5  # share of a region's bright pixels that must be a body's for the region to belong to it
 BRIGHT = 0.3  # share of a region that must be brighter than the sky
-COVERED = 0.6  # share of a body cut by the border that regions must cover: else it is a ground
-SIGMA = 1.0  # standard deviation of a velocity measured on the way of a body, pixels per second
+COVERED = 0.6  # share of a body cut by the border that must move; otherwise it is background
+SIGMA = 1.0  # standard deviation of a velocity measured on a body's path, pixels per second
 CONFIDENCE = 0.9  # confidence in a body without a moving region
 
 Regions = tuple[Region, ...]
@@ -27,12 +27,12 @@ Regions = tuple[Region, ...]
 def bodies_with_ids(
     bodies: Bodies, members: Sequence[Sequence[Region]], ids: IdAllocator, diagonal: float
 ) -> Bodies:
-    """The bodies, with ids for those that are to be reported: they move, have drifted, or stand alone.
+    """Give public ids to the bodies to be reported: those that move, have drifted, or stand alone.
 
     Args:
         bodies: The bodies.
-        members: The moving regions of each.
-        ids: Gives new ids.
+        members: The moving regions of each, from `members_of`; a body takes over the id of one, if it can.
+        ids: Allocates new ids.
         diagonal: Of the image, frame pixels.
     """
     used = {b.id for b in bodies}
@@ -47,12 +47,12 @@ def bodies_with_ids(
 
 
 def members_of(bodies: Bodies, regions: Regions, bright: Mask, now: float) -> list[list[Region]]:
-    """The moving regions that are a part of each body, or all of it.
+    """For each body, the moving regions that lie mainly on it.
 
     Args:
         bodies: The bodies.
         regions: The moving regions.
-        bright: (H, W) bool.
+        bright: (H, W) bool, pixels brighter than the sky.
         now: Time, seconds; a body that was not seen in this frame has none.
     """
     found: list[list[Region]] = [[] for _ in bodies]
@@ -70,7 +70,7 @@ def members_of(bodies: Bodies, regions: Regions, bright: Mask, now: float) -> li
 
 
 def _unless_ground(body: SkyBody, regions: list[Region]) -> list[Region]:
-    """The regions of a body; none when it is cut by the border and hardly any of it moves."""
+    """The regions of a body; none if the border cuts it and most of it rests, as the Earth's limb does."""
     if not body.cut or not regions:
         return regions
     covered = np.zeros(body.visible.shape, bool)
@@ -84,16 +84,17 @@ def _unless_ground(body: SkyBody, regions: list[Region]) -> list[Region]:
 def regions_of(
     bodies: Bodies, members: Sequence[Sequence[Region]], regions: Regions, now: float
 ) -> Regions:
-    """All regions: one for each body with an id, and the moving ones that are of no body; by id.
+    """The regions to report: one for each body with an id, and the moving ones that are not of a body; by id.
 
-    An id is kept at rest: what the border cuts got it when most of it moved, or while it was in full view. So
-    it is taken for no ground: an approximation, as one that once seemed to move as a whole would stay, too.
+    A body with an id is reported even at rest, and even if the border cuts it: it got the id when most of it
+    moved, or while it was in full view, so it is not background. This is an approximation: background that
+    once seemed to move as a whole would be reported from then on, too.
 
     Args:
-        bodies: The bodies, with ids.
-        members: The moving regions of each.
+        bodies: The bodies, from `bodies_with_ids`.
+        members: The moving regions of each, from `members_of`.
         regions: All moving regions.
-        now: Time, seconds.
+        now: Time of the frame, seconds.
     """
     kept = [(b, m) for b, m in zip(bodies, members, strict=True) if b.id and b.seen == now]
     taken = {r.id for _, m in kept for r in m} | {b.id for b, _ in kept}
@@ -111,7 +112,8 @@ def _region(body: SkyBody, members: Sequence[Region]) -> Region:
     if not members:
         return outline.region(body.id, body.velocity, SIGMA, CONFIDENCE)
     main = replace(outline.applied_to(max(members, key=lambda r: r.area)), id=body.id)
-    # The end of what the border cuts may bend; where all is in view, its way tells best how it moves.
+    # In full view, the velocity measured on the path is the most accurate one. When the border cuts the body,
+    # the path is that of its end, which may bend.
     if body.cut or not body.has_speed:
         return main
     return replace(main, velocity=body.velocity, velocity_sigma=SIGMA)

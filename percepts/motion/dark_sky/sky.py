@@ -1,7 +1,8 @@
-"""A dark sky, and the components of the picture that are brighter than it.
+"""Segmentation of a dark sky, and of the connected components that are brighter than it.
 
-Black space has one tone, and no shadow can fall on it. So what is brighter is a body, a star, or the Earth,
-whether it moves or not, and its outline is where the tone changes. What is as dark as the sky is lost.
+Black space has one tone, and no shadow falls on it. Whatever is brighter is therefore a body, a star, or the
+Earth, whether it moves or not, and its outline is where the tone changes. Parts as dark as the sky are
+missed.
 """
 
 from __future__ import annotations
@@ -18,32 +19,31 @@ from visup.percepts.motion.outlines.region_outline import chosen, label_areas, r
 Mask = NDArray[np.bool_]
 
 DARKEST = 30  # levels below which a pixel may be sky
-LEAST_SKY = 0.15  # share of the picture that must be sky
-ONE_TONE = 0.9  # share of the dark pixels that must have the sky's tone: a dark room has many
-SPREAD = 6.0  # levels from the sky's by which these may differ
-MOST_NOISE = 4.0  # standard deviation of its tones, levels
-EVERY = 4  # pixels: every so many are looked at for the sky's tone
-BRIGHTER = (
-    9.0  # levels above the sky from which a pixel is a body: compression leaves halos of less
-)
-SIGMAS = 5.0  # the same, in standard deviations of the sky
-SMOOTH = 3  # pixels: side of the window over which tones are averaged
-HALO = 0.7  # share of the brightest neighbour's level that a pixel of an outline must have
-ROUNDS = 2  # pixels by which such halos are trimmed at most
-JOINED = 0.012  # gaps of up to this share of the image diagonal do not part a body
-SPECK = 0.2  # share of the least area up to which a connected bright spot is a star
-BIGGEST = 0.5  # share of the picture: a larger component is a ground
+LEAST_SKY = 0.15  # share of the image that must be dark
+ONE_TONE = 0.9  # share of the dark pixels that must have the sky's tone: a dark room has many tones
+SPREAD = 6.0  # tolerance of the sky's tone, levels
+MOST_NOISE = 4.0  # greatest standard deviation of the sky's noise, levels
+EVERY = 4  # stride of the pixels from which the sky's tone is estimated
+BRIGHTER = 9.0  # levels above the sky from which a pixel is a body: halos of compression are below
+SIGMAS = 5.0  # the same, in standard deviations of the sky's noise
+SMOOTH = 3  # side of the window over which tones are averaged, pixels
+HALO = 0.7  # least level of a pixel at an outline, as a share of its brightest neighbour's
+ROUNDS = 2  # greatest width of the halos that are trimmed, pixels
+JOINED = 0.012  # greatest gap within a body, as a share of the image diagonal
+SPECK = 0.2  # greatest area of a star, as a share of the least area of a body
+BIGGEST = 0.5  # greatest area of a body, as a share of the image: larger ones are background
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Components:
-    """Bright components before a dark sky.
+    """Bright connected components in front of a dark sky; gaps of up to `JOINED` do not separate them.
 
     Attributes:
-        bright: (H, W) bool: pixels brighter than the sky.
-        labels: (H, W) int: component of each pixel; 0 for the sky and for what is too small or large.
-        areas: (N + 1,) bright pixels of each; 0 first.
-        cut: (N + 1,) bool: whether it touches the border of the image.
+        bright: (H, W) bool, pixels brighter than the sky.
+        labels: (H, W) int32, component of each pixel, from 1; 0 for the sky and for components that are too
+            small or too large.
+        areas: (N + 1,) int64, number of bright pixels of each component; areas[0] is 0.
+        cut: (N + 1,) bool, whether each touches the border of the image; cut[0] is False.
     """
 
     bright: Mask
@@ -53,14 +53,14 @@ class Components:
 
 
 def bright_components(tone: NDArray[np.uint8], least: float) -> Components | None:
-    """The components of a picture that are brighter than a dark sky.
+    """The components of an image that are brighter than a dark sky.
 
     Args:
         tone: (H, W) uint8, from `brightness`.
-        least: Least area, pixels.
+        least: Least area of a component, pixels.
 
     Returns:
-        The components, or None when the picture shows no dark sky.
+        The components, or None if the image shows no dark sky.
     """
     sky = sky_tone(tone)
     if sky is None:
@@ -75,7 +75,11 @@ def bright_components(tone: NDArray[np.uint8], least: float) -> Components | Non
 
 
 def brightness(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The brightest channel of each pixel, (H, W) uint8: a blue panel is dark in grey."""
+    """The maximum over the channels of each pixel, (H, W) uint8, since in grey a blue panel would be dark.
+
+    Args:
+        image: (H, W), (H, W, 1) or (H, W, 3) uint8.
+    """
     if image.ndim == 2 or image.shape[2] == 1:
         return image.reshape(image.shape[:2])
     blue, green, red = cv2.split(image)
@@ -100,14 +104,14 @@ def sky_tone(tone: NDArray[np.uint8]) -> tuple[float, float] | None:
 
 
 def without_halos(tone: NDArray[np.uint8], level: float) -> Mask:
-    """Where a pixel has enough of its brightest neighbour's level above the sky not to be a halo.
+    """Pixels that are no halo: at least `HALO` times as far above the sky as their brightest neighbour.
 
     Args:
         tone: (H, W) uint8, from `brightness`.
-        level: Of the sky.
+        level: Tone of the sky, 0 to 255.
 
     Returns:
-        (H, W) bool; only what is brighter than the sky is judged.
+        (H, W) bool; meaningful only for pixels brighter than the sky.
     """
     lit = np.arange(256, dtype=np.float32)
     halos = np.searchsorted(np.arange(256) - level, HALO * (lit - level), side="right")
@@ -116,7 +120,7 @@ def without_halos(tone: NDArray[np.uint8], level: float) -> Mask:
 
 
 def joining_gap(shape: tuple[int, ...]) -> int:
-    """Width of the gaps that do not part a body, pixels; odd.
+    """Greatest width of gaps within a body, pixels; odd, as the side of a structuring element.
 
     Args:
         shape: (height, width) of the image.
@@ -125,14 +129,14 @@ def joining_gap(shape: tuple[int, ...]) -> int:
 
 
 def square(side: int) -> NDArray[np.uint8]:
-    """A square structuring element."""
+    """A square structuring element, (side, side) uint8."""
     return np.ones((side, side), np.uint8)
 
 
 def _trimmed(bright: Mask, bright_enough: Mask) -> Mask:
-    """Bright pixels without those beside the sky that only catch the light of a brighter neighbour.
+    """Bright pixels without halos: pixels at the outline that are lit only by blur of a brighter neighbour.
 
-    Lenses and compression blur edges; of what is left the outline lies where the body ends.
+    Lenses and compression blur edges, which would put the outline outside of the body.
     """
     inner = cv2.erode(bright.view(np.uint8), square(3)).view(bool)
     return np.asarray(bright & (inner | bright_enough))
@@ -156,7 +160,7 @@ def _labelled(bright: Mask, least: float) -> Components:
 
 
 def _without_specks(bright: Mask, most: float) -> Mask:
-    """Without connected spots of up to `most` pixels."""
+    """The mask without connected components of up to `most` pixels."""
     count, labels = cv2.connectedComponents(bright.view(np.uint8), connectivity=8, ltype=cv2.CV_32S)
     keep = label_areas(labels, count) > most
     keep[0] = False

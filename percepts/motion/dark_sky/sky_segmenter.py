@@ -1,4 +1,4 @@
-"""The segmenter of bodies before a dark sky, which goes over the regions of motion."""
+"""The segmenter of bodies in front of a dark sky, which refines the regions of motion segmentation."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_reg
 
 
 class DarkSkySegmenter:
-    """Gives regions the outlines of bodies that stand out from a dark sky; one per video.
+    """Replaces moving regions by the bodies in front of a dark sky that they lie on; one per video.
 
-    Also reports such bodies without a region, once they have drifted against the ground, or stand alone.
+    Also reports bodies without a moving region, once they have drifted relative to the ground, or stand alone
+    (`SkyBody.stands_alone`).
     """
 
     def __init__(self) -> None:
@@ -33,17 +34,17 @@ class DarkSkySegmenter:
         ids: IdAllocator,
         settings: MotionSettings,
     ) -> tuple[Region, ...]:
-        """The regions of one frame; as they are while there is no dark sky.
+        """The regions to report for a frame; the given ones while there is no dark sky.
 
         Args:
             frame: The next frame.
-            scene: The frame as measured.
+            scene: Its measurements.
             regions: Moving regions.
-            ids: Gives new ids.
-            settings: Give the least area.
+            ids: Allocates public ids.
+            settings: Settings of the segmenter, for the least area of a region.
 
         Returns:
-            The regions, by id.
+            The regions, sorted by id.
         """
         height, width = scene.image.shape
         x, y = scene.measured[0].background.models[-1].shift((width / 2, height / 2))
@@ -59,18 +60,18 @@ class DarkSkySegmenter:
         least: float,
         ids: IdAllocator,
     ) -> tuple[Region, ...]:
-        """The regions of one frame, as `step` returns them.
+        """The regions to report for a frame; `step` with the measurements it needs given directly.
 
         Args:
             frame: The next frame.
             regions: Moving regions.
-            shift: (x, y) from a point of the ground in the middle of this frame to where it was in the last
-                one, frame pixels.
-            least: Least area, frame pixels.
-            ids: Gives new ids.
+            shift: (x, y) displacement of the ground, at the centre of the image, from this frame to the
+                previous one (backwards), frame pixels.
+            least: Least area of a body, frame pixels.
+            ids: Allocates public ids.
 
         Returns:
-            The regions, by id.
+            The regions, sorted by id.
         """
         self._ground = self._ground[0] - shift[0], self._ground[1] - shift[1]
         tone = brightness(frame.image)

@@ -1,4 +1,4 @@
-"""Bodies that touch or cover each other in the image share one bright component: who owns which pixel."""
+"""Division of a bright component among bodies that touch or occlude each other in the image."""
 
 from __future__ import annotations
 
@@ -14,25 +14,23 @@ from visup.percepts.motion.dark_sky.sky import Mask
 
 Tones = NDArray[np.uint8]
 
-REACH = 4  # pixels around the expected place where a body is looked for
-ALIKE = 30.0  # root mean square difference of levels up to which a body is found again
-STRAY = (
-    10.0  # squared difference of levels for which a body may lie a pixel from where it is expected
-)
-FEW = 16  # fewest pixels in which the looks of two bodies are compared
-HELD = 0.7  # factor on the difference of a body that was seen before the other one
+REACH = 4  # search range around the predicted position, pixels
+ALIKE = 30.0  # greatest RMS difference of levels at which a template matches
+STRAY = 10.0  # penalty on the mean squared difference per squared pixel from the predicted position
+FEW = 16  # fewest pixels on which templates are compared
+HELD = 0.7  # factor on the difference of a body that was in front of the other one before
 
 _STEPS = np.arange(-REACH, REACH + 1, dtype=np.float32) ** 2
 _FAR = _STEPS[:, None] + _STEPS
-"""Squared distances from the expected place, pixels."""
+"""Squared distances of the searched positions from the predicted one, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Share:
-    """What a body has of a component.
+    """The part of a component that belongs to a body.
 
     Attributes:
-        mask: (H, W) bool: its pixels.
+        mask: (H, W) bool, its visible pixels.
         covers: Keys of the bodies behind it.
     """
 
@@ -41,14 +39,16 @@ class Share:
 
 
 def placed(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
-    """The corner of a body's box in a picture where it touches others, where its look fits best; does it fit?
-
-    Where it fits nowhere it is expected where its velocity leads.
+    """Locate a body that touches others, by matching its template near the predicted position.
 
     Args:
-        tone: (H, W) uint8.
+        tone: (H, W) uint8, brightness of the frame.
         body: The body.
-        now: Time of the picture, seconds.
+        now: Time of the frame, seconds.
+
+    Returns:
+        The corner (x, y) of its box, frame pixels, and whether the template matches there; if it matches
+        nowhere, the predicted corner and False.
     """
     x, y = body.expected(now)
     look, (dx, dy) = _within(body.look, (x, y), tone.shape)
@@ -64,7 +64,7 @@ def placed(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
 
 
 def _within(look: BodyLook, corner: Corner, shape: tuple[int, ...]) -> tuple[BodyLook, Corner]:
-    """The part of a look that stays in the image wherever it is looked for, and where it begins."""
+    """The part of a template that stays in the image at all searched positions, and its offset (x, y)."""
     x, y = corner
     h, w = look.mask.shape
     left, top = max(REACH - x, 0), max(REACH - y, 0)
@@ -77,19 +77,20 @@ def _within(look: BodyLook, corner: Corner, shape: tuple[int, ...]) -> tuple[Bod
 def split(
     tone: Tones, union: Mask, bodies: Sequence[SkyBody], corners: Sequence[Corner]
 ) -> tuple[Share, ...]:
-    """Share bright pixels among bodies that touch in the image.
+    """Divide the bright pixels of a component among bodies that touch in the image.
 
-    Of two whose looks lie over each other, the one that is more like the pixels there is in front. Pixels of
-    none go to the nearest body; with a single one they are something that is not known.
+    Where the templates of two bodies overlap, the one that matches the pixels better is in front. Pixels
+    outside of all templates go to the nearest body; if there is only one body, they are left unassigned,
+    since they show something unknown that has joined it.
 
     Args:
-        tone: (H, W) uint8.
-        union: (H, W) bool: bright pixels of the component that they share.
-        bodies: At least one.
-        corners: Where the box of each lies.
+        tone: (H, W) uint8, brightness of the frame.
+        union: (H, W) bool, bright pixels of the component that the bodies share.
+        bodies: At least one body.
+        corners: (x, y) of the box of each, frame pixels, from `placed`.
 
     Returns:
-        The share of each.
+        The share of each body, in order.
     """
     x, y, w, h = cv2.boundingRect(union.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
@@ -109,12 +110,12 @@ def split(
 
 
 class _PlacedLook:
-    """Where the look of a body lies in a part of the image.
+    """The template of a body placed in a window of the image.
 
     Attributes:
         body: The body.
-        corner: (x, y) of its box in this part.
-        mask: (h, w) bool: the bright pixels there.
+        corner: (x, y) of its box in the window.
+        mask: (h, w) bool, the bright pixels of the window that the template covers.
     """
 
     def __init__(self, body: SkyBody, corner: Corner, bright: Mask) -> None:
@@ -124,19 +125,22 @@ class _PlacedLook:
         self.mask[inside] = body.look.mask[part] & bright[inside]
 
     def unlike(self, tone: Tones, where: Mask) -> float:
-        """Mean difference of levels between the image and the look, over some pixels of the look."""
+        """Mean absolute difference of levels between window and template over `where`, (h, w) bool."""
         inside, part = overlap(self.body.look, self.corner, (tone.shape[0], tone.shape[1]))
         gap = cv2.absdiff(tone[inside], np.ascontiguousarray(self.body.look.tone[part]))
         return float(gap[where[inside]].mean())
 
 
 def _behind(one: _PlacedLook, places: Sequence[_PlacedLook], tone: Tones) -> list[int]:
-    """Keys of the bodies behind one."""
+    """Keys of the bodies that are behind `one`."""
     return [o.body.key for o in places if o is not one and _covers(one, o, tone)]
 
 
 def _covers(one: _PlacedLook, other: _PlacedLook, tone: Tones) -> bool:
-    """Whether one body is in front of another: where both lie, it is more like the image; else as before."""
+    """Whether one body is in front of another: its template matches better where both overlap.
+
+    If they hardly overlap, the order is as in the last frame; ties go to the larger body.
+    """
     before, after = other.body.key in one.body.covers, one.body.key in other.body.covers
     both = one.mask & other.mask
     if np.count_nonzero(both) < FEW:
@@ -153,7 +157,7 @@ def _in_image(mask: Mask, part: Slices, shape: tuple[int, ...]) -> Mask:
 
 
 def _nearest(masks: Sequence[Mask]) -> NDArray[np.int8]:
-    """The nearest body to each pixel, of those that are seen."""
+    """(h, w) int8: index of the nearest non-empty mask to each pixel."""
     nearest = np.zeros(masks[0].shape, np.int8)
     least = np.full(masks[0].shape, np.inf, np.float32)
     for k, mask in enumerate(masks):

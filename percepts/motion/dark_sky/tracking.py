@@ -1,4 +1,4 @@
-"""Following bodies before a dark sky from frame to frame."""
+"""Tracking of bodies in front of a dark sky: association with bright components, merges and splits."""
 
 from __future__ import annotations
 
@@ -22,31 +22,32 @@ from visup.percepts.motion.dark_sky.body import (
 from visup.percepts.motion.dark_sky.sky import Components, Mask
 from visup.percepts.motion.dark_sky.splitting import Share, placed, split
 
-SHARED = 0.25  # share of the smaller of a body and a component from which they belong together
-GROWS = 1.5  # growth of an area from one frame to the next from which something else has joined
-VISIBLE = 0.5  # share of its look that must be visible for it to be looked at anew beside others
-MOVED = 3  # way, along either axis, pixels, after which it is
-LARGER = 1.03  # growth of its area after which it is
-LEAST_SEEN = 0.05  # share of its look that must be visible for a body not to be hidden
-PART = 0.5  # area, as a share of that of a body, up to which what has just come off may be a part of it
-COMING_S = 2.0  # age of a body up to which it has just come into view, seconds
+SHARED = 0.25  # least overlap of a body and its component, as a share of the smaller
+GROWS = 1.5  # growth of a component's area over its body's from which something else has joined
+# When a body that touches others gets a new template: it is visible enough and has moved, or is larger.
+VISIBLE = 0.5  # least visible share of its template
+MOVED = 3  # least displacement along either axis since the template was taken, pixels
+LARGER = 1.03  # visible area, in areas of the template, that suffices by itself
+LEAST_SEEN = 0.05  # visible share of its template below which a body is hidden
+PART = 0.5  # area, as a share of the largest body's, up to which a new body may be a part of it
+COMING_S = 2.0  # age up to which a body has just come into view, seconds
 SAME_WAY = 0.5  # difference of velocities, as a share of the greater, up to which two move alike
-SLOWEST = 5.0  # pixels per second from which a body clearly comes in
-FORGOTTEN_S = 0.5  # how long a body that is not seen is looked for, seconds
-HIDDEN_S = 10.0  # the same while it may be hidden by another one
+SLOWEST = 5.0  # speed from which two bodies can be said to move alike, pixels per second
+FORGOTTEN_S = 0.5  # how long the track of a body without a component is kept, seconds
+HIDDEN_S = 10.0  # the same while another body may hide it
 
 Bodies = tuple[SkyBody, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyFrame:
-    """What bodies are followed in.
+    """The measurements of one frame.
 
     Attributes:
-        tone: (H, W) uint8.
+        tone: (H, W) uint8, brightness of the frame.
         found: Its bright components.
-        now: Time, seconds.
-        ground: (x, y) way of the ground since the first frame, frame pixels.
+        now: Time of the frame, seconds.
+        ground: (x, y) displacement of the ground since the first frame, frame pixels.
     """
 
     tone: NDArray[np.uint8]
@@ -56,12 +57,15 @@ class SkyFrame:
 
 
 def follow(bodies: Bodies, frame: SkyFrame, first: int) -> Bodies:
-    """The bodies in the next frame, by key: those that were followed, and new ones.
+    """Update the tracks of bodies with a frame: continue, drop, and initiate tracks.
 
     Args:
-        bodies: Those of the frame before.
+        bodies: Tracks of the previous frame.
         frame: The frame.
-        first: Key of the first new body; no other one has had it.
+        first: Key of the first new track; greater than all keys used before.
+
+    Returns:
+        The tracks, sorted by key.
     """
     within = [_component(b, frame) for b in bodies]
     now = frame.now
@@ -81,9 +85,9 @@ def _key(body: SkyBody) -> int:
 
 
 def _component(body: SkyBody, frame: SkyFrame) -> int:
-    """The component that a body belongs to; 0 for none.
+    """The component that a body belongs to: the one with the most common pixels; 0 for none.
 
-    It shares most with it; what the border cuts belongs to one that the border cuts, if there is any.
+    A body that the border cuts prefers components that the border cuts.
     """
     areas, labels = frame.found.areas, frame.found.labels
     inside, part = overlap(body.look, body.expected(frame.now), (labels.shape[0], labels.shape[1]))
@@ -97,7 +101,7 @@ def _component(body: SkyBody, frame: SkyFrame) -> int:
 
 
 def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Iterator[SkyBody]:
-    """Bodies that share a component, in this frame."""
+    """The updated tracks of the bodies that share a component; tracks of mere parts of others are dropped."""
     joined = _one_of_parts(_settled(bodies), frame.now)
     merged, bodies = len(joined) < len(bodies), joined
     one, cut = bodies[0], bool(frame.found.cut[component])
@@ -113,15 +117,16 @@ def _followed(bodies: Sequence[SkyBody], component: int, frame: SkyFrame) -> Ite
 
 
 def _settled(bodies: Sequence[SkyBody]) -> Sequence[SkyBody]:
-    """The bodies without small ones that were alone too shortly, which are parts of the others."""
+    """The bodies without small ones that have never been alone for long: those are parts of the others."""
     least = PART * max(b.area for b in bodies)
     return [b for b in bodies if b.id or b.cut or b.settled or b.area > least]
 
 
 def _one_of_parts(bodies: Sequence[SkyBody], now: float) -> Sequence[SkyBody]:
-    """The bodies without parts of one that has come in.
+    """The bodies, with the parts of one body that comes into view merged into the largest part.
 
-    Neither was ever seen whole, and they have just come into view, or move alike.
+    Two bodies are parts of one if neither was ever seen whole, and both have just come into view or move
+    alike.
     """
     kept: list[SkyBody] = []
     for body in sorted(bodies, key=lambda b: (not b.id, -b.area, b.key)):
@@ -141,7 +146,7 @@ def _parts_of_one(a: SkyBody, b: SkyBody, now: float) -> bool:
 
 
 def _alone(body: SkyBody, mask: Mask, frame: SkyFrame) -> SkyBody:
-    """A body that is a component of its own: it looks as it looks now."""
+    """The track of a body that is a component of its own: its template is taken from this frame."""
     known = replace(body, visible=mask)
     return known.looking(look_at(mask, frame.tone), frame.ground, frame.now, alone=True)
 
@@ -149,7 +154,15 @@ def _alone(body: SkyBody, mask: Mask, frame: SkyFrame) -> SkyBody:
 def _touching(
     body: SkyBody, corner: Corner, share: Share, frame: SkyFrame, *, fits: bool
 ) -> SkyBody:
-    """A body that touches others: it looks as it looks now, and where it is hidden as it did before."""
+    """The track of a body that touches others: its template is kept, at least where the body is hidden.
+
+    Args:
+        body: The track of the previous frame.
+        corner: (x, y) of its box, from `placed`.
+        share: Its part of the component, from `split`.
+        frame: The frame.
+        fits: Whether its template matches at the corner.
+    """
     if np.count_nonzero(share.mask) < LEAST_SEEN * body.area:
         return body
     known = replace(body, visible=share.mask, covers=share.covers)
@@ -161,14 +174,14 @@ def _touching(
 
 
 def _changed(body: SkyBody, corner: Corner, visible: int) -> bool:
-    """Whether a body is at another place than when it was looked at, or larger."""
+    """Whether a body has moved since its template was taken, or is larger than that."""
     (x, y), seen = body.look.corner, visible / body.area
     way = max(abs(corner[0] - x), abs(corner[1] - y))
     return seen > LARGER or (seen > VISIBLE and way >= MOVED)
 
 
 def _new(key: int, component: int, frame: SkyFrame, born: float) -> SkyBody:
-    """A body that was not known."""
+    """The initial track of a component that belongs to no known body."""
     mask = frame.found.bright & (frame.found.labels == component)
     look = look_at(mask, frame.tone)
     sides = sides_of(look, mask.shape)

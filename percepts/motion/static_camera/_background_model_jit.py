@@ -47,14 +47,14 @@ class LearningRates(NamedTuple):
 
     Attributes:
         seconds: Since the last image.
-        settle: Least weight of an image.
-        restless: Weight of an image for the variance.
+        settle: Least learning rate of the mean.
+        restless: Learning rate of the variance.
         fits: Squared distance, in variances, below which a pixel shows the background.
-        rare: Squared distance at which its effect on the variance is clipped.
-        least: Least variance.
-        most: Greatest variance.
-        alike: Squared distance, over three channels, below which two tones are the same.
-        slowly: Pace at which time counts for a thing that rests, as a share.
+        rare: Squared distance, in variances, at which a pixel's effect on the variance is clipped.
+        least: Least variance, squared grey levels.
+        most: Greatest variance, squared grey levels.
+        alike: Squared distance, summed over three channels, below which two tones are the same.
+        slowly: Factor on the time for which a candidate is seen on an object of `Covered.things`.
     """
 
     seconds: float
@@ -69,12 +69,12 @@ class LearningRates(NamedTuple):
 
 
 class Covered(NamedTuple):
-    """Where objects are, each (h, w).
+    """Where objects are, each (h, w) bool.
 
     Attributes:
-        moving: They are reported: there the background is replaced less easily.
-        gone: One that was part of the background has left.
-        things: One hides a background that was known before, which is hardly ever replaced.
+        moving: Objects are reported: the background is replaced less easily.
+        gone: An object that was part of the background has left: the background is replaced at once.
+        things: An object hides a background that was known before: it is hardly ever replaced.
     """
 
     moving: Mask
@@ -105,7 +105,7 @@ def _is_shadow(image: Floats, mean: Floats, y: int, x: int, shade: ShadowLimits)
         here, now = float(mean[y, x, i]), float(image[y, x, i])
         power, common, own = power + here * here, common + now * here, own + now * now
     bright = common / power
-    # Squared residual of the tone after the background, scaled to its brightness, is subtracted.
+    # Squared residual of the pixel after subtracting the background at the pixel's brightness.
     hue = own - 2 * bright * common + bright * bright * (power - 1)
     same = hue < shade.hue * shade.hue * power + shade.noise
     return same and shade.darkest < bright < shade.brightest and power > shade.least
@@ -196,7 +196,8 @@ def update_planes(
                 instead = instead + lasted if alike else lasted
             _approach(mean, image, y, x, weight)
             _approach(other, image, y, x, step)
-            # Leaves and water vary strongly and return; a single passing object has little effect.
+            # Leaves and water vary often, which raises the variance; a single passing object hardly does,
+            # since `rare` clips its effect.
             if not moves:
                 spread += pace.restless * (min(off, pace.rare) - 1) * spread
             enough = (3 * seen if moves else min(seen, 20.0)) + 0.2
@@ -213,7 +214,7 @@ def update_planes(
 
 @compiled
 def _approach(tones: Floats, image: Floats, y: int, x: int, step: np.float32) -> None:
-    """Move a tone of (h, w, 3) by a share `step` of the way to that of the image; most stay as they are."""
+    """Blend one pixel of (h, w, 3) `tones` with the image, in place, with weight `step`, 0 to 1."""
     if step > 0:
         for i in range(3):
             tones[y, x, i] += step * (image[y, x, i] - tones[y, x, i])
@@ -240,9 +241,17 @@ def reveal_planes(planes: BackgroundPlanes, image: Floats, bare: Mask, start: fl
 
 @compiled
 def has_exposure(image: Floats, mean: Floats, step: int, even: float) -> bool:
-    """Whether most sampled pixels are about as bright as the background, in each channel.
+    """Whether the exposure of an image equals the background's: a test that is cheaper than the median.
 
-    They are at most a share `even` brighter or darker; then so is their median, which takes longer to find.
+    Args:
+        image: (h, w, 3) the image.
+        mean: (h, w, 3) tone of the background.
+        step: Stride of the sampled rows and columns.
+        even: Relative difference of brightness that is tolerated.
+
+    Returns:
+        Whether in each channel more than half of the sampled pixels are within `even` of the background, on
+        either side, which implies that the median ratio is.
     """
     least, most = np.float32(1 - even), np.float32(1 + even)
     for i in range(3):

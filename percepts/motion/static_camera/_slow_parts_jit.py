@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 def squared_difference(
     now: NDArray[np.uint8], old: NDArray[np.uint8], exposure: np.float32
 ) -> Floats:
-    """Squared difference of two (h, w) images, the older one at `exposure` times its brightness, (h, w)."""
+    """Squared difference of two (h, w) images, the older one multiplied by `exposure`, (h, w) float32."""
     out = np.empty(now.shape, np.float32)
     for y in range(now.shape[0]):
         for x in range(now.shape[1]):
@@ -28,13 +28,13 @@ def squared_difference(
 def believe_bare(
     share: Floats, was_hidden: Mask, hidden: Mask, pace: tuple[np.float32, np.float32]
 ) -> None:
-    """Update the belief that ground is bare, in place.
+    """Update, in place, the belief that no object hides the ground.
 
     Args:
-        share: (h, w) the belief, 0 to 1.
-        was_hidden: (h, w) which ground was ever hidden.
-        hidden: (h, w) which is.
-        pace: How fast belief grows where ground was hidden, and where it never was.
+        share: (h, w) the belief, 0 to 1; updated.
+        was_hidden: (h, w) where the ground was ever hidden; updated.
+        hidden: (h, w) where it is hidden in this frame.
+        pace: Growth of the belief per frame where the ground was hidden before, and where it never was.
     """
     fast, slow = pace
     for y in range(share.shape[0]):

@@ -11,7 +11,7 @@ from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
 
 MOST = 60.0  # greatest cost of a pixel, grey levels
-ROUNDING = 1e-6  # by which the cost of a part of the pixels may seem to exceed that of all
+ROUNDING = 1e-6  # tolerance for rounding when a partial cost is compared with a bound
 
 
 @compiled
@@ -28,15 +28,16 @@ def best_shift(
 
     Args:
         image: (h, w, 3) float32.
-        free: (h, w) float32, how far each pixel is free for the template, 0 to 1.
-        shape: (m, n) bool template.
+        free: (h, w) float32, weight of each pixel, 0 to 1: 0 outside the blob, less where already claimed.
+        shape: (m, n) bool, silhouette of the template.
         tone: (m, n, 3) float32, its tones.
         corner: (x, y) of the unshifted template.
         reach: Greatest shift along either axis, pixels.
         step: Stride of the compared rows and columns.
 
     Returns:
-        The cost, grey levels, and the shift (x, y); the first one of equal costs.
+        (cost, dx, dy): mean cost per compared pixel, grey levels, with a penalty of half a level per pixel of
+        shift, and the shift; the first one of equal costs.
     """
     numbers = np.zeros((step, step), np.int64)
     for j in range(shape.shape[0]):
@@ -44,7 +45,7 @@ def best_shift(
             numbers[j % step, i % step] += shape[j, i]
     compared = numbers.max()
     listed = _listed(shape, tone, free.shape[1], step, numbers[0, 0])
-    # No shift that costs more than none at all can be the best.
+    # The cost of shift 0 bounds the best cost from the start, so that most shifts are abandoned early.
     bound = _cost(image, free, shape, tone, corner, (step, compared, np.inf))
     best, best_x, best_y = np.inf, 0, 0
     for dy in range(-reach, reach + 1):
@@ -73,11 +74,18 @@ def _is_within(shape: NDArray[np.bool_], corner: tuple[int, int], free: Floats) 
 def _listed(
     shape: NDArray[np.bool_], tone: Floats, width: int, step: int, count: int
 ) -> tuple[NDArray[np.uint64], Floats, NDArray[np.int64]]:
-    """The pixels of a template that are compared where it lies wholly in an image of some width.
+    """The compared pixels of a template as flat lists, for places where it lies wholly in the image.
+
+    Args:
+        shape: (m, n) bool, silhouette of the template.
+        tone: (m, n, 3) float32, its tones.
+        width: Width of the image, pixels.
+        step: Stride of the compared rows and columns.
+        count: Number N of compared pixels.
 
     Returns:
-        (N,) how far each lies from the template's corner, pixels of the image in its order; (N, 3) tones;
-        and (M,) where the pixels of each row end.
+        (N,) uint64 offset of each pixel from the template's corner in the flattened image; (N, 3) float32
+        tones; (M,) int64 end of each of the M compared rows in these lists.
     """
     away, tones = np.empty(count, np.uint64), np.empty((count, 3), np.float32)
     ends, n = np.empty((shape.shape[0] + step - 1) // step, np.int64), 0
@@ -102,11 +110,11 @@ def _listed_cost(
     """`_cost`, with the same result, of a template that lies wholly in the image; twice as fast.
 
     Args:
-        image: As in `best_shift`, as is the next.
-        free: How far each pixel is free.
+        image: As in `best_shift`.
+        free: As in `best_shift`.
         listed: From `_listed`.
-        corner: The template's place.
-        limits: As of `_cost`, without the stride.
+        corner: (x, y) of the template in the image.
+        limits: As in `_cost`, without the stride.
     """
     away, tones, ends = listed
     compared, bound = limits
@@ -138,12 +146,13 @@ def _cost(
     """Mean cost of the pixels of a template in one place; infinite when it has none in the image.
 
     Args:
-        image: As in `best_shift`, as are the next four.
-        free: How far each pixel is free.
-        shape: The template.
-        tone: Its tones.
-        corner: Its place.
-        limits: Stride; most pixels that are compared; a cost above which only some greater one is returned.
+        image: As in `best_shift`.
+        free: As in `best_shift`.
+        shape: As in `best_shift`.
+        tone: As in `best_shift`.
+        corner: (x, y) of the template in the image.
+        limits: (stride, greatest number of compared pixels, bound): once the cost is certain to exceed the
+            bound, infinity is returned.
     """
     step, compared, bound = limits
     height, width = free.shape

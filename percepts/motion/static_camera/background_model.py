@@ -1,9 +1,9 @@
 """A per-pixel background model for a static camera.
 
 Each pixel has a background tone with its variance, and a candidate: the tone that it has shown instead
-recently. A candidate that has been seen longer than the background replaces it, so that an object which
-stood there when the video began, and leaves, does not remain foreground for ever. (After Stauffer and
-Grimson, Adaptive background mixture models, 1999, with two modes; shadows after Horprasert, Harwood,
+recently. A candidate that has been seen longer than the background replaces it, so that the place of an
+object that was there when the video began, and leaves, does not remain foreground for ever. (After Stauffer
+and Grimson, Adaptive background mixture models, 1999, with two modes; shadows after Horprasert, Harwood,
 Davis, A statistical approach for robust background subtraction, 1999.)
 """
 
@@ -41,23 +41,23 @@ RESTLESS_S = 8.0  # time constant of the variance, seconds
 SHADE = 0.6  # least brightness in a shadow, as a share of the background's
 HUE = 0.055  # greatest difference of colour in a shadow, as a share of brightness
 RARE = 10.0  # squared distance, in variances, at which a pixel's effect on the variance is clipped
-SLOWLY = 0.01  # pace at which what came and rests becomes background, as a share: minutes to hours
+SLOWLY = 0.01  # factor on the time for which a resting object is seen: minutes to hours to replace
 EVEN = 0.03  # relative change of exposure that is ignored
-SAMPLED = 4  # every how many pixels along x and y the exposure is estimated from
+SAMPLED = 4  # stride, along x and y, of the pixels from which the exposure is estimated
 LIT = 1.12  # greatest brightness in reflected light, as a share of the background's
 CAST = ShadowLimits(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
-    """State of the background model; its arrays are its own, and updated in place.
+    """State of the background model. It owns its arrays, which are updated in place.
 
     Attributes:
         mean: (h, w, 3) float32, background tone, grey levels.
         variance: (h, w) float32, of one channel.
         seen_s: (h, w) float32, how long that tone was seen, seconds; 0 where the background is unknown.
         other: (h, w, 3) float32, tone of the candidate, grey levels.
-        other_s: (h, w) float32, how long it was seen, seconds.
+        other_s: (h, w) float32, how long the candidate was seen, seconds.
     """
 
     mean: Floats
@@ -68,7 +68,7 @@ class BackgroundModel:
 
 
 def initial_model(image: Floats) -> BackgroundModel:
-    """The model after a single (h, w, 3) image."""
+    """The model after a single image, (h, w, 3) float32, BGR."""
     bare = np.zeros(image.shape[:2], np.float32)
     return BackgroundModel(
         image.copy(), bare + NOISE**2, bare + np.float32(FIRST_S), image.copy(), bare
@@ -76,7 +76,10 @@ def initial_model(image: Floats) -> BackgroundModel:
 
 
 def with_unknown(background: BackgroundModel, where: Mask) -> BackgroundModel:
-    """The background, unknown in some places where an object may have stood."""
+    """The model, unknown where `where` is set, (h, w) bool: an object may have hidden the background there.
+
+    It shares the other arrays with the given one, which must not be used any more.
+    """
     return replace(background, seen_s=np.where(where, 0, background.seen_s).astype(np.float32))
 
 
@@ -86,7 +89,7 @@ def reveal_background(background: BackgroundModel, image: Floats, bare: Mask) ->
 
 
 def shadow_mask(background: BackgroundModel, image: Floats) -> Mask:
-    """Where an image differs in brightness but not in hue, as in shadows and reflections."""
+    """(h, w) bool: where an image differs in brightness but not in hue, as in shadows and reflections."""
     return shadow_pixels(image, background.mean, CAST)
 
 
@@ -113,10 +116,13 @@ def update_background(
     Args:
         background: The model.
         image: (h, w, 3) float32.
-        moving: (h, w) bool, where objects are reported: there the background is replaced less easily.
+        moving: (h, w) bool, where objects are reported: a candidate must be seen for longer to replace the
+            background.
         seconds: Since the last image.
-        gone: (h, w) bool, where an object that was part of the background has left: it is forgotten.
-        things: (h, w) bool, where an object hides a background that was known before: it is kept for long.
+        gone: (h, w) bool, ghosts: an object that was part of the background has left, so the image replaces
+            the background at once.
+        things: (h, w) bool, where an object hides a background that was known before it came: a candidate
+            replaces it only after minutes or hours.
     """
     pace = LearningRates(
         seconds,

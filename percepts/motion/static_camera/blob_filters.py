@@ -1,4 +1,4 @@
-"""Filters for blobs that are no objects: unmoved ones, limbs, shadows and ghosts."""
+"""Filters for blobs that are not objects: unmoved ones, limbs, shadows and ghosts."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks
 
 LIMB = 0.35  # largest area of a limb, as a share of its object
 LEAST_GONE = 3.0  # least displacement of a side before an object is reported, pixels
-LEAST_SHARE = 0.25  # the same as a share of its size
-FOLLOWED = 0.5  # least displacement of the opposite side, as a share
+LEAST_SHARE = 0.25  # the same as a share of the square root of its area
+FOLLOWED = 0.5  # least displacement of the opposite side, as a share of that of the first
 STRAIGHT = 0.6  # least net displacement as a share of the path length
 DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of the background's
 EVENLY = 1.5  # greatest ratio of the relative brightness of a shadow's brightest and darkest parts
 SAME_HUE = 0.035  # greatest difference of colour in a shadow, as a share of brightness
-GHOST = 0.6  # edge strength in the image, as a share of the background's, below which it is a ghost
-THING = 1 / GHOST  # the same above which something stands before a background that was known before
+GHOST = 0.6  # outline contrast (see `outline_contrast`) below which a blob is a ghost
+THING = 1 / GHOST  # the same, above which a blob is an object in front of a known background
 FRAGMENT = 0.2  # largest gap between a part and its object, as a share of the object's length
 
 
 def is_salient_blob(s: BlobTrack) -> bool:
-    """Whether a side of an object's box has moved away on a fairly straight path.
+    """Whether a blob has moved as an object does: a side of its box has moved away on a fairly straight path.
 
-    The opposite side must have followed, unless the image border cuts the object. Shadows do so too and are
-    excluded.
+    The opposite side must have followed, unless the image border cuts the object. Shadows also move like
+    that, and are excluded.
     """
     if s.shadow:
         return False
@@ -42,7 +42,7 @@ def is_salient_blob(s: BlobTrack) -> bool:
 
 
 def merge_parts(known: BlobTracks) -> BlobTracks:
-    """Merge small parts that were initiated beside an object, and move with it, into that object."""
+    """Merge small tracks that were initiated beside an older one, and move with it, into the older one."""
     out = list(known)
     for s in known:
         if s.visible is None:
@@ -85,9 +85,9 @@ def _with_part(host: BlobTrack, s: BlobTrack) -> BlobTrack:
 
 
 def is_deep_shadow(s: BlobTrack, image: Floats, background: Floats) -> bool:
-    """Whether an outline shows the background dimmed by a uniform factor: a cast shadow.
+    """Whether a blob shows the background dimmed by a uniform factor: a cast shadow.
 
-    The ratio of an object to the background that it hides varies more from place to place.
+    The ratio of an object's brightness to that of the background that it hides varies more.
 
     Args:
         s: The object.
@@ -108,11 +108,11 @@ def is_deep_shadow(s: BlobTrack, image: Floats, background: Floats) -> bool:
 
 
 def outline_contrast(s: BlobTrack, now: Floats, background: Floats) -> float | None:
-    """How much stronger the edges along an outline are in the image than in the background model.
+    """Ratio of the edge strength along an outline in the image to that in the background model.
 
-    A thing brings its outline along; where one that was part of the background has left, the outline is in
-    the background only. A shadow also dims the edges that it falls on, so shadows are neither; but one too
-    thin to have an interior is not certain to be a shadow.
+    It is high for an object, whose outline is in the image only, and low for a ghost, whose outline is in the
+    background only. It says nothing about a shadow, which dims the edges that it falls on; a blob too thin to
+    have an interior, however, is not certain to be a shadow.
 
     Args:
         s: The object.
@@ -120,7 +120,7 @@ def outline_contrast(s: BlobTrack, now: Floats, background: Floats) -> float | N
         background: (h, w, 3) float32 background.
 
     Returns:
-        The ratio; None where nothing can be said.
+        The ratio; None if the blob is hidden, shared with other objects, or a shadow.
     """
     if s.visible is None or s.merged:
         return None

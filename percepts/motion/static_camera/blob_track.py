@@ -24,12 +24,12 @@ class BlobTrack:
     Attributes:
         key: Number in order of initiation.
         id: Public number, 0 until reported.
-        initiated: Seconds.
-        last_seen: Seconds when last visible.
+        initiated: Time of initiation, seconds.
+        last_seen: Time when last visible, seconds.
         frames: Number of frames in which it was visible.
-        corner: (x, y) of the template, pixels.
+        corner: (x, y) of the upper left corner of the template, pixels of the background model.
         velocity: (vx, vy), pixels per second.
-        shape: (h, w) bool, template: its silhouette when it last stood alone.
+        shape: (h, w) bool, template: its silhouette when it was last isolated.
         tone: (h, w, 3) float32, its tones, grey levels.
         histogram: (TONES ** 3,) float32 of its tones, sums to 1.
         initial_sides: (4,) sides of its box at initiation: left, top, right, bottom.
@@ -37,7 +37,7 @@ class BlobTrack:
         isolated_frames: Number of frames in which it shared no blob.
         visible: Its visible pixels as (box, mask within it); None when hidden.
         merged: Whether it shares a blob with others.
-        cut: Whether the image border cuts it, or ever did: then it is no limb of another.
+        cut: Whether the image border cuts it, or ever did: then it is not a part of another object.
         split_px: Displacement since it was last seen in one piece, pixels.
         shadow: Whether it looks like a deep shadow; evaluated only without a public id.
     """
@@ -87,11 +87,11 @@ class Foreground:
     """The foreground of one frame.
 
     Attributes:
-        image: (h, w, 3) float32.
+        image: (h, w, 3) float32, BGR, at the size of the background model.
         labels: (h, w) int32, number of the blob at each pixel, 0 for none.
-        count: How many blobs.
-        time: Seconds.
-        seconds: Since the frame before.
+        count: Number of blobs.
+        time: Time of the frame, seconds.
+        seconds: Seconds since the previous frame.
     """
 
     image: Floats

@@ -1,8 +1,8 @@
 """Multi-object tracking of foreground blobs before a static background.
 
-One blob may show several objects and one object several blobs. Each object has a template of its
-silhouette and tones from when it was last isolated, which tells its part of a shared blob, and where it is
-while others occlude it.
+One blob may show several objects, and one object may appear as several blobs. Each object has a template of
+its silhouette and tones from when it was last isolated (did not share a blob). Matching the template gives
+the object's part of a shared blob, and its position while others occlude it.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ VISIBLE = 0.2  # visible share of its template below which an object is hidden
 FRAGMENT = 0.2  # largest gap between fragments of one object, as a share of its length
 FOLLOW = 0.35  # weight of a newly measured velocity
 APART = 2  # isolated frames after which a track is an object of its own
-PASSED = 0.6  # displacement in pieces, in lengths, after which they are several objects
+PASSED = 0.6  # displacement, in lengths, after which the pieces of an object are several objects
 PIECE = 0.35  # least area of a piece that may be an object, as a share of the largest
-GROWN = 1.3  # visible area, in areas of its template, of an object that has come into view
+GROWN = 1.3  # visible area, in areas of the template, from which the template is outdated
 
 
 def track_blobs(known: BlobTracks, view: Foreground, last_key: int) -> tuple[BlobTracks, int]:
@@ -107,7 +107,10 @@ def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
 
 
 def _claimants(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[BlobTrack]) -> list[int]:
-    """The objects that share a blob; tracks never isolated are no objects of their own."""
+    """Indices of the objects that share a blob.
+
+    Those that have hardly been isolated yet are left out, unless all are: then the first one has the blob.
+    """
     all_ = [i for i, c in enumerate(claims) if blob in c]
     known = [i for i in all_ if ahead[i].isolated_frames >= APART]
     return known or all_[:1]
@@ -153,13 +156,20 @@ def _blob_appearance(mask: Mask, view: Foreground) -> tuple[tuple[float, float],
 def _merged_parts(
     s: BlobTrack, parts: Sequence[Mask], alone: bool, slender: float
 ) -> tuple[Mask | None, list[Mask]]:
-    """The parts of an object as one mask, and those too far from the largest to be its own."""
+    """The parts that make up an object as one mask, and those that do not belong to it.
+
+    Args:
+        s: The predicted track.
+        parts: (h, w) bool masks assigned to the object.
+        alone: Whether it shares no blob.
+        slender: Width of a body as a share of its height.
+    """
     if not parts:
         return None, []
     order = sorted(parts, key=lambda m: -int(np.count_nonzero(m)))
     whole, others = order[0], []
     reach = max(3, round(FRAGMENT * max(s.shape.shape)))
-    # A static occluder splits an object only for as long as it takes to pass.
+    # A static occluder, such as a post, splits an object only until the object has passed it.
     two = s.split_px > PASSED * max(s.shape.shape)
     for part in order[1:]:
         bodies = s.split_px > 0 and are_bodies(_box(whole), _box(part), slender)
@@ -266,7 +276,7 @@ def _shifted(s: BlobTrack, mask: Mask, view: Foreground) -> BlobTrack:
 def _measured_anew(
     s: BlobTrack, before: BlobTrack, box: Box, shape: Mask, view: Foreground
 ) -> BlobTrack:
-    """Update of a wholly visible object: box, velocity, template and tones are measured anew."""
+    """Update of a fully visible object: box, velocity, template and tones are measured anew."""
     elapsed = max(view.time - before.last_seen, view.seconds, 1e-3)
     old = before.centre
     new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)

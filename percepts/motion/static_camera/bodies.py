@@ -30,10 +30,10 @@ WIDE = 1.6  # least width of a blob of two bodies, in widths of a body
 MOST = 3  # bodies in one blob
 APART = 2  # isolated frames after which a track is an object of its own
 THIN_PX = 4  # least width of a body, pixels
-NOTCH = 0.86  # greatest height of the notch, as a share of the lower body: shoulders are at 0.82
-ALIKE = 0.6  # least height of the lower of two bodies, as a share of the higher
+NOTCH = 0.86  # greatest height of the notch, as a share of the shorter body: shoulders are at 0.82
+ALIKE = 0.6  # least height of the shorter of two bodies, as a share of the taller
 WHOLE = 0.6  # least width of a piece that counts as a body, as a share of a body's width
-AROUND = 0.3  # search range of a cut around equal shares, as a share of a body's width
+AROUND = 0.3  # search range of a cut about the equal division, as a share of a body's width
 
 
 def with_bodies_apart(view: Foreground, tracks: Sequence[BlobTrack], slender: float) -> Foreground:
@@ -99,7 +99,7 @@ def parting_columns(mask: Mask, slender: float) -> tuple[int, ...]:
 
 
 def are_bodies(a: tuple[int, int, int, int], b: tuple[int, int, int, int], slender: float) -> bool:
-    """Whether two pieces of an outline are bodies side by side, not halves of one behind a post.
+    """Whether two pieces of an object are bodies side by side, rather than halves of one behind a post.
 
     Args:
         a: (x, y, width, height) of one.
@@ -120,7 +120,7 @@ def _heights(mask: Mask) -> NDArray[np.int64]:
 
 
 def _shared(blob: int, labels: Labels, tracks: Sequence[BlobTrack]) -> int:
-    """How many tracks of objects of their own are predicted in a blob."""
+    """Number of tracks that were isolated before and are predicted to lie in a blob."""
     count = 0
     for s in tracks:
         at, own = template_window(s, labels.shape)

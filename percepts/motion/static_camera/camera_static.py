@@ -11,7 +11,7 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 TELLS = 16.0  # least information of a point that would reveal motion, 1 / pixels squared
 FITS = 9.0  # squared Mahalanobis distance up to which a point fits a static camera
-SPREAD = 0.5  # least share of the grid cells that must hold such points
+SPREAD = 0.5  # least share of the grid cells that must hold points with that information
 RESTS = 0.85  # least share of those cells that fit when the camera is static
 MOVES = 0.6  # share of those cells below which the camera moves
 
@@ -23,7 +23,7 @@ def is_camera_static(scene: FrameMeasurements) -> bool | None:
         scene: Measurements of a frame.
 
     Returns:
-        None when there is too little structure to tell, or the evidence is mixed.
+        True or False; None when there is too little structure, or the evidence is mixed.
     """
     shares = [_still_share(scene, i) for i in range(len(scene.measured))]
     if any(s is not None and s < MOVES for s in shares):
@@ -32,6 +32,7 @@ def is_camera_static(scene: FrameMeasurements) -> bool | None:
 
 
 def _still_share(scene: FrameMeasurements, number: int) -> float | None:
+    """Share of the grid cells at rest in one measurement; None if too few cells hold points."""
     c = scene.measured[number].constraints
     use = c.information[:, 0] + c.information[:, 2] > TELLS
     use &= scene.owner[scene.cell_of(c)] == 0

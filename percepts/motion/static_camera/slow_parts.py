@@ -1,14 +1,15 @@
-"""Parts of a body that hardly move, found before a static camera by their slow change.
+"""Completes regions by the nearly motionless parts of a body, which change slowly but measurably.
 
-Who has been in view from the start hides ground that was never seen, so subtraction cannot show the whole of
-him, and the layers show what moves: an arm, not the legs that he stands on. Yet no living body rests as the
-ground does: within half a second its outline shifts by a part of a pixel, which changes grey values by
-several times the noise. Noise, and leaves that tremble, change as much from one frame to the next as within
-half a second; a slow body does not. So change over longer spans is compared with that over one frame.
+A person who is in view from the start hides ground that the background model has never seen, so background
+subtraction does not show all of the body; motion layers show only what moves: an arm, not the legs. But no
+living body is as still as the ground: within half a second its outline shifts by a fraction of a pixel, which
+changes grey values by several times the noise. Noise and trembling leaves change as much between consecutive
+frames as within half a second; a slow body does not. Change over longer spans is therefore compared with
+change over one frame.
 
-What changes slowly beside a region is then joined to it by a random walk between superpixels (Grady, Random
-walks for image segmentation, 2006), with the region and the slow change on one side, and on the other what
-has structure, which would show motion, and has not changed.
+Slowly changing pixels beside a region are joined to it by random-walk segmentation of superpixels (Grady,
+Random walks for image segmentation, 2006). Seeds of the body are the region and the slow change; seeds of the
+ground are unchanged cells with structure, where motion would have been visible.
 """
 
 from __future__ import annotations
@@ -34,36 +35,36 @@ LEAST_NOISE = 0.5  # least mean squared change over one frame, squared grey leve
 AVERAGE = 1.0  # standard deviation of the average of change about a pixel, pixels
 SURE, LIKELY = 8.0, 3.0  # squared change over a span, in units of that over one frame: hysteresis
 NEAR = 5  # width of the surroundings whose greatest change over one frame counts, pixels
-GRADUAL = 1.0  # least change over one frame, as a share of what a steady shift explains
-OWN, CHANGED = 2.0, 0.3  # weight of a region, and of slow change, for a body
-BARE = 1.0  # weight of ground that has long been seen bare, against one
-FLAT = 0.05  # weight of a cell without structure, which cannot show change
+GRADUAL = 1.0  # least change over one frame, as a share of what a steady shift would cause
+OWN, CHANGED = 2.0, 0.3  # seed weight of a region, and of slow change, as body
+BARE = 1.0  # seed weight, as ground, of ground that no object has hidden for long
+FLAT = 0.05  # seed weight, as ground, of an unchanged cell without structure: change would not show
 BUSY = 3.0  # gradient at which a cell has structure, grey levels per pixel
 LINK = 0.3  # weight of the affinity of neighbouring cells
-THICK = 13  # least thickness of a part, pixels: outlines are off by less
+THICK = 13  # least thickness of an added part, pixels: a thinner one may be an error of the outline
 REACH = 0.5  # gaps that are closed, as a share of the square root of the regions' area
 MOST_REACH = 0.04  # the same as a share of the image's longer side
-BACK_S = 0.3  # how long ground is seen after it was hidden until it is certainly bare, seconds
+BACK_S = 0.3  # how long ground that was hidden must be seen to be certainly bare, seconds
 ALWAYS_S = (
-    2.4  # the same for ground that never was hidden: a body may have been there from the start
+    2.4  # the same for ground that was never hidden: a body may have been there from the start
 )
 
 
 class SlowChange:
-    """Change over some tenths of a second that noise and trembling do not explain; one per video."""
+    """Detects change over some tenths of a second that noise and trembling do not explain; one per video."""
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew, after the camera has moved."""
+        """Reset, after the camera has moved."""
         self._past: tuple[WorkImage, ...] = ()
         self._parts: Mask | None = None  # (h, w) parts found in the frame before
         self._last: Floats | None = None  # (h, w) squared change since the frame before
         self._brief: Floats | None = None  # (h, w) the same, averaged over time
 
     def note(self, image: WorkImage) -> None:
-        """Take in the next image."""
+        """Add the next image, and update the change over one frame."""
         if self._past and self._past[-1].shape != image.shape:
             self.forget()
         if self._past:
@@ -84,7 +85,8 @@ class SlowChange:
             return None
         *past, image = self._past
         last = _averaged(self._last)
-        # Also where leaves have only just moved, and beside what moves fast, which is seen as it is.
+        # The greatest change nearby counts as noise: leaves have trembled beside a pixel before it changes
+        # itself, and what moves fast is segmented by its motion anyway.
         brief = cv2.dilate(self._brief, np.ones((NEAR, NEAR), np.uint8))
         noise = np.maximum(brief, max(float(np.median(self._brief)), LEAST_NOISE))
         seconds, out = image.time - past[-1].time, None
@@ -93,25 +95,26 @@ class SlowChange:
             if not old:
                 break
             change = _averaged(_squared_change(image, old[-1]))
-            # What has come to rest in between is ground that was uncovered, or needs no completion.
+            # A pixel that changed once and is at rest now is uncovered ground, or an object that has stopped,
+            # which needs no completion.
             gradual = last > GRADUAL * (seconds / span) ** 2 * change
             found = _likely_pixels(np.asarray(change / noise, np.float32)) & gradual
             out = found if out is None else out | found
         if out is None or self._parts is None:
             return out
-        # A body that sways stands still for a moment at either end.
+        # A swaying body is still for a moment at either end: its parts are kept meanwhile.
         return out | (self._parts & (last < LIKELY * noise))
 
     def keep(self, parts: Mask) -> None:
-        """Count parts, (h, w) bool, as changed in the next frame where they still look the same."""
+        """Set the parts, (h, w) bool, that `pixels` reports in the next frame even if unchanged there."""
         self._parts = parts
 
 
 class GroundBelief:
-    """Belief that the ground is bare, the higher the longer it has looked like the background.
+    """Per-pixel belief that no object hides the ground; it grows while a pixel looks like the background.
 
-    What was hidden, and looks like the background again, is soon believed. What has always looked like it may
-    be a body that stood there when the background was first seen.
+    It grows quickly where the ground was hidden and has reappeared. It grows slowly where a pixel has always
+    looked like the background: that may be a body that was there when the background was initialised.
 
     Attributes:
         share: (h, w) float32, 0 to 1; None before the first image.
@@ -122,22 +125,22 @@ class GroundBelief:
         self._was_hidden: Mask | None = None
 
     def update(self, hidden: Mask, seconds: float) -> None:
-        """Note where the ground is hidden or unknown, `seconds` after the image before."""
+        """Update with where the ground is hidden or unknown, (h, w) bool, `seconds` after the last image."""
         if self.share is None or self._was_hidden is None:
             self.share, self._was_hidden = np.zeros(hidden.shape, np.float32), hidden.copy()
         pace = np.float32(seconds / BACK_S), np.float32(seconds / ALWAYS_S)
         believe_bare(self.share, self._was_hidden, hidden, pace)
 
     def cover(self, reported: Mask) -> None:
-        """Note where bodies are reported, (h, w) bool."""
+        """Reset the belief to 0 where bodies are reported, (h, w) bool."""
         if self.share is not None:
             self.share[reported] = 0
 
 
 def hardly_moves(velocity: tuple[float, float], scale: float) -> bool:
-    """Whether a region moves by less than the thickness of a part within the longest span.
+    """Whether a region moves by less than `THICK` within the longest span.
 
-    What moves faster shows itself by its motion, and uncovers ground, which changes as well.
+    A faster region is segmented by its motion, and uncovers ground, whose change would be taken for its own.
 
     Args:
         velocity: Of the region, frame pixels per second.
@@ -155,18 +158,18 @@ def with_slow_parts(
     scene: FrameMeasurements,
     size: tuple[int, int],
 ) -> tuple[tuple[Region, ...], Mask]:
-    """Regions with the parts beside them that change slowly.
+    """Regions extended by the slowly changing parts beside them.
 
     Args:
-        regions: In frame pixels.
-        others: Further regions, which are no part of these.
+        regions: Regions to extend, in frame pixels.
+        others: Further regions, whose pixels are not available.
         slow: (h, w) bool, working pixels, from `SlowChange`.
-        bare: Belief that the ground is bare, of any size; None if nothing is known.
+        bare: Belief that no object hides the ground, from `GroundBelief`, of any size; None if unknown.
         scene: The frame.
         size: (width, height) of the frame.
 
     Returns:
-        The regions, in the same order, and the parts, (h, w) bool; each part goes to the nearest region.
+        The regions, in the same order, and the added pixels, (h, w) bool; each goes to the nearest region.
     """
     masks = np.array([_reduced(r, slow.shape, size) for r in regions])
     own = np.asarray(masks.any(axis=0)) if len(masks) else np.zeros_like(slow)
@@ -184,7 +187,7 @@ def with_slow_parts(
 
 
 def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) -> Mask:
-    """What hangs together with some regions, (h, w) bool, and is a body rather than ground."""
+    """(h, w) bool: cells that are more likely body than ground, in components that touch the regions."""
     cells, image = scene.cells, scene.image
     mine, change = (cells.mean(m.astype(np.float32)) for m in (own, slow))
     enclosed = cells.mean(_closed(own, slow).astype(np.float32))
@@ -202,7 +205,7 @@ def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) 
 
 
 def _thick(added: Mask) -> Mask:
-    """Parts that are more than the rim by which an outline is off, (h, w) bool."""
+    """(h, w) bool: parts at least about `THICK` wide; thinner ones are errors of the outline."""
     if not added.any():
         return added
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (THICK, THICK))
@@ -212,7 +215,16 @@ def _thick(added: Mask) -> Mask:
 
 
 def _random_walk(body: Floats, ground: Floats, cells: Superpixels) -> Floats:
-    """Probability that a walk from a cell ends at a body, given the rates at which it ends in each cell."""
+    """Probability that a random walk from each cell ends at the body.
+
+    Args:
+        body: (cells,) rate at which a walk ends in each cell as body.
+        ground: (cells,) rate at which it ends there as ground.
+        cells: The superpixels; their links give the transition rates.
+
+    Returns:
+        (cells,) float32, 0 to 1.
+    """
     here = np.arange(cells.count)
     ends = (body.astype(np.float64) + ground + 1e-6) / LINK
     system, _ = weighted_laplacian(cells.link, here, ends)
@@ -220,7 +232,10 @@ def _random_walk(body: Floats, ground: Floats, cells: Superpixels) -> Floats:
 
 
 def _closed(own: Mask, slow: Mask) -> Mask:
-    """Regions and slow change, the gaps between them closed: what outlines enclose may not change."""
+    """(h, w) bool: regions and slow change after closing.
+
+    A body without texture changes only along its outline; closing includes what that encloses.
+    """
     reach = int(min(REACH * np.sqrt(np.count_nonzero(own)), MOST_REACH * max(own.shape)))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     both = own | slow
@@ -233,7 +248,7 @@ def _closed(own: Mask, slow: Mask) -> Mask:
 
 
 def _likely_pixels(change: Floats) -> Mask:
-    """Pixels that change, (h, w) bool: sure ones, and likely ones that hang together with them."""
+    """(h, w) bool: changing pixels by hysteresis: likely ones in components that hold a sure one."""
     count, labels = cv2.connectedComponents((change > LIKELY).view(np.uint8), connectivity=8)
     return chosen(labels, marked(labels, change > SURE, count))
 

@@ -61,12 +61,12 @@ LONGEST_S = (
     4.0  # most time at rest, seconds, that is credited against frames with too little structure
 )
 FLOODED = 0.6  # foreground share of the image above which the view itself has changed
-MANY_CELLS = 15  # least superpixels of a region whose outline the layers know well
+MANY_CELLS = 15  # superpixels from which the layers resolve the outline of a region well
 YOUNG_S = 0.3  # how long a track that was never reported is continued while missed, seconds
-SIZE = 768  # longer side of the background, pixels
+SIZE = 768  # longer side of the background model, pixels
 KNOWN = 0.6  # least foreground share of a region when the background shows what lies behind it
 START_S = 2.4  # age of the background up to which it may contain a newly reported object, seconds
-STRIDE_PX, MOST_STRIDES = 4.0, 32  # step of a swept mask, background pixels, and most steps
+STRIDE_PX, MOST_STRIDES = 4.0, 32  # step of a swept mask, background pixels; most steps
 HALO = 7  # dilation of regions, pixels: an outline may be off by half as much
 
 
@@ -130,7 +130,10 @@ class StaticCameraSegmenter:
     def _completed(
         self, scene: FrameMeasurements, regions: Sequence[Region], size: tuple[int, int]
     ) -> tuple[Region, ...]:
-        """The regions, those older than the background with the parts of them that hardly move."""
+        """The regions; slow ones that are older than the background are extended by their slow parts.
+
+        The background model cannot show such parts, since the object hid the ground from the start.
+        """
         scale = scene.image.scale
         old = [
             r
@@ -174,7 +177,11 @@ class StaticCameraSegmenter:
     def _reveal(
         self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
     ) -> None:
-        """Mark the background that regions hid since initialisation unknown; fill in what is uncovered."""
+        """Correct a young background model for objects that were present when it was initialised.
+
+        Where a newly reported region stands, or stood since then, the background becomes unknown; where it is
+        unknown and no region hides it, it is initialised from the image.
+        """
         assert self._background is not None
         background, shape = self._background, image.shape[:2]
         age = frame.time - self._since
@@ -227,7 +234,8 @@ class StaticCameraSegmenter:
         known = tuple(s for s in known if s not in ghosts)
         self._background = background
         gone = blob_mask(ghosts, change.shape) if ghosts else None
-        # Also where a blob has the tone of the ground: the model would follow it there, then inwards.
+        # With a rim: at the outline an object blends into the ground, and the model would adapt to it there,
+        # then further and further inwards.
         reported = _with_rim(blob_mask([s for s in known if s.id], change.shape))
         resting = _with_rim(blob_mask(things, change.shape))
         update_background(background, image, reported, seconds, gone, resting)
@@ -240,11 +248,12 @@ class StaticCameraSegmenter:
 
 
 def _with_rim(mask: Mask) -> Mask:
-    """A mask with the pixels beside it, which show some of both sides."""
+    """A mask dilated by two pixels: pixels at an outline mix object and ground."""
     return np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((5, 5), np.uint8)) > 0)
 
 
 def _prepare(frame: Frame) -> Floats:
+    """The frame at the size of the background model, slightly smoothed, (h, w, 3) float32 BGR."""
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
@@ -256,7 +265,7 @@ def _prepare(frame: Frame) -> Floats:
 
 
 def region_mask(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
-    """(h, w) bool: the background pixels that some regions may hide.
+    """(h, w) bool: the background pixels that regions may hide, dilated by `HALO`.
 
     Args:
         regions: In frame pixels.

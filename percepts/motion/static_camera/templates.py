@@ -23,7 +23,7 @@ from visup.percepts.motion.static_camera.blob_track import (
 
 SEARCH = 3  # least search range around the prediction, pixels
 ENOUGH = 1200  # approximate number of template pixels that are compared
-TAKEN = 0.3  # weight of a pixel that a nearer object has claimed
+TAKEN = 0.3  # factor on the weight of a pixel that a better fitting object has claimed
 
 
 def split_blob(
@@ -32,12 +32,12 @@ def split_blob(
     """Divide a blob among its claimants.
 
     Args:
-        blob: Its number.
-        rivals: The claimants, each with a number.
+        blob: Number of the blob in `view.labels`.
+        rivals: The claimants, each with an index of the caller's.
         view: The foreground of the frame.
 
     Returns:
-        For each claimant its number and an (h, w) mask.
+        For each claimant its index and an (h, w) bool mask of its pixels.
     """
     whole = view.labels == blob
     if len(rivals) < 2:
@@ -61,7 +61,7 @@ def split_blob(
 def _placed_templates(
     rivals: Sequence[BlobTrack], blob: Mask, view: Foreground
 ) -> list[tuple[int, int, int]]:
-    """Number and shift of each object in a blob, best fit first; later ones avoid its pixels."""
+    """(index, dx, dy) of each object in a blob, best fit first; its pixels then weigh less for the others."""
     free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
     while left:
         fits = [(best_template_shift(rivals[n], free, view), n) for n in left]
@@ -78,17 +78,17 @@ def best_template_shift(s: BlobTrack, blob: Floats, view: Foreground) -> tuple[f
 
     Args:
         s: The object.
-        blob: (h, w) float32, how far each pixel is free for it, 0 to 1.
+        blob: (h, w) float32, weight of each pixel, 0 to 1: 0 outside the blob, less where already claimed.
         view: The foreground of the frame.
 
     Returns:
-        The cost, grey levels, and the shift (x, y), whole pixels.
+        (cost, dx, dy): the cost in grey levels, and the shift in whole pixels.
     """
     # Large templates are subsampled.
     step = max(1, int(np.sqrt(np.count_nonzero(s.shape) / ENOUGH)))
     reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
     corner = round(s.corner[0]), round(s.corner[1])
-    # Of one layout, as the loop is compiled anew for another one, in the middle of a run.
+    # Contiguous, since for another memory layout the loop would be compiled again in the middle of a run.
     shape, tone = np.ascontiguousarray(s.shape), np.ascontiguousarray(s.tone)
     return best_shift(view.image, blob, shape, tone, corner, reach, step)
 

@@ -21,14 +21,14 @@ from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks
 from visup.percepts.motion.static_camera.bodies import SLENDER, are_bodies
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-KNOWN = 0.4  # least foreground share of a region that subtraction shows
+KNOWN = 0.4  # foreground share of a region from which background subtraction shows it
 COMMON = 0.5  # least overlap of two outlines of one object, as a share of the smaller
-WHOLE = 0.6  # intersection over union above which subtraction shows an object whole
-MAIN = 0.4  # least share of a region that a blob must fill to take its id: limbs do not
+WHOLE = 0.6  # intersection over union above which background subtraction shows all of an object
+MAIN = 0.4  # least share of a region that a blob must fill to take over its id: a limb fills less
 MISSED = 0.15  # share of a region's motion evidence outside of the foreground, above which parts are missed
-PIECE = 0.35  # least share of a body in a region, as a share of the largest
-LARGE = 4.0  # least area, in areas of a well-known region, at which subtraction may miss parts
-RECENT = 0.9  # weight of previous evidence per frame
+PIECE = 0.35  # least size of a body in a region, as a share of the largest body there
+LARGE = 4.0  # least area of a region of which parts may be missed, in `well_known_area`
+RECENT = 0.9  # decay factor of motion evidence per frame
 BESIDE = 5  # tolerance, pixels: points lie on edges, half of them outside of the blob
 LEAST_AREA = 0.0005  # least area of an object when first reported, as a share of the image
 
@@ -39,7 +39,7 @@ class MotionEvidence:
 
     Attributes:
         xy: (N, 2) float32, frame pixels.
-        sure: (N,) float32, log likelihood that they move as their region does, less that of rest.
+        sure: (N,) float32, log likelihood ratio of moving with their region against being at rest.
     """
 
     xy: Floats
@@ -54,7 +54,7 @@ class FusionFrame:
         size: (width, height) of the frame.
         foreground: Its foreground.
         evidence: Points with independent motion.
-        well_known_area: Area from which the layers know an outline well, frame pixels.
+        well_known_area: Area from which the layers resolve an outline well, frame pixels.
     """
 
     size: tuple[int, int]
@@ -67,13 +67,14 @@ class TrackFusion:
     """Fuses blobs and layer regions, and assigns public ids; one per video."""
 
     def __init__(self) -> None:
-        self._last: dict[int, float] = {}  # when a region of the layers was last seen
-        self._shown: set[int] = set()  # their ids that were reported without blobs
-        self._alias: dict[int, int] = {}  # under which other id a region is reported
+        # All by the layers' id of a region.
+        self._last: dict[int, float] = {}  # time when it was last seen
+        self._shown: set[int] = set()  # regions that were reported without blobs
+        self._alias: dict[int, int] = {}  # id under which it is reported, if another one
         self._old: set[int] = (
             set()
-        )  # those reported before the background was known, and well known
-        self._missed_evidence: dict[int, tuple[float, float]] = {}  # of a region: missed, all
+        )  # well resolved regions that are older than the background model, not yet shown by a blob
+        self._missed_evidence: dict[int, tuple[float, float]] = {}  # outside the foreground, all
 
     def knows(self, number: int) -> bool:
         """Whether a region of the layers was seen recently."""
@@ -87,7 +88,7 @@ class TrackFusion:
         """Record the current regions of the layers, and forget expired ones.
 
         Args:
-            regions: Those of a frame, each with its own id.
+            regions: Regions of a frame, each under the layers' id.
             now: Seconds.
             memory_s: How long the layers remember occluded regions, seconds.
         """
@@ -106,9 +107,9 @@ class TrackFusion:
         """Regions of the layers, reported without blobs.
 
         Args:
-            regions: Those of the layers, each with its own id.
+            regions: Regions of the layers, each under the layers' id.
             ids: Allocates new ids.
-            well_known_area: Area from which the layers know an outline well, frame pixels.
+            well_known_area: Area from which the layers resolve an outline well, frame pixels.
 
         Returns:
             The same regions under their public ids, sorted by id.
@@ -131,15 +132,15 @@ class TrackFusion:
         Args:
             frame: Inputs of the frame.
             blobs: Blob tracks; salient ones are given ids.
-            regions: Those of the layers, each with its own id.
+            regions: Regions of the layers, each under the layers' id.
             ids: Allocates new ids.
 
         Returns:
-            Regions by public id; the blobs with theirs.
+            The reported regions, sorted by public id, and the blob tracks with their public ids.
         """
         seen = _visible_regions(blobs, frame)
         numbered = {s.id: seen[s.key] for s in blobs if s.id and s.key in seen}
-        # Subtraction resolves small regions better: people walking together, with their shadows.
+        # Background subtraction resolves small regions better, such as people who walk together.
         large = [r for r in regions if r.area >= LARGE * frame.well_known_area]
         missed = self._missed(large, tuple(numbered.values()), frame)
         older, heirs = self._older(regions, seen, missed)
@@ -172,7 +173,7 @@ class TrackFusion:
         frame: FusionFrame,
         ids: IdAllocator,
     ) -> tuple[Region, ...]:
-        """The reported blobs, with the regions that subtraction shows less well or not at all."""
+        """The reported blobs, and the regions of objects that background subtraction shows badly or not."""
         out, labels = blobs, frame.foreground.labels
         change = cv2.resize(
             (labels > 0).view(np.uint8), frame.size, interpolation=cv2.INTER_NEAREST
@@ -192,7 +193,11 @@ class TrackFusion:
         return tuple(sorted(out, key=lambda r: r.id))
 
     def _is_shown(self, r: Region, blobs: Sequence[Region]) -> bool:
-        """Whether a region's own blob is reported: at rest, ground joins a layer, as both move alike."""
+        """Whether the blob of a region is reported.
+
+        The region need not be covered by the blob: a layer at rest grows into the ground, since both move
+        alike.
+        """
         return any(
             s.id == self._known_id(r) and common_pixels(s, r) > COMMON * min(s.area, r.area)
             for s in blobs
@@ -218,16 +223,16 @@ class TrackFusion:
         regions: Sequence[Region],
         numbered: Mapping[int, Region],
     ) -> bool:
-        """Whether a blob is a new object: large enough, salient, and no part of another."""
+        """Whether a blob is a new object: large enough, salient, and not a part of another one."""
         large = own.area >= LEAST_AREA * (frame.size[0] * frame.size[1])
         return large and is_salient_blob(s) and not self._is_part(own, regions, numbered)
 
     def _missed(
         self, regions: Sequence[Region], seen: Sequence[Region], frame: FusionFrame
     ) -> set[int]:
-        """Regions of which subtraction misses parts with the tone of the background, or slow ones.
+        """Ids of regions of which background subtraction misses parts: of the background's tone, or slow.
 
-        Points there move with the region, not with the background.
+        The evidence is points outside of the foreground that move with the region, not with the background.
         """
         shown = np.zeros(frame.size[::-1], dtype=np.uint8)
         for s in seen:
@@ -253,9 +258,18 @@ class TrackFusion:
     def _older(
         self, regions: Sequence[Region], seen: Mapping[int, Region], missed: set[int]
     ) -> tuple[list[Region], dict[int, int]]:
-        """Regions with missed parts, or older than the background and not yet shown whole by a blob.
+        """Regions to be reported instead of blobs, and the ids of others that pass to blobs.
 
-        Also the ids that pass to blobs, by key, which now show such a region whole.
+        Reported are regions with missed parts, and those older than the background model that no blob shows
+        completely yet. Once blobs do, the largest of them inherits the region's public id.
+
+        Args:
+            regions: Regions of the layers.
+            seen: Visible blobs, by key.
+            missed: Ids of regions with missed parts.
+
+        Returns:
+            The regions, and for each heir its key -> the public id.
         """
         out, heirs = [], {}
         for r in regions:
@@ -305,9 +319,9 @@ class TrackFusion:
 
 
 def _whole_in(r: Region, seen: Mapping[int, Region]) -> list[int]:
-    """The blobs, by key, that show a region whole, the largest part first; none if they do not.
+    """Keys of the blobs that show all of a region, the one with the largest part first; empty if none do.
 
-    One blob, or bodies side by side that the layers have taken for one, since they walk together.
+    Either one blob, or people side by side whom the layers have segmented as one, since they walk together.
     """
     common = {key: common_pixels(s, r) for key, s in seen.items()}
     order = sorted(common, key=lambda key: -common[key])
