@@ -170,9 +170,9 @@ def _fails_unbegun(leaf: Leaf[StepMonitor]) -> bool:
 def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
     """Whether the first of two steps determines the status of their stage.
 
-    A step that progresses within the stage makes the stage active, though another one is still waiting. It does
-    not if it held before, or if the other one is about its actors together with further ones: a part that moves
-    has not been lifted until it moves together with the gripper.
+    A step that progresses within the stage makes the stage active, though another one is still waiting. It
+    does not if it held before, or if the other one is about its actors together with further ones: a part
+    that moves has not been lifted until it moves together with the gripper.
     """
     pair = leaf, other
     if {x.payload.status for x in pair} == {Status.ACTIVE, Status.PROGRESSING}:
