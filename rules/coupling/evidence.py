@@ -173,6 +173,7 @@ def coupling_cells(
     coupled: Mapping[Pair, Coupling],
     evidence: Mapping[Pair, CouplingEvidence],
     mind: Mind,
+    settings: ContactSettings,
 ) -> RelationBlock:
     """The columns of the relations `coupled`, `in_contact` and `passing_by` for all observed pairs."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
@@ -185,7 +186,8 @@ def coupling_cells(
             unsettled = 0 if contact.in_front else UNKNOWN_CODE
             state[1, k] = unsettled if settled is None else 1
             since[1, k] = contact.met_at if settled is None else min(settled, contact.changed_at)
-            state[2, k] = _in_front(contact, seen.pair, mind)
+            far = settings.doubt_share * smaller_size(seen.pair, mind)
+            state[2, k] = _in_front(contact, far)
             since[2, k] = contact.changed_at
         if seen.pair in coupled:
             doubted = evidence[seen.pair].apart_since is not None
@@ -198,9 +200,8 @@ def coupling_cells(
     return RelationBlock(COLUMNS, state, since, np.full((1, len(observed)), CONFIDENCE))
 
 
-def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
-    """Whether one body has moved so far across the other that it must be in front of it, or behind it."""
-    far = ContactSettings().doubt_share * smaller_size(pair, mind)
+def _in_front(contact: OutlineContact, far: float) -> bool:
+    """Whether one body has moved more than `far` pixels across the other, so in front of it or behind it."""
     return contact.in_front or (contact.passing and contact.path > far)
 
 

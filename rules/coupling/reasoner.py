@@ -172,8 +172,8 @@ class CouplingReasoner(ExplainableReasoner):
                 evidence = replace(evidence, apart_since=None, decoupled_at=None)
             kept[pair] = evidence
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_block(coupling_cells(observed, coupled, kept, mind))
-        memory = MappingProxyType(kept)
+        cells = coupling_cells(observed, coupled, kept, mind, self.settings.contact)
+        memory, table = MappingProxyType(kept), table.with_block(cells)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         mind = mind.remember(CARRIERS, carriers)
         # Parts of one machine are always connected, which is not worth an event.

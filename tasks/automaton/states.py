@@ -70,7 +70,7 @@ class TaskStep:
         return paused_by(self.conditions)
 
     @property
-    def is_told(self) -> bool:
+    def has_stage_conditions(self) -> bool:
         """Whether the task file states conditions by which it begins, ends, progresses or fails."""
         return len(self.conditions) > len(self.pauses)
 

@@ -279,7 +279,9 @@ class Advance:
         measurements: if one is entered, none is early. Steps of actors of whom something was required before
         continue that, and are left out, unless they undo it.
         """
-        if not transition.entered or any(s.already or s.is_told for s in transition.entered):
+        if not transition.entered or any(
+            s.already or s.has_stage_conditions for s in transition.entered
+        ):
             return ()
         turn = transition.turn
         if turn is None:

@@ -144,7 +144,7 @@ class MonitoredPhases:
     def _is_work(self, step: TaskStep) -> bool:
         meaning = self.actions[step.action]
         other = meaning.lasts or meaning.measures or meaning.undoes
-        return not (other or step.already or step.is_told)
+        return not (other or step.already or step.has_stage_conditions)
 
     def _required(self, node: int) -> Iterator[Requirement]:
         for step in self.automaton.steps(node):

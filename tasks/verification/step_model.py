@@ -69,7 +69,7 @@ class StepModel:
         return at_the_same_time(state, self._judged, gap, self.settings.contact_s)
 
     def _judged(self, step: TaskStep) -> bool:
-        return not self.actions[step.action].lasts and not step.is_told
+        return not self.actions[step.action].lasts and not step.has_stage_conditions
 
     def joint_fit(
         self, state: State[StepMonitor], observe: Observe, done: bool, dt: float

@@ -55,7 +55,11 @@ def _for_as_long(state: State[StepMonitor]) -> State[StepMonitor]:
     """The state in which actions with the same `for` have held for the shortest time of them all."""
     groups: dict[tuple[str, float], list[Leaf[StepMonitor]]] = {}
     for part in state.parts if isinstance(state, ParallelState) else ():
-        if isinstance(part, Leaf) and part.step.hold_s is not None and not part.step.is_told:
+        if (
+            isinstance(part, Leaf)
+            and part.step.hold_s is not None
+            and not part.step.has_stage_conditions
+        ):
             groups.setdefault((part.step.stage, part.step.hold_s), []).append(part)
     waiting = [g for g in groups.values() if not all(x.payload.fulfilled for x in g)]
     held = {id(x): min(y.payload.held_s for y in group) for group in waiting for x in group}

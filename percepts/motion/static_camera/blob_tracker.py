@@ -30,6 +30,7 @@ from visup.percepts.motion.static_camera.blob_track import (
     tone_histogram,
 )
 from visup.percepts.motion.static_camera.bodies import (
+    APART,
     are_bodies,
     body_width,
     with_bodies_apart,
@@ -40,7 +41,6 @@ CLAIM = 0.25  # least overlap for a claim, as a share of the smaller of object a
 VISIBLE = 0.2  # visible share of its template below which an object is hidden
 FRAGMENT = 0.2  # largest gap between fragments of one object, as a share of its length
 FOLLOW = 0.35  # weight of a newly measured velocity
-APART = 2  # isolated frames after which a track is an object of its own
 PASSED = 0.6  # displacement, in lengths, after which the pieces of an object are several objects
 PIECE = 0.35  # least area of a piece that may be an object, as a share of the largest
 GROWN = 1.3  # visible area, in areas of the template, from which the template is outdated
