@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 from visup.agent import (
     AlertCondition,
-    Binding,
     Event,
     Mind,
     Observation,
     Outcome,
-    Presence,
     Reasoner,
     Severity,
     TaskBelief,
@@ -28,15 +26,14 @@ from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.states import leaves
-from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.casting.matching import (
     bystanders,
     handlers,
     machines,
-    match,
     scenery,
     unexplained,
 )
+from visup.tasks.casting.recasting import Casting, recast
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.beginning import is_first, stage_onsets, stirring, with_begun
 from visup.tasks.supervision.belief import (
@@ -53,6 +50,7 @@ from visup.tasks.supervision.events import (
     stage_concerns,
     stage_events,
 )
+from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.invariants import (
     broken_since,
     invariant_concerns,
@@ -225,69 +223,99 @@ def _with_activity(
 
 def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemory:
     """One step of one task: bind its actors, update its hypotheses, derive the belief."""
-    settings, now = model.settings, mind.time
-    bindings, rival, rival_since = _bind(model, memory, mind)
+    now, casting = mind.time, _cast(model, memory, mind)
     start, kept = memory.posterior, memory.kept
-    if memory.looks and newly_found(memory.belief.bindings, bindings, mind):
-        start, kept = replayed(model, memory.looks, bindings)
-    snapshot = TaskSnapshot(mind, bindings, model, kept)
+    if memory.looks and newly_found(memory.belief.bindings, casting.bindings, mind):
+        start, kept = replayed(model, memory.looks, casting.bindings)
+    snapshot = TaskSnapshot(mind, casting.bindings, model, kept)
     posterior = followed(model, start, snapshot)
-    gain = 0.0
-    if start is not None and posterior is not None:
-        gain = model.gain(posterior.likeliest, snapshot.observe)
     broken = broken_since(model, snapshot, memory)
-    known = {*scenery(mind, bindings, settings), *handlers(mind, bindings, settings)}
-    akin = tuple(sorted(known.union(memory.akin)))
-    strange = tuple(s for s in _strange(model, snapshot, memory) if s[0] not in akin)
-    interrupted, strangers = memory.interrupted, memory.strangers
-    let_be = bystanders(model.task, mind, bindings, settings)
-    if ({b.object_id for b in bindings} | set(let_be)) & set(strangers):
-        interrupted, strangers = "", ()
-    if not interrupted:
-        interrupted, strangers = _interrupted(model, snapshot, memory, broken, let_be)
+    akin = _akin(snapshot, memory, model.settings)
+    bystanding = bystanders(model.task, mind, casting.bindings, model.settings)
+    interrupted, strangers = _interrupted(model, snapshot, memory, broken, bystanding)
+    broke = interrupted != memory.interrupted and not strangers
+    broke = broke and interrupted == violation(model, broken, now, safety=True)
     violated = memory.violated
     if not violated and memory.belief.verdict not in OVER:
         violated = violation(model, broken, now, safety=False)
-    belief = task_belief(model, snapshot, posterior, interrupted)
-    belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
-    misplaced = order_violation(model, snapshot, posterior, memory.order_violation)
-    if misplaced and not violated:
-        belief = out_of_order_belief(belief, memory.belief, misplaced.why, now)
+    new = replace(
+        memory,
+        time=now,
+        posterior=posterior,
+        interrupted=interrupted,
+        strangers=strangers,
+        strange_since=tuple(s for s in _strange(model, snapshot, memory) if s[0] not in akin),
+        broken_since=broken,
+        rival=casting.rival,
+        rival_since=casting.rival_since,
+        gain=_gain(model, start, posterior, snapshot),
+        looks=remembered(memory.looks, mind, start, kept) if _awaited(model, casting) else (),
+        violated=violated,
+        akin=akin,
+        forbidden=memory.forbidden or broke,
+        order_violation=order_violation(model, snapshot, posterior, memory.order_violation),
+    )
+    belief = _belief(model, snapshot, memory, new, bystanding)
+    return replace(new, belief=belief, kept=snapshot.kept)  # with all facts that were asked for
+
+
+def _belief(
+    model: MonitoredPhases,
+    snapshot: TaskSnapshot,
+    memory: TaskMemory,
+    new: TaskMemory,
+    bystanding: tuple[int, ...],
+) -> TaskBelief:
+    """The belief that follows from the new memory of a task, apart from its belief, and the one before."""
+    now, old = new.time, memory.belief
+    belief = task_belief(model, snapshot, new.posterior, new.interrupted)
+    if new.violated:
+        belief = failed_belief(belief, old, new.violated, now)
+    elif new.order_violation:
+        belief = out_of_order_belief(belief, old, new.order_violation.why, now)
     if memory.forbidden:
-        belief = replace(belief, stages=memory.belief.stages, current=memory.belief.current)
-    broke = interrupted != memory.interrupted and not strangers
-    broke = broke and interrupted == violation(model, broken, now, safety=True)
-    lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
-    one = machines(model.task, bindings)
-    told = memory.belief.stages
-    stirs = is_first(told) and stirring(snapshot, posterior)
-    stages = with_begun(told, belief.stages, stirs=stirs)
-    belief = replace(belief, stages=stages, unexplained=lasting, bystanders=let_be, machines=one)
-    return TaskMemory(
-        now,
-        posterior,
+        belief = replace(belief, stages=old.stages, current=old.current)
+    stirs = is_first(old.stages) and stirring(snapshot, new.posterior)
+    least = model.settings.unexplained_s
+    return replace(
         belief,
-        interrupted,
-        strangers,
-        strange,
-        broken,
-        rival,
-        rival_since,
-        snapshot.kept,
-        memory.activity,
-        gain,
-        memory.inferred,
-        remembered(memory.looks, mind, start, kept) if _awaited(model, bindings) else (),
-        violated,
-        akin,
-        memory.forbidden or broke,
-        misplaced,
+        stages=with_begun(old.stages, belief.stages, stirs=stirs),
+        unexplained=tuple(i for i, since in new.strange_since if now - since >= least),
+        bystanders=bystanding,
+        machines=machines(model.task, snapshot.bindings),
     )
 
 
-def _awaited(model: MonitoredPhases, bindings: Sequence[Binding]) -> bool:
+def _gain(
+    model: MonitoredPhases,
+    before: TaskHypotheses | None,
+    now: TaskHypotheses | None,
+    snapshot: TaskSnapshot,
+) -> float:
+    """Evidence per second that the task is in progress; 0 in its first step."""
+    if before is None or now is None:
+        return 0.0
+    return model.gain(now.likeliest, snapshot.observe)
+
+
+def _cast(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> Casting:
+    """The casting of this step."""
+    before = Casting(memory.belief.bindings, memory.rival, memory.rival_since)
+    steps = () if memory.posterior is None else leaves(memory.posterior.likeliest.state)
+    acting = tuple(a for x in steps for a in x.step.actors)
+    return recast(model.task, mind, before, acting, model.settings)
+
+
+def _akin(snapshot: TaskSnapshot, memory: TaskMemory, settings: TaskSettings) -> tuple[int, ...]:
+    """See `TaskMemory.akin`."""
+    mind, bindings = snapshot.mind, snapshot.bindings
+    known = {*scenery(mind, bindings, settings), *handlers(mind, bindings, settings)}
+    return tuple(sorted(known.union(memory.akin)))
+
+
+def _awaited(model: MonitoredPhases, casting: Casting) -> bool:
     """Whether an actor that the task depends on is still missing."""
-    unbound = (b.actor for b in bindings if b.object_id is None)
+    unbound = (b.actor for b in casting.bindings if b.object_id is None)
     return any(not model.task.actor(a).optional for a in unbound)
 
 
@@ -322,43 +350,6 @@ def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
     return tuple(Revision(b.step, b.left, new.time) for b in found if b.step.stage in gone)
 
 
-def _bind(
-    model: MonitoredPhases, memory: TaskMemory, mind: Mind
-) -> tuple[tuple[Binding, ...], tuple[int | None, ...], float]:
-    """The present bindings, and the rival casting with the time since when it has been better.
-
-    A casting that takes an actor from an object that is still present must persist to be accepted.
-    """
-    before = memory.belief.bindings
-    found = match(model.task, mind, before, _current_actors(memory), model.settings)
-    if not any(_changes_hands(a, b, mind) for a, b in zip(before, found, strict=False)):
-        return found, (), mind.time
-    rival = tuple(b.object_id for b in found)
-    since = memory.rival_since if rival == memory.rival else mind.time
-    if mind.time - since >= model.settings.switch_s:
-        return found, (), mind.time
-    playing = {b.actor: b.object_id for b in before if b.object_id is not None}
-    return tuple(_refreshed(model.task, b, mind, playing) for b in before), rival, since
-
-
-def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
-    if before.object_id is None or before.guessed or before.object_id == now.object_id:
-        return False
-    belief = mind.objects.get(before.object_id)
-    return belief is not None and belief.presence is not Presence.LEFT
-
-
-def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, int]) -> Binding:
-    """The same binding with its present strength."""
-    belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
-    if belief is None:
-        return replace(binding, object_id=None, strength=0.0)
-    if binding.guessed:
-        return binding
-    (now,) = fits(Role(task, binding.actor, mind, playing), binding.models, [belief])
-    return replace(binding, strength=now)
-
-
 def _strange(
     model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[tuple[int, float], ...]:
@@ -374,24 +365,22 @@ def _interrupted(
     snapshot: TaskSnapshot,
     memory: TaskMemory,
     broken: tuple[float | None, ...],
-    let_be: tuple[int, ...],
+    bystanding: tuple[int, ...],
 ) -> tuple[str, tuple[int, ...]]:
     """Why the task is interrupted by something unsafe, or empty; and by which unexpected objects.
 
-    A task that has ended is not interrupted, and bystanders interrupt none.
+    An interruption lasts, unless the object that caused it turns out to be an actor or a bystander. A task
+    that has ended is not interrupted, and bystanders interrupt none.
     """
+    explained = {b.object_id for b in snapshot.bindings}.union(bystanding)
+    if memory.interrupted and explained.isdisjoint(memory.strangers):
+        return memory.interrupted, memory.strangers
     if memory.belief.verdict in OVER:
         return "", ()
     for alert in snapshot.mind.alerts:
-        if set(alert.objects) & set(let_be):
+        if set(alert.objects) & set(bystanding):
             continue
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
     return violation(model, broken, snapshot.mind.time, safety=True), ()
-
-
-def _current_actors(memory: TaskMemory) -> tuple[str, ...]:
-    if memory.posterior is None:
-        return ()
-    return tuple(a for x in leaves(memory.posterior.likeliest.state) for a in x.step.actors)
