@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from visup.compiled import compiled
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.outlines.region_outline import chosen
 
 Mask = NDArray[np.bool_]
 FIRST_S = 0.01  # how long a background counts as seen after a single image, seconds
@@ -156,11 +157,7 @@ def pixels_near_sure_ones(
             if off[y, x] > least and out_of[y, x]:
                 sure[labels[y, x]] = True
     sure[0] = False
-    out = np.empty((height, width), np.bool_)
-    for y in range(height):
-        for x in range(width):
-            out[y, x] = sure[labels[y, x]]
-    return out
+    return chosen(labels, sure)
 
 
 @compiled
