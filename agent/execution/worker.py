@@ -38,7 +38,6 @@ from visup.agent.storage.codec import (
     encode_percept,
     from_document,
 )
-from visup.agent.storage.mask_codec import mask_to_runs
 
 _SOME = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)
 _MORE = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
@@ -98,7 +97,6 @@ def _started(asked: Message) -> tuple[Message, Behaviour]:
     limit_at_start(asked["memory_mb"])
     behaviour = _rebuilt(asked) if "object" in asked else _loaded(asked)
     start_behaviour(behaviour)
-    mask_to_runs(np.zeros((1, 1), np.bool_))  # loads its libraries before memory is limited
     limit_memory(asked["memory_mb"])
     return {}, behaviour
 

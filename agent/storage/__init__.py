@@ -1,7 +1,7 @@
 """Runs on disk: journals of what happened, and checkpoints to resume from.
 
 Read `journal.py` (written step by step, SQLite) and `journal_reader.py` (read back); `codec.py` on
-`_codec_jit.py` packs observations to the last bit, `jsonable.py` gives records as plain JSON,
+`mask_codec.py` packs observations to the last bit, `jsonable.py` gives records as plain JSON,
 `checkpoint.py` saves the state of an agent.
 
 Names are loaded when they are first used: the process of an isolated behaviour packs, and keeps no journal.

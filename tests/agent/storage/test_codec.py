@@ -7,6 +7,7 @@ import json
 import math
 import zlib
 from contextlib import suppress
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -37,7 +38,12 @@ from visup.agent.storage.codec import (
     pack_observation,
     unpack_observation,
 )
-from visup.agent.storage.mask_codec import mask_to_runs, runs_to_mask
+from visup.agent.storage.mask_codec import (
+    chain_to_contour,
+    contour_to_chain,
+    mask_to_runs,
+    runs_to_mask,
+)
 
 numbers = st.floats(allow_nan=False)
 masks = st.tuples(st.integers(1, 12), st.integers(1, 12)).flatmap(lambda s: arrays(bool, s))
@@ -168,6 +174,43 @@ def test_runs_say_what_a_mask_is(mask: np.ndarray[Any, np.dtype[np.bool_]]) -> N
         lengths[-1] += 1
     assert mask_to_runs(mask) == lengths
     assert (runs_to_mask(lengths, mask.shape) == mask).all()
+
+
+MOVES = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)]
+
+
+def chain_by_hand(points: list[list[float]]) -> dict[str, Any] | None:
+    for value in (v for point in points for v in point):
+        negative_zero = value == 0.0 and math.copysign(1.0, value) < 0.0
+        if not abs(value) < 2.0**24 or value != math.floor(value) or negative_zero:
+            return None
+    moves = [(x - u, y - v) for (u, v), (x, y) in pairwise(points)]
+    if any(m not in MOVES for m in moves):
+        return None
+    digits = "".join(str(MOVES.index((int(x), int(y)))) for x, y in moves)
+    return {"$": "chain", "from": [int(v) for v in points[0]], "of": digits}
+
+
+odd_values = st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 0.5, 3.0, 2.0**24])
+starts = st.sampled_from([0, 5, -3, 2**24 - 3, 3 - 2**24])
+
+
+@given(
+    st.tuples(starts, starts),
+    st.lists(st.sampled_from([*MOVES, *MOVES, (0, 0), (2, 0)]), max_size=6),
+    st.none() | st.tuples(st.integers(0, 6), st.integers(0, 1), odd_values),
+)
+def test_chains_say_what_a_contour_is(
+    start: tuple[int, int], moves: list[tuple[int, int]], odd: tuple[int, int, float] | None
+) -> None:
+    """Against a loop over the points."""
+    contour = np.cumsum([start, *moves], axis=0).astype(np.float32)
+    if odd is not None:
+        contour[odd[0] % len(contour), odd[1]] = odd[2]
+    chain = chain_by_hand(contour.tolist())
+    assert contour_to_chain(contour) == chain
+    if chain is not None:
+        assert same(chain_to_contour(chain), contour)
 
 
 @pytest.mark.parametrize("lengths", [[3], [5, -1], [[2, 2]], [2**62, 2**62], ["a"], [1.5, 2.5]])
