@@ -16,19 +16,23 @@ from visup.agent import (
     Region,
 )
 from visup.agent.contract.contract import COMPILING_HANG_S
-from visup.percepts.appearance.looks.blob import Blob
-from visup.percepts.appearance.looks.scene import Scene, prepare_scene
-from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.output.explaining import moving_body, shares, unexplained
-from visup.percepts.appearance.output.thing_region import confidence, thing_outline, thing_region
-from visup.percepts.appearance.tracking.track import ThingTrack
-from visup.percepts.appearance.tracking.tracker import ThingTracker
+from visup.percepts.appearance.models.appearance_model import view_models
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.scene import Scene, prepare_scene
+from visup.percepts.appearance.output.object_region import confidence, object_outline, object_region
+from visup.percepts.appearance.output.unexplained_regions import (
+    moving_body,
+    region_iou,
+    unexplained,
+)
+from visup.percepts.appearance.tracking.track import TaughtObjectTrack
+from visup.percepts.appearance.tracking.tracker import TaughtObjectTracker
 from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
 from visup.percepts.motion.outlines.region_outline import RegionOutline
 from visup.percepts.taught.light import relit
 from visup.percepts.taught.view import TaughtView
 
-SAME = 0.4  # IoU from which a newly detected object takes over the id of a moving region
+SAME_OBJECT_IOU = 0.4  # IoU from which a newly detected object takes over the id of a moving region
 
 
 class AppearanceBehaviour:
@@ -51,7 +55,7 @@ class AppearanceBehaviour:
     ) -> None:
         self._taught = tuple(taught)
         self._motion = motion or MotionBehaviour()
-        self._tracker = ThingTracker(view_models(taught))
+        self._tracker = TaughtObjectTracker(view_models(taught))
         self._relit: tuple[tuple[int, TaughtView], ...] | None = None
         self._drawn: dict[str, tuple[Blob, RegionOutline | None]] = {}
 
@@ -63,7 +67,7 @@ class AppearanceBehaviour:
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a behaviour with the same settings."""
         self._motion.load(state["motion"])
-        self._see_in_light(state["relit"])
+        self._add_relit_views(state["relit"])
         self._tracker.load(state["tracker"])
 
     def missed(self, observation: Observation) -> None:
@@ -89,20 +93,20 @@ class AppearanceBehaviour:
         if not image_is_sound(observation):
             return []
         if self._relit is None:
-            self._see_in_light(tuple(relit(self._taught, frame.image)))
+            self._add_relit_views(tuple(relit(self._taught, frame.image)))
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
         bodies = [moving_body(r, scene) for r in moving] if self._tracker.seeks_new else []
-        tracks = self._tracker.step(scene, lambda blob: self._id_of(blob, moving, scene), bodies)
+        tracks = self._tracker.step(scene, lambda blob: self._id_for(blob, moving, scene), bodies)
         if not image_is_trusted(observation):
             return []
         before = None if last is None else last.time
         outlined = [(t, self._outline(t, scene)) for t in tracks]
-        things = [(t, thing_region(t, o, scene, before)) for t, o in outlined if o is not None]
+        objects = [(t, object_region(t, o, scene, before)) for t, o in outlined if o is not None]
         known = {t.id for t in tracks}
         moving = [r for r in moving if r.id not in known]
-        others = unexplained(moving, [r for _, r in things], frame.size)
-        regions = sorted([*others, *(r for _, r in things)], key=lambda r: r.id)
+        others = unexplained(moving, [r for _, r in objects], frame.size)
+        regions = sorted([*others, *(r for _, r in objects)], key=lambda r: r.id)
         camera = self._tracker.camera
         return [
             *(
@@ -111,42 +115,46 @@ class AppearanceBehaviour:
                 else [self._percept(frame, "camera", CameraMotion(camera), 1.0)]
             ),
             *(self._percept(frame, "region", r, r.confidence) for r in regions),
-            *(self._named(frame, t, r) for t, r in things),
+            *(self._hypothesis(frame, t, r) for t, r in objects),
         ]
 
-    def _see_in_light(self, views: tuple[tuple[int, TaughtView], ...] | None) -> None:
+    def _add_relit_views(self, views: tuple[tuple[int, TaughtView], ...] | None) -> None:
         """Add views whose colours are adapted to the lighting of the video, if that differs; see `relit`."""
         self._relit = views
         if views:
-            self._tracker = ThingTracker(view_models([*self._taught, *(v for _, v in views)]))
+            self._tracker = TaughtObjectTracker(
+                view_models([*self._taught, *(v for _, v in views)])
+            )
 
-    def _view_number(self, track: ThingTrack) -> int:
+    def _view_number(self, track: TaughtObjectTrack) -> int:
         """Number, from 0, of the taught view that an object matches, among those of its name."""
         origins = [*range(len(self._taught)), *(k for k, _ in self._relit or ())]
         mine = [k for k, v in enumerate(self._taught) if v.name == track.name]
-        return mine.index(origins[track.number])
+        return mine.index(origins[track.view_number])
 
-    def _outline(self, track: ThingTrack, scene: Scene) -> RegionOutline | None:
+    def _outline(self, track: TaughtObjectTrack, scene: Scene) -> RegionOutline | None:
         """The visible outline of an object; redrawn only when it has changed."""
         known = self._drawn.get(track.name)
         if track.visible is None:
             return None
         if known is None or known[0] is not track.visible:
-            known = track.visible, thing_outline(track.visible, scene)
+            known = track.visible, object_outline(track.visible, scene)
             self._drawn[track.name] = known
         return known[1]
 
-    def _id_of(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:
+    def _id_for(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:
         """The id of a newly detected object: that of the region that moved there, if any."""
         known = {t.id for t in self._tracker.tracks}
-        same = [r for r in moving if r.id not in known and shares(r, blob, scene) > SAME]
+        same = [
+            r for r in moving if r.id not in known and region_iou(r, blob, scene) > SAME_OBJECT_IOU
+        ]
         return min((r.id for r in same), default=None) or self._motion.new_id()
 
     def _percept(self, frame: Frame, kind: str, value: Any, sure: float) -> Percept:
         return Percept(kind, value, frame.time, self.contract.name, sure)
 
-    def _named(self, frame: Frame, track: ThingTrack, region: Region) -> Percept:
+    def _hypothesis(self, frame: Frame, track: TaughtObjectTrack, region: Region) -> Percept:
         sure = confidence(track)
         number = self._view_number(track)
-        it = Hypothesis(region_id=region.id, name=track.name, view=number, similarity=sure)
-        return self._percept(frame, "hypothesis", it, sure)
+        hypothesis = Hypothesis(region_id=region.id, name=track.name, view=number, similarity=sure)
+        return self._percept(frame, "hypothesis", hypothesis, sure)

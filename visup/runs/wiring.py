@@ -15,7 +15,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
 from visup.agent.model.task_beliefs import TaskBelief
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
-from visup.percepts.appearance.placed import PlacedBehaviour
+from visup.percepts.appearance.placed_objects import PlacedObjectBehaviour
 from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.detections import (
@@ -286,7 +286,7 @@ def _behaviours(
     eyes = RestingMotion(settings.rest_s) if settings.rest_s else MotionBehaviour()
     moving: Behaviour = AppearanceBehaviour(taught) if taught else eyes
     if places:
-        moving = PlacedBehaviour(places, taught)
+        moving = PlacedObjectBehaviour(places, taught)
     if boxes:
         return [HealthBehaviour(), boxes, *user_behaviours(settings)]
     if not settings.motion:

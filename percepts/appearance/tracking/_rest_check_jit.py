@@ -11,7 +11,7 @@ Bytes = NDArray[np.uint8]
 
 
 @compiled
-def like_before(now: Bytes, was: Bytes, light: int, chroma: int) -> NDArray[np.bool_]:
+def unchanged_pixels(now: Bytes, was: Bytes, light: int, chroma: int) -> NDArray[np.bool_]:
     """Which pixels are unchanged except for lighting.
 
     A shadow darkens a pixel and moves its colour towards grey in proportion, but keeps its hue.

@@ -8,11 +8,11 @@ from itertools import permutations
 
 import numpy as np
 
-from visup.percepts.appearance.looks.patches import ALIKE
-from visup.percepts.appearance.looks.pose import PatchPose
-from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
-from visup.percepts.appearance.tracking.finding import SURE, ThingPlace, home_of
+from visup.percepts.appearance.models.appearance_model import Appearance, ViewModel
+from visup.percepts.appearance.models.colour_patches import LEAST_SIMILARITY
+from visup.percepts.appearance.models.pose import PatchPose
+from visup.percepts.appearance.models.scene import Scene
+from visup.percepts.appearance.tracking.redetection import SURE, RedetectionCandidate, taught_pose
 from visup.percepts.appearance.tracking.verification import verify
 
 LookAlikes = dict[int, frozenset[int]]
@@ -24,28 +24,28 @@ def look_alikes(views: Sequence[ViewModel]) -> LookAlikes:
     like = {
         (i, k)
         for (i, one), (k, other) in permutations(enumerate(views), 2)
-        if one.name != other.name and _like(one.appearance, other.appearance)
+        if one.name != other.name and _look_alike(one.appearance, other.appearance)
     }
     count = range(len(views))
     return {i: frozenset(k for k in count if {(i, k), (k, i)} <= like) for i in count}
 
 
-def _like(it: Appearance, other: Appearance) -> bool:
-    if it.colours.shared(other.colours) < ALIKE:
+def _look_alike(appearance: Appearance, other: Appearance) -> bool:
+    if appearance.colours.shared(other.colours) < LEAST_SIMILARITY:
         return False  # without this, an object that is merely visible beside the other would match
     height, width = other.shape
     shown = Scene(0.0, [other.lab], np.ascontiguousarray(other.lab[..., 0]), (width, height))
-    middle = PatchPose((width - 1) / 2, (height - 1) / 2, other.radius / it.radius)
-    return verify(shown, it, middle).score > SURE
+    middle = PatchPose((width - 1) / 2, (height - 1) / 2, other.radius / appearance.radius)
+    return verify(shown, appearance, middle).score > SURE
 
 
-def settled(
+def resolve_look_alike(
     scene: Scene,
-    place: ThingPlace,
+    place: RedetectionCandidate,
     views: Sequence[ViewModel],
     alike: LookAlikes,
     sought: Collection[str],
-) -> ThingPlace:
+) -> RedetectionCandidate:
     """Resolve a position among look-alikes: it belongs to the one taught nearest to it.
 
     Objects are searched one after another; of two equal ones the first would take any position that comes
@@ -58,9 +58,13 @@ def settled(
         alike: Which of them look alike.
         sought: Names of the objects not in view.
     """
-    rivals = [k for k in sorted(alike[place.number]) if views[k].name in sought]
+    rivals = [k for k in sorted(alike[place.view_number]) if views[k].name in sought]
     pose = place.match.pose
-    number = min([place.number, *rivals], key=lambda k: pose.apart(home_of(scene, views[k]), 0))
-    if number == place.number:
+    number = min(
+        [place.view_number, *rivals], key=lambda k: pose.apart(taught_pose(scene, views[k]), 0)
+    )
+    if number == place.view_number:
         return place
-    return replace(place, name=views[number].name, number=number, looks=views[number].appearance)
+    return replace(
+        place, name=views[number].name, view_number=number, appearance=views[number].appearance
+    )

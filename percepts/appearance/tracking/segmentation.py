@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.blob import Blob
-from visup.percepts.appearance.looks.colours import colour_bins
-from visup.percepts.appearance.looks.pose import PatchPose, Window, paint, window_of
-from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.looks.thing_model import Appearance
-from visup.percepts.appearance.tracking._rest_check_jit import like_before
+from visup.percepts.appearance.models.appearance_model import Appearance
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.colours import colour_bins
+from visup.percepts.appearance.models.pose import PatchPose, Window, paint, window_of
+from visup.percepts.appearance.models.scene import Scene
+from visup.percepts.appearance.tracking._rest_check_jit import unchanged_pixels
 from visup.percepts.appearance.tracking.track import RestMemory
 from visup.percepts.appearance.tracking.verification import explained_pixels, template_of
 
@@ -36,26 +36,26 @@ _SAME, _DIFFERENT = np.float32(5.0), np.float32(-2.0)
 NOWHERE = np.float32(-9.0)  # log odds of pixels outside an object's patch
 
 
-def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | None:
+def appearance_log_odds(scene: Scene, pose: PatchPose, appearance: Appearance) -> Claim | None:
     """Log odds that pixels near an object are its own.
 
     Args:
         scene: The frame.
         pose: Pose of the object.
-        looks: Its appearance.
+        appearance: Its appearance.
 
     Returns:
         The window and (h, w) float32 log odds; None when the object is out of view.
     """
-    window = window_of(pose, looks.shape, scene.size)
+    window = window_of(pose, appearance.shape, scene.size)
     if window is None:
         return None
-    lab = scene.patch(pose, looks.shape)
-    odds = looks.colours.odds(colour_bins(lab))
-    score = _shape_odds(looks.mask, odds) + np.clip(odds, -_COLOUR, _COLOUR)
-    like, _ = explained_pixels(template_of(looks.lab, looks.mask), lab)
-    score += np.where(like, _LIKE, _UNLIKE) * np.clip(looks.mask * 2 - 1, 0, 1)
-    return window, np.asarray(paint(score, pose, window, float(NOWHERE)), dtype=np.float32)
+    lab = scene.patch(pose, appearance.shape)
+    odds = appearance.colours.odds(colour_bins(lab))
+    log_odds = _shape_odds(appearance.mask, odds) + np.clip(odds, -_COLOUR, _COLOUR)
+    like, _ = explained_pixels(template_of(appearance.lab, appearance.mask), lab)
+    log_odds += np.where(like, _LIKE, _UNLIKE) * np.clip(appearance.mask * 2 - 1, 0, 1)
+    return window, np.asarray(paint(log_odds, pose, window, float(NOWHERE)), dtype=np.float32)
 
 
 def _shape_odds(mask: Floats, colours: Floats) -> Floats:
@@ -63,33 +63,33 @@ def _shape_odds(mask: Floats, colours: Floats) -> Floats:
 
     Limbs move, so a colour unique in the surroundings may extend the outline.
     """
-    thing = (mask > 0.5).view(np.uint8)
-    if not thing.any():
+    inside = (mask > 0.5).view(np.uint8)
+    if not inside.any():
         return np.full(mask.shape, -_SHAPE)
-    within = cv2.distanceTransform(thing, cv2.DIST_L2, 3)
-    without = cv2.distanceTransform(np.uint8(1) - thing, cv2.DIST_L2, 3)
+    within = cv2.distanceTransform(inside, cv2.DIST_L2, 3)
+    without = cv2.distanceTransform(np.uint8(1) - inside, cv2.DIST_L2, 3)
     depth = np.minimum(within, _INNER) / _INNER - np.minimum(without, _INNER) / _INNER
     limb = (colours > _UNLIKE_ALL) & (without > 0) & (without < _LIMB)
     return np.where(limb, np.maximum(depth * _SHAPE, -0.5 * _COLOUR), depth * _SHAPE)
 
 
-def rest_scores(rest: RestMemory, same: Mask) -> Claim:
+def rest_log_odds(rest: RestMemory, same: Mask) -> Claim:
     """Log odds that pixels still belong to an object at rest.
 
     Args:
         rest: Its rest memory.
         same: From `unchanged`.
     """
-    score = np.where(same, _SAME, _DIFFERENT)
-    score[~rest.blob.mask] = NOWHERE
-    return rest.blob.window, score
+    log_odds = np.where(same, _SAME, _DIFFERENT)
+    log_odds[~rest.blob.mask] = NOWHERE
+    return rest.blob.window, log_odds
 
 
 def unchanged(scene: Scene, rest: RestMemory) -> Mask:
     """(h, w) bool: pixels of a resting object's window that equal its memory but for lighting."""
     left, top, right, bottom = rest.blob.window
     now = np.ascontiguousarray(scene.lab[0][top:bottom, left:right])
-    same = like_before(now, rest.lab, *_CHANGED)
+    same = unchanged_pixels(now, rest.lab, *_CHANGED)
     if same.all():
         return same
     # Single pixels that flicker are noise.
@@ -97,12 +97,12 @@ def unchanged(scene: Scene, rest: RestMemory) -> Mask:
     return np.asarray(changed == 0)
 
 
-def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob | None]:
+def assign_pixels(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob | None]:
     """The pixels that each object wins.
 
     Args:
         claims: For each object its window and (h, w) float32 log odds.
-        size: (width, height) of the picture.
+        size: (width, height) of the image.
 
     Returns:
         For each object its visible blob, including specks; None where nothing remains.
@@ -124,7 +124,7 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
     return out
 
 
-def cleaned(blob: Blob) -> Blob | None:
+def without_specks(blob: Blob) -> Blob | None:
     """The blob without small connected components; None if it is empty."""
     mask = blob.mask.view(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)

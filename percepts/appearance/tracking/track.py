@@ -8,14 +8,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.blob import Blob
-from visup.percepts.appearance.looks.pose import PatchPose
-from visup.percepts.appearance.looks.thing_model import Appearance
+from visup.percepts.appearance.models.appearance_model import Appearance
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.pose import PatchPose
 
 Bytes = NDArray[np.uint8]
 
 
-class State(StrEnum):
+class TrackState(StrEnum):
     """The state of an object, as far as observed."""
 
     ABSENT = "absent"
@@ -24,7 +24,7 @@ class State(StrEnum):
     HIDDEN = "hidden"
 
 
-IN_VIEW = (State.MOVING, State.RESTING)
+IN_VIEW = (TrackState.MOVING, TrackState.RESTING)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,41 +41,41 @@ class RestMemory:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ThingTrack:
+class TaughtObjectTrack:
     """The track of one object.
 
     Attributes:
         name: Name as taught.
-        number: Number of the view that it matches, among all taught views.
+        view_number: Number of the view that it matches, among all taught views.
         id: Id of its region, 0 until it is detected.
         state: Its state.
         pose: Its current or last pose, working pixels.
-        looks: Its current appearance.
+        appearance: Its current appearance.
         visible: Its visible part; None when there is none.
         rest: Its rest memory; kept when it is covered at rest.
         path: (time, pose) of the last `PATH_S`, oldest first.
         peak: Last peak of its filter.
-        explained: Share of its pixels that looked as expected.
-        colours: Excess of its colours over those of the surroundings.
-        seen: Time of the last observation, seconds.
-        since: Time of the first observation, seconds.
-        proven: Whether it has clearly matched a taught view.
-        asked: Time of the last search of the whole picture for it, seconds.
+        explained_share: Share of its pixels that looked as expected.
+        colour_excess: Excess of its colours over those of the surroundings.
+        seen_at: Time of the last observation, seconds.
+        first_seen_at: Time of the first observation, seconds.
+        confirmed: Whether it has clearly matched a taught view.
+        compared_at: Time of the last search of the whole image for it, seconds.
     """
 
     name: str
-    number: int
+    view_number: int
     id: int = 0
-    state: State = State.ABSENT
+    state: TrackState = TrackState.ABSENT
     pose: PatchPose | None = None
-    looks: Appearance | None = None
+    appearance: Appearance | None = None
     visible: Blob | None = None
     rest: RestMemory | None = None
     path: tuple[tuple[float, PatchPose], ...] = ()
     peak: float = 0.0
-    explained: float = 0.0
-    colours: float = 0.0
-    seen: float = -np.inf
-    since: float = 0.0
-    proven: bool = False
-    asked: float = -np.inf
+    explained_share: float = 0.0
+    colour_excess: float = 0.0
+    seen_at: float = -np.inf
+    first_seen_at: float = 0.0
+    confirmed: bool = False
+    compared_at: float = -np.inf

@@ -1,4 +1,4 @@
-"""Verification: how well a position of the picture matches an appearance."""
+"""Verification: how well a position of the image matches an appearance."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.colours import OWN, ColourModel, colour_bins
-from visup.percepts.appearance.looks.correlation_filter import CorrelationFilter, peak_of
-from visup.percepts.appearance.looks.features import CELL, cell_features
-from visup.percepts.appearance.looks.pose import PatchPose
-from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.looks.thing_model import Appearance
+from visup.percepts.appearance.models.appearance_model import Appearance
+from visup.percepts.appearance.models.colours import OWN_LOG_ODDS, ColourModel, colour_bins
+from visup.percepts.appearance.models.correlation_filter import CorrelationFilter, peak_of
+from visup.percepts.appearance.models.features import CELL, cell_features
+from visup.percepts.appearance.models.pose import PatchPose
+from visup.percepts.appearance.models.scene import Scene
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -30,25 +30,25 @@ class Match:
     Attributes:
         pose: Position of the filter's peak.
         peak: Height of the peak, about 1 where the object is as learned.
-        explained: Share of the object's pixels that look as expected, 0 to 1.
+        explained_share: Share of the object's pixels that look as expected, 0 to 1.
     """
 
     pose: PatchPose
     peak: float
-    explained: float
+    explained_share: float
 
     @property
     def score(self) -> float:
         """Combination of both, 0 to 1."""
-        return float(np.sqrt(np.clip(self.peak, 0, 1) * self.explained))
+        return float(np.sqrt(np.clip(self.peak, 0, 1) * self.explained_share))
 
 
-def respond(
+def filter_peak(
     scene: Scene,
     pose: PatchPose,
     shape: tuple[int, int],
     colours: ColourModel,
-    it: CorrelationFilter,
+    correlation_filter: CorrelationFilter,
 ) -> tuple[PatchPose, float]:
     """The pose shifted to the peak of a filter's response near it, and the height of the peak.
 
@@ -57,11 +57,11 @@ def respond(
         pose: Expected pose, working pixels.
         shape: (height, width) of the filter's patch.
         colours: Colours of the object.
-        it: Filter of the object.
+        correlation_filter: Filter of the object.
     """
     lab = scene.patch(pose, shape)
     features = cell_features(lab, colours.odds(colour_bins(lab)))
-    dx, dy, peak = peak_of(it.response(features))
+    dx, dy, peak = peak_of(correlation_filter.response(features))
     return pose.shifted(dx * CELL, dy * CELL), peak
 
 
@@ -89,46 +89,48 @@ def template_of(lab: Bytes, mask: Floats) -> Template:
 
 def explained_pixels(template: Template, lab: Bytes) -> tuple[NDArray[np.bool_], float]:
     """Which pixels of a patch match a template, and their share of its weight."""
-    middle = (template.low[..., 0] + template.high[..., 0]) // 2
-    sure = template.weight > 0.5
-    if not sure.any():
+    expected = (template.low[..., 0] + template.high[..., 0]) // 2
+    inside = template.weight > 0.5
+    if not inside.any():
         return np.zeros(lab.shape[:2], dtype=bool), 0.0
-    now = lab.astype(np.int16)
-    lighter = np.median((now[..., 0] - middle)[sure])
-    now[..., 0] -= np.int16(np.clip(lighter, -_LIGHTER, _LIGHTER))
-    like: NDArray[np.bool_] = np.asarray(
-        np.all((now >= template.low) & (now <= template.high), axis=2)
+    pixels = lab.astype(np.int16)
+    lighter = np.median((pixels[..., 0] - expected)[inside])
+    pixels[..., 0] -= np.int16(np.clip(lighter, -_LIGHTER, _LIGHTER))
+    matches: NDArray[np.bool_] = np.asarray(
+        np.all((pixels >= template.low) & (pixels <= template.high), axis=2)
     )
     weight = float(template.weight.sum())
-    return like, float((template.weight * like).sum()) / max(weight, 1e-6)
+    return matches, float((template.weight * matches).sum()) / max(weight, 1e-6)
 
 
-def colour_agreement(scene: Scene, pose: PatchPose, it: Appearance) -> tuple[float, PatchPose]:
+def colour_agreement(
+    scene: Scene, pose: PatchPose, appearance: Appearance
+) -> tuple[float, PatchPose]:
     """Excess of an object's colours at its position over the surroundings, and their centre.
 
     Args:
         scene: The frame.
         pose: Expected pose.
-        it: Its appearance.
+        appearance: Its appearance.
 
     Returns:
         The share of the object's pixels with its colours minus that of the surroundings, -1 to 1, and
         the pose shifted to the centre of these colours.
     """
-    odds = it.colours.odds(colour_bins(scene.patch(pose, it.shape)))
-    own = (odds > OWN).astype(np.float32)
-    inside = float((own * it.mask).sum()) / max(it.area, 1e-6)
-    ring = _ring(it.mask)
-    around = float((own * ring).sum()) / max(float(ring.sum()), 1e-6)
-    reach = cv2.GaussianBlur(cv2.dilate(it.mask, np.ones((9, 9), np.uint8)), (0, 0), 5.0)
-    weight = own * reach
+    odds = appearance.colours.odds(colour_bins(scene.patch(pose, appearance.shape)))
+    has_own_colour = (odds > OWN_LOG_ODDS).astype(np.float32)
+    inside = float((has_own_colour * appearance.mask).sum()) / max(appearance.area, 1e-6)
+    ring = _ring(appearance.mask)
+    around = float((has_own_colour * ring).sum()) / max(float(ring.sum()), 1e-6)
+    near = cv2.GaussianBlur(cv2.dilate(appearance.mask, np.ones((9, 9), np.uint8)), (0, 0), 5.0)
+    weight = has_own_colour * near
     total = float(weight.sum())
-    if total < 0.1 * it.area:
+    if total < 0.1 * appearance.area:
         return inside - around, pose
-    rows, cols = np.indices(own.shape, dtype=np.float32)
+    rows, cols = np.indices(has_own_colour.shape, dtype=np.float32)
     x, y = (float((weight * at).sum()) / total for at in (cols, rows))
-    middle = it.area
-    u, v = (float((it.mask * at).sum()) / middle for at in (cols, rows))
+    area = appearance.area
+    u, v = (float((appearance.mask * at).sum()) / area for at in (cols, rows))
     return inside - around, pose.shifted(x - u, y - v)
 
 
@@ -139,13 +141,15 @@ def _ring(mask: Floats) -> Floats:
     return np.asarray(np.clip(far - near, 0, 1), dtype=np.float32)
 
 
-def verify(scene: Scene, it: Appearance, pose: PatchPose) -> Match:
+def verify(scene: Scene, appearance: Appearance, pose: PatchPose) -> Match:
     """Match an object near a pose, after a local search over position and scale."""
-    pose, peak = respond(scene, pose, it.shape, it.colours, it.filter)
-    for by in (1.0, 0.93, 1.075):
-        at, height = respond(scene, pose.resized(by), it.shape, it.colours, it.filter)
-        if height > peak:
-            pose, peak = at, height
-    template = template_of(it.lab, it.mask)
-    _, share = explained_pixels(template, scene.patch(pose, it.shape))
+    pose, peak = filter_peak(scene, pose, appearance.shape, appearance.colours, appearance.filter)
+    for factor in (1.0, 0.93, 1.075):
+        at, other_peak = filter_peak(
+            scene, pose.resized(factor), appearance.shape, appearance.colours, appearance.filter
+        )
+        if other_peak > peak:
+            pose, peak = at, other_peak
+    template = template_of(appearance.lab, appearance.mask)
+    _, share = explained_pixels(template, scene.patch(pose, appearance.shape))
     return Match(pose, peak, share)

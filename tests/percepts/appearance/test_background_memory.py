@@ -20,24 +20,24 @@ from tests.percepts.appearance.scenes import (
     thing,
 )
 from visup.agent import Frame, Observation, Region
-from visup.percepts.appearance.behaviour import AppearanceBehaviour
-from visup.percepts.appearance.looks.blob import Blob
-from visup.percepts.appearance.looks.pose import Doubles
-from visup.percepts.appearance.looks.scene import Scene, prepare_scene
-from visup.percepts.appearance.scenery.background_memory import (
-    COARSER,
-    FIRST_EVERY_S,
-    MOST_KEPT,
+from visup.percepts.appearance.background.background_memory import (
+    FIRST_INTERVAL_S,
+    MOST_FRAMES,
+    REDUCTION,
     BackgroundMemory,
-    holds,
+    has_changed,
 )
-from visup.percepts.appearance.scenery.points import STILL
+from visup.percepts.appearance.background.point_tracking import STILL
+from visup.percepts.appearance.behaviour import AppearanceBehaviour
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.pose import Doubles
+from visup.percepts.appearance.models.scene import Scene, prepare_scene
 
 SIZE = WIDTH, HEIGHT
 WIDE, HIGH = SIZES["tool"]
 PLACES = st.tuples(st.integers(0, WIDTH - WIDE), st.integers(0, HEIGHT - HIGH))
 LEFT_AT = 140, 60
-APART = 2 * COARSER
+APART = 2 * REDUCTION
 """Pixels around a thing that count as its own, and of which nothing is known."""
 
 
@@ -62,7 +62,7 @@ def seen_at(*places: tuple[int, int], beside: tuple[tuple[int, int], ...] = ()) 
     """A memory of a tool at one place after the other, and of equal tools beside it all the time."""
     memory = BackgroundMemory()
     for k, at in enumerate(places):
-        time = k * FIRST_EVERY_S
+        time = k * FIRST_INTERVAL_S
         memory.update(scene(time, *beside, at), {"tool": blob(at)})
     return memory
 
@@ -79,7 +79,7 @@ def test_where_it_was_not_it_can_be_only_where_something_has_changed(
     memory = seen_at(was)
     changed = memory.changed(scene(9.0, *((now,) if comes else ())), "tool")
     assert changed is not None
-    assert not apart(was, now) or holds(changed, blob(now)) is comes
+    assert not apart(was, now) or has_changed(changed, blob(now)) is comes
 
 
 @settings(max_examples=20, deadline=None)
@@ -90,7 +90,7 @@ def test_an_equal_thing_that_rested_beside_it_is_not_it(
     memory = seen_at(was, beside=(other,))
     changed = memory.changed(scene(9.0, other), "tool")
     assert changed is not None
-    assert not apart(was, other) or not holds(changed, blob(other))
+    assert not apart(was, other) or not has_changed(changed, blob(other))
 
 
 @settings(max_examples=20, deadline=None)
@@ -98,7 +98,7 @@ def test_an_equal_thing_that_rested_beside_it_is_not_it(
 def test_where_it_was_all_the_time_nothing_is_known(was: tuple[int, int]) -> None:
     changed = seen_at(was, was, was).changed(scene(9.0, was), "tool")
     assert changed is not None
-    assert holds(changed, blob(was))
+    assert has_changed(changed, blob(was))
 
 
 def test_what_is_uncovered_is_known_from_before_it_was_covered() -> None:
@@ -108,11 +108,11 @@ def test_what_is_uncovered_is_known_from_before_it_was_covered() -> None:
         image = with_tools(wall, was)
         if k > 1:
             image[50:140, 0:80] = 200
-        time = k * FIRST_EVERY_S
+        time = k * FIRST_INTERVAL_S
         memory.update(prepare_scene(image, time), {"tool": blob(was)})
     changed = memory.changed(scene(9.0, wall), "tool")
     assert changed is not None
-    assert not holds(changed, blob(wall))
+    assert not has_changed(changed, blob(wall))
 
 
 @settings(max_examples=20, deadline=None)
@@ -126,7 +126,7 @@ def test_the_memory_goes_with_the_camera(dx: int, dy: int, comes: bool) -> None:
     image = cv2.warpAffine(with_tools(*((now,) if comes else ())), shift(dx, dy), (WIDTH, HEIGHT))
     changed = memory.changed(prepare_scene(np.asarray(image, np.uint8), 9.0), "tool")
     assert changed is not None
-    assert holds(changed, blob((now[0] + dx, now[1] + dy))) is comes
+    assert has_changed(changed, blob((now[0] + dx, now[1] + dy))) is comes
 
 
 def shift(dx: float, dy: float) -> Doubles:
@@ -148,11 +148,11 @@ def test_the_first_picture_is_kept_and_few_are(count: int) -> None:
     """What rests all the time and is covered for minutes is known from the beginning."""
     memory, image = BackgroundMemory(), picture({})[0]
     for k in range(count):
-        time = k * FIRST_EVERY_S
+        time = k * FIRST_INTERVAL_S
         where = (20, 60) if k == 0 else (150, 60)
         memory.update(prepare_scene(image, time), {"tool": blob(where)})
-    assert len(memory.kept) <= MOST_KEPT
-    assert memory.kept[0].covered["tool"][80 // COARSER, 30 // COARSER]
+    assert len(memory.frames) <= MOST_FRAMES
+    assert memory.frames[0].covered["tool"][80 // REDUCTION, 30 // REDUCTION]
 
 
 def told(images: Iterable[Image]) -> list[list[Region]]:

@@ -18,14 +18,14 @@ from tests.percepts.appearance.scenes import (
     table,
     thing,
 )
-from visup.percepts.appearance.looks.blob import Blob
-from visup.percepts.appearance.looks.bodies import (
+from visup.percepts.appearance.models.appearance_model import view_models
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.moving_body import (
     MovingBody,
-    body_colours,
+    colour_similarity,
 )
-from visup.percepts.appearance.looks.scene import Scene, prepare_scene
-from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.tracking.finding import body_places
+from visup.percepts.appearance.models.scene import Scene, prepare_scene
+from visup.percepts.appearance.tracking.redetection import candidates_at_bodies
 
 VIEWS = view_models(shown({"tool": (100, 60), "tray": (20, 20)}, "tool", "tray"))
 TOOL, TRAY = VIEWS
@@ -57,9 +57,9 @@ def scene(image: Image) -> Scene:
 @given(st.floats(-180, 180), st.integers(60, 180), st.integers(50, 130))
 def test_a_moving_thing_is_found_however_it_is_turned(degrees: float, x: int, y: int) -> None:
     image, mask = turned(degrees, x, y)
-    (place,) = body_places(scene(image), TOOL, 0, [MovingBody(7, blob(mask), cut=False)])
+    (place,) = candidates_at_bodies(scene(image), TOOL, 0, [MovingBody(7, blob(mask), cut=False)])
     rows, cols = np.nonzero(mask)
-    assert (place.name, place.looks) == ("tool", TOOL.appearance)
+    assert (place.name, place.appearance) == ("tool", TOOL.appearance)
     assert (place.match.pose.x, place.match.pose.y) == pytest.approx(
         (cols.mean(), rows.mean()), abs=1.5
     )
@@ -68,7 +68,7 @@ def test_a_moving_thing_is_found_however_it_is_turned(degrees: float, x: int, y:
 @pytest.mark.parametrize("degrees", [0, 40, 90])
 def test_a_moving_thing_is_no_other_one(degrees: float) -> None:
     image, mask = turned(degrees)
-    assert body_places(scene(image), TRAY, 1, [MovingBody(7, blob(mask), cut=False)]) == []
+    assert candidates_at_bodies(scene(image), TRAY, 1, [MovingBody(7, blob(mask), cut=False)]) == []
 
 
 def test_a_shadow_on_the_table_is_nothing() -> None:
@@ -77,7 +77,7 @@ def test_a_shadow_on_the_table_is_nothing() -> None:
     image = table()
     image[mask] = image[mask] * 0.6
     bodies = [MovingBody(7, blob(mask), cut=False)]
-    assert all(not body_places(scene(image), v, 0, bodies) for v in VIEWS)
+    assert all(not candidates_at_bodies(scene(image), v, 0, bodies) for v in VIEWS)
 
 
 @pytest.mark.parametrize(("by", "cut", "found"), [(1.0, False, 1), (0.3, False, 0), (0.3, True, 1)])
@@ -88,14 +88,16 @@ def test_a_body_is_about_as_large_as_the_thing_unless_the_border_cuts_it(
     rows = np.flatnonzero(mask.any(axis=1))
     mask[rows[0] + round(by * by * len(rows)) :] = False
     image[~mask] = table()[~mask]
-    assert len(body_places(scene(image), TOOL, 0, [MovingBody(7, blob(mask), cut)])) == found
+    assert (
+        len(candidates_at_bodies(scene(image), TOOL, 0, [MovingBody(7, blob(mask), cut)])) == found
+    )
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 210), st.integers(0, 150), st.integers(1, 30), st.integers(1, 30))
 def test_colours_are_shares(x: int, y: int, w: int, h: int) -> None:
     image, _ = picture({"tool": (100, 60)})
-    excess, alike = body_colours(
+    excess, alike = colour_similarity(
         scene(image), TOOL.appearance, Blob((x, y, x + w, y + h), np.ones((h, w), dtype=bool))
     )
     assert -1 <= excess <= 1

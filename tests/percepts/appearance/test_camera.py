@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from visup.agent import CameraMotion
-from visup.percepts.appearance.looks.scene import prepare_scene
-from visup.percepts.appearance.scenery.camera import CameraTrack, followed_camera
-from visup.percepts.appearance.scenery.points import STILL
+from visup.percepts.appearance.background.camera_motion import CameraTrack, track_camera
+from visup.percepts.appearance.background.point_tracking import STILL
+from visup.percepts.appearance.models.scene import prepare_scene
 
 Image = NDArray[np.uint8]
 FPS, WIDTH, HEIGHT = 25.0, 240, 180
@@ -40,14 +40,14 @@ def picture(at: tuple[float, float], arm: float = 0.0, number: int = 0) -> Image
     return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def followed(
+def track_object(
     places: list[tuple[float, float]], arm: list[float]
 ) -> list[NDArray[np.float64] | None]:
     track, moved = CameraTrack(), []
     shots = zip(places, arm, strict=True)
     scenes = [prepare_scene(picture(p, a, k), k / FPS) for k, (p, a) in enumerate(shots)]
     for old, new in pairwise(scenes):
-        track, camera = followed_camera(track, old, new, None)
+        track, camera = track_camera(track, old, new, None)
         moved.append(camera)
     return moved
 
@@ -63,20 +63,20 @@ def total(moved: list[NDArray[np.float64] | None]) -> tuple[float, float]:
 def test_a_drift_adds_up_to_what_it_is(dx: float, dy: float) -> None:
     """To a pixel or so over a second, however slow."""
     count = 25
-    moved = followed([(dx * k, dy * k) for k in range(count + 1)], [0.0] * (count + 1))
+    moved = track_object([(dx * k, dy * k) for k in range(count + 1)], [0.0] * (count + 1))
     assert all(m is not None for m in moved)
     x, y = total(moved)  # the picture moves against the camera
     assert np.hypot(x + dx * count, y + dy * count) < 1.6
 
 
 def test_a_camera_that_rests_is_exactly_still() -> None:
-    assert all(m is STILL for m in followed([(0.0, 0.0)] * 12, [0.0] * 12))
+    assert all(m is STILL for m in track_object([(0.0, 0.0)] * 12, [0.0] * 12))
 
 
 def test_an_arm_that_reaches_in_does_not_move_the_scene() -> None:
     """It fills a third of the picture in the end, with a texture as strong as that of the rest."""
     reach = [0.0] * 16 + [4.0 * k for k in range(30)]
-    assert np.hypot(*total(followed([(0.0, 0.0)] * len(reach), reach))) < 1.5
+    assert np.hypot(*total(track_object([(0.0, 0.0)] * len(reach), reach))) < 1.5
 
 
 @given(

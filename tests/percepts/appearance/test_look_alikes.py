@@ -10,7 +10,7 @@ from tests.percepts.appearance.scenes import shown
 from tests.percepts.appearance.test_behaviour import Places, look, watch
 from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
-from visup.percepts.appearance.looks.thing_model import view_models
+from visup.percepts.appearance.models.appearance_model import view_models
 from visup.percepts.appearance.tracking.look_alikes import look_alikes
 
 AWAY = (9, 10, 11, 12, 13, 14)

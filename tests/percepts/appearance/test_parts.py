@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from tests.percepts.appearance.scenes import HEIGHT, WIDTH, picture, shown
 from visup.agent import Region
-from visup.percepts.appearance.looks.pose import PatchPose
-from visup.percepts.appearance.looks.scene import prepare_scene
-from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.output.explaining import unexplained
-from visup.percepts.appearance.scenery.change import ChangeMap
-from visup.percepts.appearance.scenery.points import STILL
-from visup.percepts.appearance.tracking._rest_check_jit import like_before
-from visup.percepts.appearance.tracking.finding import candidates
+from visup.percepts.appearance.background.change_map import ChangeMap
+from visup.percepts.appearance.background.point_tracking import STILL
+from visup.percepts.appearance.models.appearance_model import view_models
+from visup.percepts.appearance.models.pose import PatchPose
+from visup.percepts.appearance.models.scene import prepare_scene
+from visup.percepts.appearance.output.unexplained_regions import unexplained
+from visup.percepts.appearance.tracking._rest_check_jit import unchanged_pixels
+from visup.percepts.appearance.tracking.redetection import view_candidates
 from visup.percepts.appearance.tracking.verification import verify
 from visup.percepts.motion.outlines.region_outline import describe_mask
 
@@ -49,7 +49,7 @@ def test_pixels_are_compared_as_the_definition_says(seed: int) -> None:
     ratio = (a[..., 0] + 1) / (b[..., 0] + 1)
     kind = abs((a[..., 1:] - 128) - (b[..., 1:] - 128) * ratio[..., None]).max(axis=2) <= 7
     shade = (b[..., 0] > 50) & (ratio > 0.62) & (ratio < 1.25) & kind
-    assert np.array_equal(like_before(now, was, 14, 7), near | shade)
+    assert np.array_equal(unchanged_pixels(now, was, 14, 7), near | shade)
 
 
 @settings(max_examples=10, deadline=None)
@@ -66,7 +66,7 @@ def test_a_thing_is_verified_where_it_is(dx: int, dy: int) -> None:
 
 def test_an_empty_table_has_no_place_for_a_thing() -> None:
     view = view_models(shown({"part": (100, 70)}, "part"))[0]
-    assert candidates(prepare_scene(picture({})[0], 0.0), view, 0) == []
+    assert view_candidates(prepare_scene(picture({})[0], 0.0), view, 0) == []
 
 
 def test_a_change_is_where_a_thing_went() -> None:
@@ -74,7 +74,7 @@ def test_a_change_is_where_a_thing_went() -> None:
     for n in range(8):
         scene = prepare_scene(picture({"part": (20 + 6 * n, 60)})[0], n * 0.1)
         change.update(scene, STILL)
-    lately = change.lately(scene)
+    lately = change.recently_changed(scene)
     assert lately is not None
     ys, xs = np.nonzero(lately)
     assert 4 * ys.min() > 30

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame, Health, HealthStatus, Observation, Percept, Report, ReportState
 from visup.agent.storage.checkpoint import dump_state, load_state
-from visup.percepts.appearance.placed import PlacedBehaviour
+from visup.percepts.appearance.placed_objects import PlacedObjectBehaviour
 from visup.percepts.taught.pointed import outline_at
 
 GREEN, RED = (60, 140, 70), (40, 40, 200)
@@ -62,7 +62,7 @@ def test_a_place_outside_the_picture_shows_nothing(at: tuple[float, float]) -> N
 def test_what_lies_at_a_place_is_seen_at_rest_and_remembered_by_a_copy() -> None:
     healthy = Percept("health", Health(HealthStatus.OK), 0.0, "health")
     fit = Report("health", ReportState.RAN, ("health",), (healthy,))
-    one, copy = PlacedBehaviour({"charger": (165.0, 115.0)}), None
+    one, copy = PlacedObjectBehaviour({"charger": (165.0, 115.0)}), None
     names: list[set[str]] = []
     for n in range(8):
         frame = Frame(n, n / 10, scene((150, 100, 40, 40), seed=n))
@@ -72,6 +72,6 @@ def test_what_lies_at_a_place_is_seen_at_rest_and_remembered_by_a_copy() -> None
             told = copy.perceive(frame, Observation(n, n / 10, (320, 240), (fit,)), ())
             assert [p.kind for p in told] == [p.kind for p in seen]
         if n == 4:
-            copy = PlacedBehaviour({"charger": (165.0, 115.0)})
+            copy = PlacedObjectBehaviour({"charger": (165.0, 115.0)})
             copy.load(load_state(dump_state(one.save())))
     assert names[-1] == {"charger"}

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from visup.agent import CameraMotion, Directive, Frame, Observation, Percept
 from visup.agent.contract.behaviour import Contract
-from visup.percepts.appearance.looks.scene import Scene, prepare_scene
-from visup.percepts.appearance.scenery.camera import CameraTrack, followed_camera
+from visup.percepts.appearance.background.camera_motion import CameraTrack, track_camera
+from visup.percepts.appearance.models.scene import Scene, prepare_scene
 
 
 class SceneCamera:
@@ -40,7 +40,7 @@ class SceneCamera:
         last, self._last = self._last, (frame.index, scene)
         if last is None:
             return
-        self._track, motion = followed_camera(self._track, last[1], scene, self._taken(*last))
+        self._track, motion = track_camera(self._track, last[1], scene, self._taken(*last))
         if motion is not None:
             motion = motion.copy()
             motion[:, 2] /= scene.scale

@@ -8,25 +8,25 @@ import cv2
 import numpy as np
 
 from visup.agent import Region
-from visup.percepts.appearance.looks.blob import Blob
-from visup.percepts.appearance.looks.pose import Doubles
-from visup.percepts.appearance.looks.scene import Scene
-from visup.percepts.appearance.tracking.track import State, ThingTrack
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.pose import Doubles
+from visup.percepts.appearance.models.scene import Scene
+from visup.percepts.appearance.tracking.track import TaughtObjectTrack, TrackState
 from visup.percepts.motion.outlines.region_outline import RegionOutline, describe_mask
 
-OVER_S = 0.2  # time over which a velocity is measured, seconds
+VELOCITY_WINDOW_S = 0.2  # time over which a velocity is measured, seconds
 JITTER_PX = 0.5  # error of a pose, working pixels
 LEAST_SIGMA = 0.5  # pixels per second
 
 
-def thing_outline(blob: Blob, scene: Scene) -> RegionOutline | None:
-    """A blob of the working picture in frame pixels; None when nothing remains."""
-    mask, origin = _enlarged(blob, scene)
+def object_outline(blob: Blob, scene: Scene) -> RegionOutline | None:
+    """A blob of the working image in frame pixels; None when nothing remains."""
+    mask, origin = _in_frame_pixels(blob, scene)
     return describe_mask(mask, origin, scene.frame_size) if mask.any() else None
 
 
-def thing_region(
-    track: ThingTrack, shape: RegionOutline, scene: Scene, last: float | None
+def object_region(
+    track: TaughtObjectTrack, shape: RegionOutline, scene: Scene, last: float | None
 ) -> Region:
     """The reported region of an object.
 
@@ -41,18 +41,20 @@ def thing_region(
     """
     velocity, sigma = _velocity(track, scene.scale, shape.centroid)
     region = shape.region(track.id, velocity, sigma, confidence(track))
-    return replace(region, motion=_motion(track, scene.scale, last), visible_since=track.since)
+    return replace(
+        region, motion=_motion(track, scene.scale, last), visible_since=track.first_seen_at
+    )
 
 
-def confidence(track: ThingTrack) -> float:
+def confidence(track: TaughtObjectTrack) -> float:
     """Confidence that this is the object: it was recognised, and still looks as expected."""
-    return float(0.7 + 0.3 * np.clip(track.peak, 0, 1) * track.explained)
+    return float(0.7 + 0.3 * np.clip(track.peak, 0, 1) * track.explained_share)
 
 
-def _enlarged(
+def _in_frame_pixels(
     blob: Blob, scene: Scene
 ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.bool_]], tuple[int, int]]:
-    """A mask of the working picture in frame pixels, and its corner there."""
+    """A mask of the working image in frame pixels, and its corner there."""
     width, height = scene.frame_size
     if scene.size == scene.frame_size:
         return blob.mask, blob.window[:2]
@@ -65,18 +67,18 @@ def _enlarged(
 
 
 def _velocity(
-    track: ThingTrack, scale: float, at: tuple[float, float]
+    track: TaughtObjectTrack, scale: float, at: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
     """(vx, vy) of a point of an object and its standard deviation, frame pixels per second."""
     if len(track.path) < 2:
         return (0.0, 0.0), 0.0
     now, pose = track.path[-1]
-    before = next(p for p in track.path if now - p[0] <= OVER_S + 1e-6)
+    before = next(p for p in track.path if now - p[0] <= VELOCITY_WINDOW_S + 1e-6)
     span = now - before[0]
     if span <= 0:
         return (0.0, 0.0), 0.0
     sigma = max(JITTER_PX / scale / span, LEAST_SIGMA)
-    if track.state is State.RESTING:
+    if track.state is TrackState.RESTING:
         return (0.0, 0.0), sigma
     back = pose.motion_to(before[1])
     x, y = at[0] * scale, at[1] * scale
@@ -84,7 +86,7 @@ def _velocity(
     return (float((x - was[0]) / scale / span), float((y - was[1]) / scale / span)), sigma
 
 
-def _motion(track: ThingTrack, scale: float, last: float | None) -> Doubles | None:
+def _motion(track: TaughtObjectTrack, scale: float, last: float | None) -> Doubles | None:
     """(2, 3) affine from the previous frame to this one, frame pixels."""
     if last is None or len(track.path) < 2 or track.path[-2][0] < last - 1e-6:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks._cell_features_jit import (
+from visup.percepts.appearance.models._cell_features_jit import (
     BINS,
     COLOURS,
     cell_histograms,

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 Doubles = NDArray[np.float64]
-Picture = NDArray[np.uint8] | NDArray[np.float32]
+Image = NDArray[np.uint8] | NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
 class PatchPose:
-    """A similarity transform from an object's patch to the picture.
+    """A similarity transform from an object's patch to the image.
 
     Attributes:
-        x: Centre of the patch in the picture, pixels.
+        x: Centre of the patch in the image, pixels.
         y: The same, downwards.
-        scale: Pixels of the picture per pixel of the patch.
-        angle: Rotation from the patch to the picture, radians.
+        scale: Pixels of the image per pixel of the patch.
+        angle: Rotation from the patch to the image, radians.
     """
 
     x: float
@@ -31,7 +31,7 @@ class PatchPose:
     angle: float = 0.0
 
     def matrix(self, shape: tuple[int, ...]) -> Doubles:
-        """(2, 3) from pixels of a patch to pixels of the picture.
+        """(2, 3) from pixels of a patch to pixels of the image.
 
         Args:
             shape: (height, width, ...) of the patch.
@@ -43,7 +43,7 @@ class PatchPose:
         )
 
     def moved(self, motion: Doubles) -> PatchPose:
-        """The pose after a similarity of the picture, a (2, 3) matrix."""
+        """The pose after a similarity of the image, a (2, 3) matrix."""
         x, y = motion[:, :2] @ (self.x, self.y) + motion[:, 2]
         scale = float(np.hypot(motion[0, 0], motion[1, 0]))
         turn = float(np.arctan2(motion[1, 0], motion[0, 0]))
@@ -64,13 +64,13 @@ class PatchPose:
         return PatchPose(self.x, self.y, self.scale * by, self.angle + turn)
 
     def apart(self, other: PatchPose, radius: float) -> float:
-        """How far a point at a radius (patch pixels) moves from one pose to the other, picture pixels."""
+        """How far a point at a radius (patch pixels) moves from one pose to the other, image pixels."""
         shift = float(np.hypot(self.x - other.x, self.y - other.y))
         bend = np.hypot(self.scale - other.scale, self.scale * (self.angle - other.angle))
         return shift + float(bend) * radius
 
     def motion_to(self, other: PatchPose) -> Doubles:
-        """(2, 3) similarity of the picture that maps this pose to another."""
+        """(2, 3) similarity of the image that maps this pose to another."""
         by, turn = other.scale / self.scale, other.angle - self.angle
         cos, sin = by * np.cos(turn), by * np.sin(turn)
         linear = np.array([[cos, -sin], [sin, cos]])
@@ -78,8 +78,8 @@ class PatchPose:
 
 
 def cut_patch(
-    image: Picture, pose: PatchPose, shape: tuple[int, ...], nearest: bool = False
-) -> Picture:
+    image: Image, pose: PatchPose, shape: tuple[int, ...], nearest: bool = False
+) -> Image:
     """The patch at a pose; beyond the border the border pixels are repeated.
 
     Args:
@@ -98,22 +98,22 @@ def cut_patch(
             borderMode=cv2.BORDER_REPLICATE,
         )
     )
-    return cast(Picture, out)
+    return cast(Image, out)
 
 
 Window = tuple[int, int, int, int]
 
 
 def window_of(pose: PatchPose, shape: tuple[int, ...], size: tuple[int, int]) -> Window | None:
-    """The box of the picture that a patch covers.
+    """The box of the image that a patch covers.
 
     Args:
         pose: Pose of the patch.
         shape: (height, width) of the patch.
-        size: (width, height) of the picture.
+        size: (width, height) of the image.
 
     Returns:
-        (left, top, right, bottom), half open; None when outside the picture.
+        (left, top, right, bottom), half open; None when outside the image.
     """
     h, w = shape[:2]
     corners = np.array([[0, 0, 1], [w - 1, 0, 1], [0, h - 1, 1], [w - 1, h - 1, 1]], dtype=float)
@@ -125,13 +125,13 @@ def window_of(pose: PatchPose, shape: tuple[int, ...], size: tuple[int, int]) ->
     return (left, top, right, bottom) if right - left > 1 and bottom - top > 1 else None
 
 
-def paint(patch: Picture, pose: PatchPose, window: Window, outside: float = 0.0) -> Picture:
-    """A patch rendered into a window of the picture.
+def paint(patch: Image, pose: PatchPose, window: Window, outside: float = 0.0) -> Image:
+    """A patch rendered into a window of the image.
 
     Args:
         patch: (h, w) or (h, w, 3).
         pose: Pose of the patch.
-        window: (left, top, right, bottom) of the picture.
+        window: (left, top, right, bottom) of the image.
         outside: Value outside the patch.
     """
     left, top, right, bottom = window
@@ -146,4 +146,4 @@ def paint(patch: Picture, pose: PatchPose, window: Window, outside: float = 0.0)
             borderValue=(outside,) * 3,
         )
     )
-    return cast(Picture, out)
+    return cast(Image, out)

@@ -1,4 +1,4 @@
-"""Point tracking from frame to frame: on objects, and all over the picture."""
+"""Point tracking from frame to frame: on objects, and all over the image."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.pose import Doubles
-from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.models.pose import Doubles
+from visup.percepts.appearance.models.scene import Scene
 
 STILL = np.eye(2, 3)
 NO_POINTS = np.zeros((0, 2), dtype=np.float32)
-_GRID = 12, 8  # grid of the picture; one camera point per cell
+_GRID = 12, 8  # grid of the image; one camera point per cell
 _WINDOW = (13, 13)
 _BACK = 0.7  # most forward-backward error, pixels
 
@@ -38,7 +38,7 @@ class PointMotion:
         return self.before[mine], self.after[mine]
 
 
-def follow_points(
+def track_points(
     old: Scene, new: Scene, points: NDArray[np.float32], owner: NDArray[np.int64]
 ) -> PointMotion:
     """Track points; those that fail the forward-backward check are dropped.

@@ -1,4 +1,4 @@
-"""Blobs: binary masks within a window of the working picture (`looks/scene.py`)."""
+"""Blobs: binary masks within a window of the working image (`models/scene.py`)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.pose import Window
+from visup.percepts.appearance.models.pose import Window
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blob:
-    """A set of pixels of the working picture.
+    """A set of pixels of the working image.
 
     Attributes:
         window: (left, top, right, bottom), working pixels, half open.

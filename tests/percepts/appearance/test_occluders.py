@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from tests.percepts.appearance.scenes import SIZES, picture, thing
 from tests.percepts.appearance.test_bodies import TOOL, TRAY, scene
-from visup.percepts.appearance.looks.blob import Blob, overlap, without
-from visup.percepts.appearance.looks.pose import PatchPose
-from visup.percepts.appearance.tracking.finding import ThingPlace, assigned
+from visup.percepts.appearance.models.blob import Blob, overlap, without
+from visup.percepts.appearance.models.pose import PatchPose
+from visup.percepts.appearance.tracking.redetection import RedetectionCandidate, assign_candidates
 from visup.percepts.appearance.tracking.verification import Match
 
 AT, SIDE = (60, 60), 14
@@ -31,9 +31,9 @@ def test_a_patch_within_another_thing_is_taken_where_it_lies_before_it(
         image[y : y + SIDE, x : x + SIDE] = thing("tool")[4 : 4 + SIDE, 4 : 4 + SIDE]
     match = Match(PatchPose(x + SIDE / 2, y + SIDE / 2, 0.3), 0.8, 0.8)
     seen = full(x, y, SIDE, SIDE) if known else None
-    place = ThingPlace("tool", 0, TOOL.appearance, match, 0.8, seen)
+    place = RedetectionCandidate("tool", 0, TOOL.appearance, match, 0.8, seen)
     tray = full(*AT, *SIZES["tray"]), TRAY.appearance
-    assert bool(assigned(scene(image), [place], [tray])) is (put_before and known)
+    assert bool(assign_candidates(scene(image), [place], [tray])) is (put_before and known)
 
 
 BLOBS = st.builds(full, *(st.integers(0, 30) for _ in "xy"), *(st.integers(1, 20) for _ in "wh"))

@@ -14,7 +14,7 @@ from visup.percepts.taught.pointed import outline_at
 from visup.percepts.taught.view import TaughtView, taught_view
 
 
-class PlacedBehaviour:
+class PlacedObjectBehaviour:
     """Reports taught objects, other motion, and the objects at given positions of the first valid frame.
 
     Nothing is taught at a position where no outline is found; an object that moves away from there can
@@ -56,11 +56,11 @@ class PlacedBehaviour:
     ) -> Iterable[Percept]:
         """Report the objects and the other moving regions of one frame; see `AppearanceBehaviour`."""
         if self._views is None and image_is_sound(observation):
-            self._views = tuple(self._shown(frame))
+            self._views = tuple(self._views_at_places(frame))
             self._inner = AppearanceBehaviour((*self._given, *self._views))
         return self._inner.perceive(frame, observation, directives)
 
-    def _shown(self, frame: Frame) -> Iterable[TaughtView]:
+    def _views_at_places(self, frame: Frame) -> Iterable[TaughtView]:
         for name, at in sorted(self._places.items()):
             outline = outline_at(frame.image, at)
             try:

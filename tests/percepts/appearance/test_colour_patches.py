@@ -21,8 +21,8 @@ from tests.percepts.appearance.scenes import (
 from tests.percepts.appearance.test_bodies import TOOL, TRAY, scene, turned
 from visup.agent import Frame, Observation
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
-from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.tracking.finding import coloured_places, has_distinctive_colours
+from visup.percepts.appearance.models.appearance_model import view_models
+from visup.percepts.appearance.tracking.redetection import candidates_by_colour, is_unique_by_colour
 from visup.percepts.taught.view import taught_mask
 
 WIDE, HIGH = SIZES["tool"]
@@ -33,7 +33,7 @@ SIZE = WIDTH, HEIGHT
 @given(st.floats(-180, 180), st.integers(60, 180), st.integers(50, 130))
 def test_what_rests_is_found_however_it_is_turned(degrees: float, x: int, y: int) -> None:
     image, mask = turned(degrees, x, y)
-    (place,) = coloured_places(scene(image), TOOL, 0)
+    (place,) = candidates_by_colour(scene(image), TOOL, 0)
     rows, cols = np.nonzero(mask)
     middle = (cols.min() + cols.max()) / 2, (rows.min() + rows.max()) / 2
     assert (place.match.pose.x, place.match.pose.y) == pytest.approx(middle, abs=2.5)
@@ -43,22 +43,22 @@ def test_what_rests_is_found_however_it_is_turned(degrees: float, x: int, y: int
 @given(st.integers(8, WIDE - 8), st.booleans())
 def test_what_the_border_cuts_is_where_its_free_side_is(hidden: int, left: bool) -> None:
     x = -hidden if left else WIDTH - WIDE + hidden
-    (place,) = coloured_places(scene(picture({"tool": (x, 60)})[0]), TOOL, 0)
+    (place,) = candidates_by_colour(scene(picture({"tool": (x, 60)})[0]), TOOL, 0)
     assert place.match.pose.x == pytest.approx(x + (WIDE - 1) / 2, abs=2.5)
     assert place.match.pose.y == pytest.approx(60 + (HIGH - 1) / 2, abs=2.5)
 
 
 def test_an_empty_table_and_another_thing_are_nothing() -> None:
-    assert coloured_places(scene(table()), TOOL, 0) == []
-    assert coloured_places(scene(picture({"tray": (90, 60)})[0]), TOOL, 0) == []
-    assert coloured_places(scene(picture({"tool": (90, 60)})[0]), TRAY, 1) == []
+    assert candidates_by_colour(scene(table()), TOOL, 0) == []
+    assert candidates_by_colour(scene(picture({"tray": (90, 60)})[0]), TOOL, 0) == []
+    assert candidates_by_colour(scene(picture({"tool": (90, 60)})[0]), TRAY, 1) == []
 
 
 def test_of_two_patches_neither_is_it() -> None:
     """Whichever of them it is, colours do not tell."""
     image, masks = picture({"tool": (30, 60)})
     image[60 : 60 + HIGH, 150 : 150 + WIDE] = image[masks["tool"]].reshape(HIGH, WIDE, 3)
-    assert coloured_places(scene(image), TOOL, 0) == []
+    assert candidates_by_colour(scene(image), TOOL, 0) == []
 
 
 @pytest.mark.parametrize("by", [0.3, 2.2])
@@ -68,7 +68,7 @@ def test_what_is_much_smaller_or_larger_is_something_else(by: float) -> None:
     part = cv2.resize(tool, (round(WIDE * by), round(HIGH * by)))
     canvas = table()
     canvas[10 : 10 + part.shape[0], 90 : 90 + part.shape[1]] = part
-    assert coloured_places(scene(canvas), TOOL, 0) == []
+    assert candidates_by_colour(scene(canvas), TOOL, 0) == []
 
 
 @pytest.mark.parametrize("alone", [True, False])
@@ -80,7 +80,7 @@ def test_colours_are_distinctive_where_they_find_the_thing_where_it_was_taught(
     if not alone:
         taught[80 : 80 + HIGH, 160 : 160 + WIDE] = taught[masks["tool"]].reshape(HIGH, WIDE, 3)
     view = taught_mask("tool", taught, masks["tool"])
-    assert has_distinctive_colours(view_models([view])[0]) is alone
+    assert is_unique_by_colour(view_models([view])[0]) is alone
     behaviour = AppearanceBehaviour([view])
     found = behaviour.perceive(Frame(0, 0.0, turned(90)[0]), Observation(0, 0.0, SIZE), ())
     assert bool([p for p in found if p.kind == "hypothesis"]) is alone
@@ -94,9 +94,9 @@ def test_colours_that_find_something_else_where_it_was_taught_are_not_distinctiv
     for rail in range(80, 80 + HIGH, 14):
         taught[rail : rail + 6, 60 : 60 + WIDE] = table()[rail : rail + 6, 60 : 60 + WIDE]
     (view,) = view_models([taught_mask("tool", taught, masks["tool"])])
-    (other,) = coloured_places(scene(view.scene), view, 0)
+    (other,) = candidates_by_colour(scene(view.scene), view, 0)
     assert other.match.pose.x == pytest.approx(160 + (WIDE - 1) / 2, abs=2.0)
-    assert not has_distinctive_colours(view)
+    assert not is_unique_by_colour(view)
 
 
 def resting(image: Image, frames: int) -> list[set[str]]:

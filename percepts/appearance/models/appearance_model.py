@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.looks.colours import ColourModel, colour_bins, learn_colours
-from visup.percepts.appearance.looks.correlation_filter import CorrelationFilter, learn_filter
-from visup.percepts.appearance.looks.features import CELL, cell_features
-from visup.percepts.appearance.looks.pose import PatchPose
-from visup.percepts.appearance.looks.scene import Scene, prepare_scene, work_scale
+from visup.percepts.appearance.models.colours import ColourModel, colour_bins, learn_colours
+from visup.percepts.appearance.models.correlation_filter import CorrelationFilter, learn_filter
+from visup.percepts.appearance.models.features import CELL, cell_features
+from visup.percepts.appearance.models.pose import PatchPose
+from visup.percepts.appearance.models.scene import Scene, prepare_scene, work_scale
 from visup.percepts.taught.view import TaughtView
 
 Floats = NDArray[np.float32]
@@ -63,9 +63,9 @@ class ViewModel:
     Attributes:
         name: Name of the object.
         appearance: Its appearance.
-        pose: Its pose, working pixels of the picture in which it was taught.
-        size: (width, height) of that picture, working pixels.
-        scene: (H, W, 3) uint8, BGR: that picture, reduced.
+        pose: Its pose, working pixels of the image in which it was taught.
+        size: (width, height) of that image, working pixels.
+        scene: (H, W, 3) uint8, BGR: that image, reduced.
     """
 
     name: str
@@ -81,23 +81,23 @@ def view_models(views: Sequence[TaughtView]) -> tuple[ViewModel, ...]:
 
 
 def _view_model(view: TaughtView) -> ViewModel:
-    small = work_scale(view.frame_size)
-    scene = _part_scene(view.image, small)
+    scale = work_scale(view.frame_size)
+    scene = _part_scene(view.image, scale)
     x, y, w, h = cv2.boundingRect(view.mask.astype(np.uint8))
-    pose, shape = _fitted((x * small, y * small, w * small, h * small))
-    mask = _mask_patch(view.mask, pose, shape, small)
-    by = small
-    origin = view.origin[0] * by, view.origin[1] * by
+    pose, shape = _fitted((x * scale, y * scale, w * scale, h * scale))
+    mask = _mask_patch(view.mask, pose, shape, scale)
+    scale = scale
+    origin = view.origin[0] * scale, view.origin[1] * scale
     placed = PatchPose(pose.x + origin[0], pose.y + origin[1], pose.scale)
-    size = round(view.frame_size[0] * by), round(view.frame_size[1] * by)
+    size = round(view.frame_size[0] * scale), round(view.frame_size[1] * scale)
     return ViewModel(
         view.name, learn_appearance(scene.patch(pose, shape), mask), placed, size, view.scene
     )
 
 
-def _part_scene(image: Bytes, small: float) -> Scene:
-    if small < 1:
-        size = max(1, round(image.shape[1] * small)), max(1, round(image.shape[0] * small))
+def _part_scene(image: Bytes, scale: float) -> Scene:
+    if scale < 1:
+        size = max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     return prepare_scene(image, 0.0)
 
@@ -113,10 +113,10 @@ def _fitted(box: tuple[float, float, float, float]) -> tuple[PatchPose, tuple[in
 
 
 def _mask_patch(
-    mask: NDArray[np.bool_], pose: PatchPose, shape: tuple[int, int], small: float
+    mask: NDArray[np.bool_], pose: PatchPose, shape: tuple[int, int], scale: float
 ) -> Floats:
     whole = PatchPose(
-        (pose.x + 0.5) / small - 0.5, (pose.y + 0.5) / small - 0.5, pose.scale / small
+        (pose.x + 0.5) / scale - 0.5, (pose.y + 0.5) / scale - 0.5, pose.scale / scale
     )
     soft = np.asarray(mask, dtype=np.float32)
     if whole.scale > 1.5:

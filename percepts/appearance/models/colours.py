@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
-OWN = 0.7  # log odds from which a colour is the object's own
+OWN_LOG_ODDS = 0.7  # log odds from which a colour is the object's own
 _STEPS = 16  # bins of lightness and of each colour; 4096 in all
 # Shares of the pixels below which a colour is not distinctive. A colour seen neither on the object nor around
 # it probably belongs to something else: it counts slightly against the object.

@@ -1,6 +1,6 @@
 """Scenes: frames reduced to a working size, in which taught objects are searched.
 
-The reduced frame is called the *working picture*, its pixels *working pixels*.
+The reduced frame is called the *working image*, its pixels *working pixels*.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from visup.percepts.appearance.looks.pose import Bytes, PatchPose, cut_patch
+from visup.percepts.appearance.models.pose import Bytes, PatchPose, cut_patch
 
 WORK_SIZE = 640
-"""Most pixels along the longer side of the searched picture."""
+"""Most pixels along the longer side of the searched image."""
 
 _LEVELS = 3  # most levels of the pyramid
 
@@ -68,12 +68,12 @@ def prepare_scene(image: Bytes, time: float) -> Scene:
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     height, width = image.shape[:2]
-    small = work_scale((width, height))
-    if small < 1:
-        size = max(1, round(width * small)), max(1, round(height * small))
+    scale = work_scale((width, height))
+    if scale < 1:
+        size = max(1, round(width * scale)), max(1, round(height * scale))
         # Area averaging is slow for fractional factors, and useful only for strong reduction.
-        how = cv2.INTER_AREA if small < 0.6 else cv2.INTER_LINEAR
-        image = np.asarray(cv2.resize(image, size, interpolation=how), dtype=np.uint8)
+        interpolation = cv2.INTER_AREA if scale < 0.6 else cv2.INTER_LINEAR
+        image = np.asarray(cv2.resize(image, size, interpolation=interpolation), dtype=np.uint8)
     lab = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), dtype=np.uint8)
     grey = np.ascontiguousarray(lab[..., 0])
     return Scene(time, [lab], grey, (width, height))
