@@ -42,6 +42,22 @@ def moved_to(page: Browser, seconds: float) -> None:
     )
 
 
+def test_the_video_covers_nothing_until_a_moment_is_asked_for(page: Browser) -> None:
+    page.open(page.value("location.href"))
+    video = "document.querySelector('#cursor video')"
+    page.until(f"{video}?.readyState >= 1")
+    height = f"{video}.getBoundingClientRect().height"
+    fold = "document.querySelector('#cursor [data-fold]')"
+    assert page.value(height) == 0
+    assert page.value(f"{fold}.getAttribute('aria-expanded')") == "false"
+    moved_to(page, 2.0)
+    assert page.value(height) > 50
+    assert page.value(f"{fold}.getAttribute('aria-expanded')") == "true"
+    page.value(f"{fold}.click()")
+    moved_to(page, 3.0)
+    assert page.value(height) == 0, "what the user has folded stays so"
+
+
 def test_the_slider_moves_video_figures_and_text(page: Browser) -> None:
     video = "document.querySelector('#cursor video')"
     page.until(f"{video}.readyState >= 1")  # else it cannot be moved yet

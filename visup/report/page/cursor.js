@@ -49,12 +49,34 @@
     if (usable()) video.currentTime = (now / duration) * video.duration;
   };
   const go = (time) => {
+    unfold();
     now = Math.min(Math.max(time, 0), duration);
     seek();
     show();
   };
   // A move that came before the length of the video was known is made good.
   if (video) video.addEventListener("durationchange", seek);
+
+  // The video is folded until a moment is asked for, since it covers a corner of the page; on a small
+  // screen, where it would cover what one reads, until it is asked for itself.
+  const fold = box.querySelector("[data-fold]");
+  let waits = !matchMedia("(max-width: 34rem)").matches;
+  const folded = (yes) => {
+    box.classList.toggle("folded", yes);
+    fold.textContent = yes ? "+" : "–";
+    fold.setAttribute("aria-expanded", String(!yes));
+  };
+  const unfold = () => {
+    if (fold && waits) folded(false);
+    waits = false;
+  };
+  if (fold) {
+    folded(true);
+    fold.addEventListener("click", () => {
+      waits = false;
+      folded(!box.classList.contains("folded"));
+    });
+  }
 
   const rest = () => {
     clearInterval(clock);
@@ -68,6 +90,7 @@
     if (usable() ? video.ended : now >= duration) rest();
   };
   play.addEventListener("click", () => {
+    unfold();
     if (clock) {
       if (video) video.pause();
       return rest();
@@ -92,17 +115,6 @@
       },
       true,
     );
-  }
-  const fold = box.querySelector("[data-fold]");
-  if (fold) {
-    const folded = (yes) => {
-      box.classList.toggle("folded", yes);
-      fold.textContent = yes ? "+" : "–";
-      fold.setAttribute("aria-expanded", String(!yes));
-    };
-    fold.addEventListener("click", () => folded(!box.classList.contains("folded")));
-    // On a small screen it would cover what one reads.
-    folded(matchMedia("(max-width: 34rem)").matches);
   }
   addEventListener("resize", () => setTimeout(show, 250));
   if (video) {

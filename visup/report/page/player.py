@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from visup.report.records import RunData
 
-_FOLD = "<button type=button data-fold aria-label='Show or hide the video' aria-expanded=true>–</button>"
+_FOLD = "<button type=button data-fold aria-label='Show or hide the video' aria-expanded=false>+</button>"
 
 
 def player(run: RunData) -> str:
