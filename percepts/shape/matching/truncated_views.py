@@ -18,6 +18,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.matching._truncated_views_jit import (
+    Samples,
+    places_of_samples,
+    weighted_remainders,
+)
 from visup.percepts.shape.matching.shape_similarity import Shape
 from visup.percepts.shape.silhouette.area_overlap import paint_outline
 from visup.percepts.shape.silhouette.silhouette import polygon_moments, resample_closed
@@ -79,34 +84,20 @@ class _PaintedShape:
             (B, S, R * A) float64, the weighted map of each, the line on the right; and the lines' offsets
             (B, S).
         """
-        bearings, shares = _bearings(), np.array(SHARES)
-        normals = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        normals, directions = _directions()
+        shares = np.array(SHARES)
         heights = self.points @ normals.T
         order = np.argsort(heights, axis=0)
         left = np.clip(((1 - shares) * len(order)).astype(int), 1, len(order)) - 1
-        offsets = np.take_along_axis(heights, order, axis=0)[left].T
+        offsets = np.take_along_axis(heights, order, axis=0)[left].T.copy()
         sums = np.cumsum(self.points[order], axis=0)[left].swapaxes(0, 1)
         centres = sums / (left + 1.0)[None, :, None]
         units = np.asarray(np.sqrt((left + 1.0) / len(order)), dtype=np.float64)
-        return self._sampled(bearings, normals, offsets, centres, units), offsets
-
-    def _sampled(
-        self,
-        bearings: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        offsets: NDArray[np.float64],
-        centres: NDArray[np.float64],
-        units: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
-        around = bearings[:, None, None] + np.arange(_ANGLES) * (2 * np.pi / _ANGLES)
-        reach = (units[:, None] * _RADII)[None, :, :, None]
-        x = centres[..., 0, None, None] + reach * np.cos(around)[:, None]
-        y = centres[..., 1, None, None] + reach * np.sin(around)[:, None]
-        beyond = x * normals[:, None, None, None, 0] + y * normals[:, None, None, None, 1]
-        inside = np.clip((offsets[..., None, None] - beyond) / _BLUR + 0.5, 0.0, 1.0)
-        tone = _interpolated(self.tone, x, y)
-        weighted = tone * inside * _WEIGHTS[:, None]
-        return np.asarray(weighted.reshape(*offsets.shape, -1), dtype=np.float64)
+        samples = Samples(centres, units, _RADII, directions)
+        at = places_of_samples(samples, _HALF, _PIXELS)
+        tone = np.asarray(cv2.remap(self.tone, at[0], at[1], cv2.INTER_LINEAR), np.float32)
+        maps = weighted_remainders(tone, samples, _WEIGHTS, normals, offsets, _BLUR)
+        return maps, offsets
 
 
 def query_map(contour: NDArray[np.floating], border: float) -> NDArray[np.float64]:
@@ -122,7 +113,9 @@ def query_map(contour: NDArray[np.floating], border: float) -> NDArray[np.float6
     tone = _blurred(contour)
     around = border + np.arange(_ANGLES) * (2 * np.pi / _ANGLES)
     x, y = _RADII[:, None] * np.cos(around), _RADII[:, None] * np.sin(around)
-    return np.asarray((_interpolated(tone, x, y) * _WEIGHTS[:, None]).ravel(), dtype=np.float64)
+    at_x, at_y = (((n + _HALF) * _PIXELS - 0.5).astype(np.float32) for n in (x, y))
+    found = cv2.remap(tone, at_x, at_y, cv2.INTER_LINEAR).astype(np.float64)
+    return np.asarray((found * _WEIGHTS[:, None]).ravel(), dtype=np.float64)
 
 
 def mirrored_map(whole: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -273,8 +266,13 @@ def cut_outline(contour: NDArray[np.floating], cut: CutLine) -> NDArray[np.float
     return resample_closed((clipped - centroid) / max(abs(area), 1e-9) ** 0.5)
 
 
-def _bearings() -> NDArray[np.float64]:
-    return np.asarray(np.arange(BEARINGS) * (2 * np.pi / BEARINGS), dtype=np.float64)
+@lru_cache(maxsize=1)
+def _directions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normals of the lines (B, 2), and cosines and sines of a ring's samples for each bearing (2, B, A)."""
+    bearings = np.arange(BEARINGS) * (2 * np.pi / BEARINGS)
+    around = bearings[:, None] + np.arange(_ANGLES) * (2 * np.pi / _ANGLES)
+    normals = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    return normals, np.stack([np.cos(around), np.sin(around)])
 
 
 @lru_cache(maxsize=1)
@@ -292,13 +290,3 @@ def _basis() -> NDArray[np.float64]:
 def _blurred(contour: NDArray[np.floating]) -> NDArray[np.float32]:
     tone = cv2.GaussianBlur(paint_outline(contour, _PIXELS, _HALF), (0, 0), _BLUR * _PIXELS)
     return np.asarray(tone, dtype=np.float32)
-
-
-def _interpolated(
-    tone: NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Tones at positions in units, of any shape."""
-    at_x = ((x + _HALF) * _PIXELS - 0.5).reshape(-1, _ANGLES).astype(np.float32)
-    at_y = ((y + _HALF) * _PIXELS - 0.5).reshape(-1, _ANGLES).astype(np.float32)
-    found = cv2.remap(tone, at_x, at_y, cv2.INTER_LINEAR)
-    return np.asarray(found, dtype=np.float64).reshape(x.shape)
