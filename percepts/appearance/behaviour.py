@@ -29,8 +29,8 @@ from visup.percepts.appearance.tracking.track import TaughtObjectTrack
 from visup.percepts.appearance.tracking.tracker import TaughtObjectTracker
 from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
 from visup.percepts.motion.outlines.region_outline import RegionOutline
-from visup.percepts.taught.light import relit
-from visup.percepts.taught.view import TaughtView
+from visup.percepts.taught.lighting import relit_views
+from visup.percepts.taught.taught_view import TaughtView
 
 SAME_OBJECT_IOU = 0.4  # IoU from which a newly detected object takes over the id of a moving region
 
@@ -93,7 +93,7 @@ class AppearanceBehaviour:
         if not image_is_sound(observation):
             return []
         if self._relit is None:
-            self._add_relit_views(tuple(relit(self._taught, frame.image)))
+            self._add_relit_views(tuple(relit_views(self._taught, frame.image)))
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
         bodies = [moving_body(r, scene) for r in moving] if self._tracker.seeks_new else []
@@ -119,7 +119,7 @@ class AppearanceBehaviour:
         ]
 
     def _add_relit_views(self, views: tuple[tuple[int, TaughtView], ...] | None) -> None:
-        """Add views whose colours are adapted to the lighting of the video, if that differs; see `relit`."""
+        """Add views whose colours are adapted to the video's lighting, if it differs; see `relit_views`."""
         self._relit = views
         if views:
             self._tracker = TaughtObjectTracker(

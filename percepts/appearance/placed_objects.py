@@ -10,8 +10,8 @@ from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.agent.model.errors import SettingsError
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.motion.behaviour import image_is_sound
-from visup.percepts.taught.pointed import outline_at
-from visup.percepts.taught.view import TaughtView, taught_view
+from visup.percepts.taught.point_segmentation import outline_at_point
+from visup.percepts.taught.taught_view import TaughtView, taught_view
 
 
 class PlacedObjectBehaviour:
@@ -62,7 +62,7 @@ class PlacedObjectBehaviour:
 
     def _views_at_places(self, frame: Frame) -> Iterable[TaughtView]:
         for name, at in sorted(self._places.items()):
-            outline = outline_at(frame.image, at)
+            outline = outline_at_point(frame.image, at)
             try:
                 if outline is not None:
                     yield taught_view(name, frame.image, outline)

@@ -1,7 +1,7 @@
 """Boxes from an external detector or tracker, in place of motion segmentation: a file, a network, or code.
 
 Read `boxes.py` (a box), `files.py` (MOT and COCO files), `yolo.py` and `network.py` (ONNX files of the YOLO
-family), `supervision.py` (conversion from and to that library), `numbering.py` (tracking by detection),
+family), `supervision.py` (conversion from and to that library), `box_tracker.py` (tracking by detection),
 `behaviour.py` (boxes as regions, their names as hypotheses) and `people.py` (OpenCV's bundled people
 detector).
 """

@@ -10,10 +10,10 @@ import numpy as np
 
 from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
 from visup.agent.model.errors import BehaviourError
+from visup.percepts.detections.box_tracker import MultiBoxTracker
 from visup.percepts.detections.boxes import Detection
 from visup.percepts.detections.files import Frames
 from visup.percepts.detections.network import YoloNetwork
-from visup.percepts.detections.numbering import BoxNumbering
 
 PAST_S = 0.4
 """Time over which velocities are measured, seconds."""
@@ -43,7 +43,7 @@ class DetectorBehaviour:
 
     def __init__(self, find: Callable[[Frame], Iterable[Detection]] | None = None) -> None:
         self._find = find
-        self._numbering = BoxNumbering()
+        self._tracker = MultiBoxTracker()
         self._past: dict[int, list[tuple[float, float, float]]] = {}
 
     def find(self, frame: Frame) -> Iterable[Detection]:
@@ -58,19 +58,19 @@ class DetectorBehaviour:
     def save(self) -> Mapping[str, Any]:
         """The recent positions of objects."""
         past = {track: list(map(list, rows)) for track, rows in self._past.items()}
-        return {"past": past, "numbering": self._numbering.save()}
+        return {"past": past, "numbering": self._tracker.save()}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a behaviour with the same detector."""
         self._past = {int(k): [tuple(r) for r in rows] for k, rows in state["past"].items()}
-        self._numbering.load(state["numbering"])
+        self._tracker.load(state["numbering"])
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One region for each box visible in the picture, and a hypothesis for its name."""
+        """One region for each box visible in the image, and a hypothesis for its name."""
         source = self.contract.name
-        for detection in self._numbering.number(frame.index, tuple(self.find(frame))):
+        for detection in self._tracker.number(frame.index, tuple(self.find(frame))):
             region = self._region(detection, frame)
             if region is None:
                 continue

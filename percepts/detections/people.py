@@ -1,6 +1,6 @@
 """Standing and walking people, by the detector included in OpenCV, without a download.
 
-Histograms of oriented gradients with the linear SVM trained on the pictures of Dalal and Triggs, "Histograms
+Histograms of oriented gradients with the linear SVM trained on the images of Dalal and Triggs, "Histograms
 of Oriented Gradients for Human Detection" (2005). It detects whole people, upright and roughly from the side;
 not hands, nor people who sit or are half hidden.
 """
@@ -24,7 +24,7 @@ WINDOW = (64, 128)
 PERSON_PX = 96.0
 
 LARGEST_PX = 1600
-"""Most width and height of an enlarged picture, which bounds the time per frame."""
+"""Most width and height of an enlarged image, which bounds the time per frame."""
 
 MARGIN = (0.15, 0.06)
 """Margin of a detected box around the person, shares of its width and height."""
@@ -60,10 +60,10 @@ class PeopleBehaviour(DetectorBehaviour):
     def find(self, frame: Frame) -> Iterable[Detection]:
         """The people of a frame, from left to right."""
         scale = min(PERSON_PX / self.settings.least_px, LARGEST_PX / max(frame.size))
-        picture = cv2.resize(frame.image, None, fx=scale, fy=scale)
-        if picture.shape[1] < WINDOW[0] or picture.shape[0] < WINDOW[1]:
+        image = cv2.resize(frame.image, None, fx=scale, fy=scale)
+        if image.shape[1] < WINDOW[0] or image.shape[0] < WINDOW[1]:
             return
-        boxes, weights = self._detector.detectMultiScale(picture, winStride=(8, 8), scale=1.05)
+        boxes, weights = self._detector.detectMultiScale(image, winStride=(8, 8), scale=1.05)
         found = zip(map(tuple, np.reshape(boxes, (-1, 4)).tolist()), np.ravel(weights), strict=True)
         for box, weight in sorted(found):
             if weight >= self.settings.least:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from visup.percepts.detections.boxes import Detection
 
 GREY = 114
-"""Padding around the picture: the grey that these networks were trained with."""
+"""Padding around the image: the grey that these networks were trained with."""
 
 LEAST_SCORE, MOST_OVERLAP = 0.25, 0.45
 """Least score of a box, and most overlap of two boxes of a class (non-maximum suppression)."""
@@ -30,10 +30,10 @@ class Layout(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Letterbox:
-    """The fit of a picture into the input of a network.
+    """The fit of an image into the input of a network.
 
     Attributes:
-        scale: Pixels of the network per pixel of the picture.
+        scale: Pixels of the network per pixel of the image.
         left: Padding at the left, pixels.
         top: Padding at the top, pixels.
     """
@@ -43,7 +43,7 @@ class Letterbox:
     top: int
 
     def back(self, boxes: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Corners (N, 4) x1, y1, x2, y2 in pixels of the picture."""
+        """Corners (N, 4) x1, y1, x2, y2 in pixels of the image."""
         moved = boxes - np.array([self.left, self.top] * 2, np.float32)
         return (moved / self.scale).astype(np.float32)
 
@@ -51,7 +51,7 @@ class Letterbox:
 def letterbox(
     image: NDArray[np.uint8], size: tuple[int, int]
 ) -> tuple[NDArray[np.float32], Letterbox]:
-    """A picture as network input: scaled to fit, padded with grey, RGB, 0 to 1.
+    """An image as network input: scaled to fit, padded with grey, RGB, 0 to 1.
 
     Args:
         image: (H, W, 3) uint8 BGR.
@@ -80,7 +80,7 @@ def decode_yolo(
     least_score: float = LEAST_SCORE,
     most_overlap: float = MOST_OVERLAP,
 ) -> tuple[Detection, ...]:
-    """Decode the boxes of one picture from a network's output.
+    """Decode the boxes of one image from a network's output.
 
     Known layouts, with C classes and N candidates:
 
@@ -94,12 +94,12 @@ def decode_yolo(
     Args:
         output: The array, with or without the leading 1.
         names: Class names, where known.
-        fitted: The fit of the picture, from `letterbox`.
+        fitted: The fit of the image, from `letterbox`.
         least_score: Boxes below are dropped.
         most_overlap: Of two boxes of one class that overlap more, the lower-scored is dropped.
 
     Returns:
-        The boxes without numbers, picture pixels, highest score first.
+        The boxes without numbers, image pixels, highest score first.
 
     Raises:
         ValueError: The array's shape fits no known layout.

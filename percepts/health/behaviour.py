@@ -29,9 +29,9 @@ from visup.percepts.health.settings import HealthSettings
 from visup.percepts.health.standstill import StandstillDetector
 
 OK = Health(HealthStatus.OK)
-USUAL = 25  # number of sound images that define what is usual
-FEWEST = 4
-SUSPECTED = 0.5
+REFERENCE_IMAGES = 25  # number of sound images that define what is usual
+FEWEST_REFERENCES = 4
+SUSPECTED_CONFIDENCE = 0.5
 
 
 class HealthBehaviour:
@@ -45,7 +45,7 @@ class HealthBehaviour:
 
     def __init__(self, settings: HealthSettings | None = None) -> None:
         self._settings = settings or HealthSettings()
-        self._usual: deque[ImageQuality] = deque(maxlen=USUAL)
+        self._usual: deque[ImageQuality] = deque(maxlen=REFERENCE_IMAGES)
         self._standstill = StandstillDetector(self._settings.covered)
         self._arrivals = ArrivalMonitor(
             self._settings.lost, self._settings.gap, self._settings.same_s
@@ -54,7 +54,7 @@ class HealthBehaviour:
         self._noise_only = NoiseOnlyDetector()
         self._same_since: float | None = None
         self._fault_since: float | None = None
-        self._harmed = False
+        self._faulty = False
 
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
@@ -74,28 +74,28 @@ class HealthBehaviour:
         """
         health = self._assess(frame)
         suspected = health is OK and self._fault_since is not None
-        confidence = SUSPECTED if suspected else 1.0
+        confidence = SUSPECTED_CONFIDENCE if suspected else 1.0
         return [Percept("health", health, frame.time, self.contract.name, confidence)]
 
     def _assess(self, frame: Frame) -> Health:
-        picture = measure_quality(frame.image)
-        repeat = self._repeats.compare(frame.image, picture.small)
+        quality = measure_quality(frame.image)
+        repeat = self._repeats.compare(frame.image, quality.small)
         # A dark image repeats itself too, without missing frames.
-        usable = None if self._harmed else repeat
+        usable = None if self._faulty else repeat
         missing = self._arrivals.arrive(frame.index, frame.time, usable)
         frozen = self._frozen(frame.time, repeat.same)
-        health = _of_picture(picture, self._usual, self._settings)
-        self._harmed = health is not OK
+        health = _image_health(quality, self._usual, self._settings)
+        self._faulty = health is not OK
         noise_alone = False
-        if not self._harmed:
-            health = self._of_cells(picture, frame.time)
-            noise_alone = self._noise_only.update(picture, frame.time)
+        if not self._faulty:
+            health = self._cell_health(quality, frame.time)
+            noise_alone = self._noise_only.update(quality, frame.time)
             if self._standstill.standstill is None:
-                self._usual.append(picture)
+                self._usual.append(quality)
         else:
-            self._standstill.forget()
-            self._noise_only.forget()
-        health = self._lasting(health, frame.time)
+            self._standstill.reset()
+            self._noise_only.reset()
+        health = self._if_lasting(health, frame.time)
         if health is OK and noise_alone:
             return Health(HealthStatus.FROZEN, "Nothing changes any more but noise.")
         if health is OK and frozen:
@@ -104,15 +104,15 @@ class HealthBehaviour:
             return Health(HealthStatus.DROPPED, f"About {missing} frames are missing.")
         return health
 
-    def _of_cells(self, picture: ImageQuality, now: float) -> Health:
-        halt = self._standstill.update(picture.small, picture.factor, now)
+    def _cell_health(self, quality: ImageQuality, now: float) -> Health:
+        halt = self._standstill.update(quality.small, quality.factor, now)
         if halt is None:
             return OK
         if halt.whole:
             return Health(HealthStatus.FROZEN, "All that moved stands still since one moment.")
         return Health(HealthStatus.BLOCKED, "A large part of the view is covered.")
 
-    def _lasting(self, health: Health, now: float) -> Health:
+    def _if_lasting(self, health: Health, now: float) -> Health:
         """Report only faults that last, but recovery at once."""
         if health is OK:
             self._fault_since = None
@@ -129,26 +129,26 @@ class HealthBehaviour:
         return now - self._same_since >= self._settings.same_s
 
 
-def _of_picture(
-    picture: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings
+def _image_health(
+    quality: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings
 ) -> Health:
     """The health of one image, compared with what is usual."""
-    known = len(usual) >= FEWEST
-    if _dark(picture, usual, settings, known):
+    known = len(usual) >= FEWEST_REFERENCES
+    if _dark(quality, usual, settings, known):
         return Health(HealthStatus.DARK, "The image is dark.")
-    if _saturated(picture, usual, settings, known):
+    if _saturated(quality, usual, settings, known):
         return Health(HealthStatus.SATURATED, "The image is saturated.")
-    if known and picture.spread < settings.flat and _most(usual, "spread") > 4 * settings.flat:
+    if known and quality.spread < settings.flat and _largest(usual, "spread") > 4 * settings.flat:
         return Health(HealthStatus.BLOCKED, "The whole view is covered.")
     # Noise has no straight steps, but small blocks have as many impulses as noise.
-    if _broken(picture, usual, settings, known):
+    if _broken(quality, usual, settings, known):
         return Health(HealthStatus.SCRAMBLED, "The image is broken into blocks.")
-    if _noisy(picture, usual, settings, known):
+    if _noisy(quality, usual, settings, known):
         return Health(HealthStatus.NOISY, "The image is noisy.")
     return OK
 
 
-def _most(usual: Sequence[ImageQuality], name: str) -> float:
+def _largest(usual: Sequence[ImageQuality], name: str) -> float:
     return max((float(getattr(p, name)) for p in usual), default=0.0)
 
 
@@ -166,7 +166,7 @@ def _saturated(
 ) -> bool:
     if p.low > settings.bright:
         return True
-    sudden = known and p.low > 30 + _most(usual, "low")
+    sudden = known and p.low > 30 + _largest(usual, "low")
     return sudden and p.low > settings.bright - 30 and p.spread < 2 * settings.flat
 
 
@@ -177,8 +177,8 @@ def _noisy(
         return True
     if not known:
         return False
-    grain = p.noise > max(settings.rather_noisy, 3.0 * _most(usual, "noise"))
-    specks = p.impulses > max(settings.rather_impulses, 3.0 * _most(usual, "impulses"))
+    grain = p.noise > max(settings.rather_noisy, 3.0 * _largest(usual, "noise"))
+    specks = p.impulses > max(settings.rather_impulses, 3.0 * _largest(usual, "impulses"))
     return grain or specks
 
 
@@ -187,4 +187,4 @@ def _broken(
 ) -> bool:
     if p.steps > settings.broken:
         return True
-    return known and p.steps > settings.rather_broken + 1.7 * _most(usual, "steps")
+    return known and p.steps > settings.rather_broken + 1.7 * _largest(usual, "steps")

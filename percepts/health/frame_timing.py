@@ -10,8 +10,8 @@ import numpy as np
 from visup.percepts.health.repeated_frames import Repeat
 
 WINDOW_S = 1.0
-MOST = 128
-ENOUGH = 6  # fewest intervals to estimate the usual one
+MOST_FRAMES = 128
+FEWEST_INTERVALS = 6  # fewest intervals to estimate the usual one
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +47,10 @@ class ArrivalMonitor:
 
     def __init__(self, lost: float, gap: int, frozen_s: float) -> None:
         self._lost, self._gap, self._frozen_s = lost, gap, frozen_s
-        self._recent: deque[Arrival] = deque(maxlen=MOST)
-        self._steps: deque[int] = deque(maxlen=MOST)
-        self._waits: deque[float] = deque(maxlen=MOST)
-        self._repeats: deque[bool] = deque(maxlen=MOST)
+        self._recent: deque[Arrival] = deque(maxlen=MOST_FRAMES)
+        self._steps: deque[int] = deque(maxlen=MOST_FRAMES)
+        self._waits: deque[float] = deque(maxlen=MOST_FRAMES)
+        self._repeats: deque[bool] = deque(maxlen=MOST_FRAMES)
         self._run = 0
         self._run_s = 0.0
         self._last: tuple[int, float] | None = None
@@ -83,7 +83,7 @@ class ArrivalMonitor:
             self._repeats.extend(past)
             self._steps.append(new.step)
             self._waits.append(new.wait)
-        if len(self._repeats) < ENOUGH:
+        if len(self._repeats) < FEWEST_INTERVALS:
             # Until the window has filled, the first frames alone define the usual rate.
             self._repeats.append(new.repeated)
         return missing
@@ -98,21 +98,21 @@ class ArrivalMonitor:
         return run if repeat.resumes and lasted < self._frozen_s else 0
 
     def _missing(self) -> int:
-        if len(self._waits) < ENOUGH:
+        if len(self._waits) < FEWEST_INTERVALS:
             return 0
         step = max(1.0, float(np.median(self._steps)))
         wait = float(np.quantile(self._waits, 0.75))
         # Many cameras repeat frames all the time, in low light or to fill a rate.
-        habit = float(np.mean(self._repeats)) > 0.04
+        repeats_usually = float(np.mean(self._repeats)) > 0.04
         gaps = [max(a.step / step, a.wait / wait) - 1.0 for a in self._recent]
         total = sum(g for g in gaps if g > 0.6) - self._early(wait, step)
-        stale = 0 if habit else self._recent_stale()
-        due = WINDOW_S / wait
+        stale = 0 if repeats_usually else self._recent_stale()
+        expected = WINDOW_S / wait
         if max(gaps, default=0.0) > self._gap - 0.4:
             return round(total)
         # Frame numbers are reliable; an image may repeat another for a frame or two by chance.
-        sure = total >= max(3.0, self._lost * due)
-        too_many = sure or total + stale >= max(3.0, 2.0 * self._lost * due)
+        sure = total >= max(3.0, self._lost * expected)
+        too_many = sure or total + stale >= max(3.0, 2.0 * self._lost * expected)
         return round(total + stale) if too_many else 0
 
     def _early(self, wait: float, step: float) -> float:

@@ -63,7 +63,7 @@ def measure_quality(image: NDArray[np.uint8]) -> ImageQuality:
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)) if colour else image
     grey = grey.reshape(image.shape[:2]).astype(np.uint8, copy=False)
     factor = max(1, -(-max(grey.shape) // SMALL))
-    small = shrunk(grey, factor)
+    small = box_average(grey, factor)
     low, high, darkest, brightest = _levels(small, (0.03, 0.999, 0.005, 0.995))
     # Grey averages the noise of three channels; a single channel shows it in full.
     strips = _strips(image[..., 1] if colour else grey)
@@ -89,7 +89,7 @@ def _levels(small: Floats, shares: Sequence[float]) -> list[float]:
     return [float(levels[index]) for index in at]
 
 
-def shrunk(grey: Grey, factor: int) -> Floats:
+def box_average(grey: Grey, factor: int) -> Floats:
     """Means of squares of pixels; incomplete squares at the border are dropped."""
     rows, columns = (max(1, n // factor) for n in grey.shape)
     # Means are not rounded: slow change is less than a grey level.

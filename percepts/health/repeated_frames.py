@@ -19,20 +19,20 @@ from numpy.typing import NDArray
 from visup.percepts.health.quantiles import quantiles
 from visup.percepts.health.standstill import Floats, per_cell
 
-MOST = 25
+MOST_FRAMES = 25
 ENOUGH = 6
-LIVELY = 1.5  # peak change from which near repeats can be detected, grey levels
-NEARLY = 0.1  # all cells of a near repeat change by less than this share of the usual
-CODED = 1.0  # most change of a cell by recoding the same image, grey levels
+DETECTABLE_PEAK = 1.5  # peak change from which near repeats can be detected, grey levels
+NEAR_REPEAT_SHARE = 0.1  # all cells of a near repeat change by less than this share of the usual
+RECODING_CHANGE = 1.0  # most change of a cell by recoding the same image, grey levels
 FLOOR = 0.3  # change that is not motion, beyond that of the whole image, grey levels
 FLOOR_MOST = 1.2  # bound of the latter: the whole image changes by more only when the camera moves
 # A mover that rested starts at less than 0.8 of its usual pace in 19 of 20 pauses of real and rendered clips;
 # after lost frames it exceeds that in three of four, since the lost step is made up for.
-RESUMED = 0.8
+RESUMED_STEPS = 0.8
 GAIN = 0.4  # share of the usual change per lost frame; below 1, since change saturates
 GAIN_MOST = 2.0
-CALM = 0.1  # share of the cells counted as the calmest
-RESTLESS = 0.01  # change of these from which there is always noise, grey levels
+CALMEST_SHARE = 0.1  # share of the cells counted as the calmest
+NOISY_CHANGE = 0.01  # change of these from which there is always noise, grey levels
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +59,12 @@ class RepeatDetector:
     def __init__(self) -> None:
         self._image: NDArray[np.uint8] | None = None
         self._small: Floats | None = None
-        self._held: Floats | None = None  # the repeated image
+        self._repeated: Floats | None = None  # the repeated image
         self._run = 0
         self._exact = True
-        self._peaks: deque[float] = deque(maxlen=MOST)
-        self._motions: deque[float] = deque(maxlen=MOST)
-        self._calmest: deque[float] = deque(maxlen=MOST)
+        self._peaks: deque[float] = deque(maxlen=MOST_FRAMES)
+        self._motions: deque[float] = deque(maxlen=MOST_FRAMES)
+        self._calmest: deque[float] = deque(maxlen=MOST_FRAMES)
         self.was_lively = False
 
     def compare(self, image: NDArray[np.uint8], small: Floats) -> Repeat:
@@ -80,18 +80,18 @@ class RepeatDetector:
         before, self._image = self._image, image
         smaller, self._small = self._small, small
         if before is None or smaller is None or before.shape != image.shape:
-            self._run, self._held = 0, None
+            self._run, self._repeated = 0, None
             return Repeat()
         change = per_cell(cv2.absdiff(small, smaller))
         same = not change.any() and bool(np.array_equal(before, image))
         self.was_lively = self.was_lively or not same
         if same or self._is_coded_repeat(change):
-            self._held = smaller if self._held is None else self._held
+            self._repeated = smaller if self._repeated is None else self._repeated
             self._run, self._exact = self._run + 1, self._exact and same
             return Repeat(same and self.was_lively, self.was_lively)
-        new = self._resumed(small)
-        self._run, self._held, self._exact = 0, None, True
-        calmest, peak = quantiles(change, CALM, 0.95)
+        new = self._resumption(small)
+        self._run, self._repeated, self._exact = 0, None, True
+        calmest, peak = quantiles(change, CALMEST_SHARE, 0.95)
         self._calmest.append(calmest)
         self._peaks.append(peak)
         self._motions.append(_motion(change))
@@ -101,21 +101,23 @@ class RepeatDetector:
         if len(self._peaks) < ENOUGH:
             return False
         usual = median(self._peaks)
-        return usual > LIVELY and float(change.max()) < min(CODED, NEARLY * usual)
+        return usual > DETECTABLE_PEAK and float(change.max()) < min(
+            RECODING_CHANGE, NEAR_REPEAT_SHARE * usual
+        )
 
-    def _resumed(self, small: Floats) -> Repeat:
+    def _resumption(self, small: Floats) -> Repeat:
         """Compare a new image with the one repeated before it."""
-        if self._held is None or len(self._motions) < ENOUGH:
+        if self._repeated is None or len(self._motions) < ENOUGH:
             return Repeat()
         usual = median(self._motions)
-        if self._exact and min(self._calmest) > RESTLESS:
+        if self._exact and min(self._calmest) > NOISY_CHANGE:
             return Repeat(resumes=True, catches_up=True)
         if usual <= 0.0:
             return Repeat()
-        steps = _motion(per_cell(cv2.absdiff(small, self._held))) / usual
+        steps = _motion(per_cell(cv2.absdiff(small, self._repeated))) / usual
         catches_up = steps > min(1.0 + GAIN * self._run, GAIN_MOST)
         return Repeat(
-            resumes=catches_up or (self._exact and steps > RESUMED), catches_up=catches_up
+            resumes=catches_up or (self._exact and steps > RESUMED_STEPS), catches_up=catches_up
         )
 
 

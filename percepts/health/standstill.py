@@ -23,10 +23,10 @@ CELL = 10  # pixels of the small image along a cell
 LAG_S = 0.2  # time over which slow motion shows, seconds
 AFTER_S = 0.42  # how long the new state must have lasted, seconds
 HISTORY_S = 1.0
-MOST = 48  # most frames in the history, whatever the rate
+MOST_FRAMES = 48  # most frames in the history, whatever the rate
 FEWEST = 3  # fewest frames before the change
-SETTLED = 1.0  # most total difference of a still part beyond noise, grey levels
-JUMP = 1.0  # least jump, grey levels; codec keyframes change a dark scene by less
+STILL_CHANGE = 1.0  # most total difference of a still part beyond noise, grey levels
+LEAST_JUMP = 1.0  # least jump, grey levels; codec keyframes change a dark scene by less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +70,12 @@ class StandstillDetector:
 
     def __init__(self, covered: float) -> None:
         self._covered = covered
-        self._looks: deque[CellChange] = deque(maxlen=MOST)
+        self._changes: deque[CellChange] = deque(maxlen=MOST_FRAMES)
         self.standstill: Standstill | None = None
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Reset the history."""
-        self._looks.clear()
+        self._changes.clear()
         self.standstill = None
 
     def update(self, small: Floats, factor: int, time: float) -> Standstill | None:
@@ -89,24 +89,24 @@ class StandstillDetector:
         Returns:
             The cause of a standstill, or None.
         """
-        if self._looks and self._looks[-1].small.shape != small.shape:
-            self.forget()
+        if self._changes and self._changes[-1].small.shape != small.shape:
+            self.reset()
         still = 0.25 + 2.0 / factor  # sensor noise of 2 grey levels, averaged
         if self.standstill is not None:
             if _persists(self.standstill, small, still):
                 return self.standstill
-            self.forget()
+            self.reset()
         self._push(small, time)
-        self.standstill = self._halted(still)
+        self.standstill = self._detect(still)
         return self.standstill
 
     def _push(self, small: Floats, time: float) -> None:
-        looks = self._looks
-        while looks and time - looks[0].time > HISTORY_S and len(looks) > 3 * FEWEST:
-            looks.popleft()
-        last = looks[-1].small if looks else small
-        lag = next((k.small for k in reversed(looks) if time - k.time >= LAG_S - 1e-6), last)
-        looks.append(
+        changes = self._changes
+        while changes and time - changes[0].time > HISTORY_S and len(changes) > 3 * FEWEST:
+            changes.popleft()
+        last = changes[-1].small if changes else small
+        lag = next((k.small for k in reversed(changes) if time - k.time >= LAG_S - 1e-6), last)
+        changes.append(
             CellChange(
                 time,
                 small,
@@ -116,37 +116,37 @@ class StandstillDetector:
             )
         )
 
-    def _halted(self, still: float) -> Standstill | None:
-        now = self._looks[-1]
-        after = [k for k in self._looks if now.time - k.time < AFTER_S]
+    def _detect(self, still: float) -> Standstill | None:
+        now = self._changes[-1]
+        after = [k for k in self._changes if now.time - k.time < AFTER_S]
         # A slow camera gives few frames in that time, but three are needed.
-        after = after if len(after) >= 4 else list(self._looks)[-4:]
-        before = list(self._looks)[1 : len(self._looks) - len(after)]
+        after = after if len(after) >= 4 else list(self._changes)[-4:]
+        before = list(self._changes)[1 : len(self._changes) - len(after)]
         if len(before) < FEWEST:
             return None
         calm = np.median([k.change for k in after[1:]], axis=0)
         # A passing object leaves calm cells that changed; stopped or covered ones look the same since.
-        passed = per_cell(cv2.absdiff(now.small, after[1].small)) >= still + SETTLED
+        passed = per_cell(cv2.absdiff(now.small, after[1].small)) >= still + STILL_CHANGE
         least = np.min([k.slow for k in before], axis=0)
         most = np.max([k.change for k in before], axis=0)
         texture = np.min([k.texture for k in before], axis=0)
-        stands = (calm < still) & ~passed
+        still_cells = (calm < still) & ~passed
         noise = min(still, quantiles(least, 0.1)[0])
-        lively = least > 0.4 + 2.0 * noise
-        stopped = lively & stands & (now.slow < 0.25 * least)
+        was_moving = least > 0.4 + 2.0 * noise
+        stopped = was_moving & still_cells & (now.slow < 0.25 * least)
         then = before[-1].small
         # Light and codecs change bright parts more than dark ones.
-        calls_for = JUMP + 0.1 * per_cell(then) + 3.0 * most
-        jump = per_cell(cv2.absdiff(now.small, then)) > calls_for
-        bare = (texture > 3.0) & (now.texture < 0.3 * texture)
+        least_jump = LEAST_JUMP + 0.1 * per_cell(then) + 3.0 * most
+        jump = per_cell(cv2.absdiff(now.small, then)) > least_jump
+        lost_texture = (texture > 3.0) & (now.texture < 0.3 * texture)
         moving = now.slow > np.maximum(still, 0.25 * least)
-        if not moving.any() and _all_stopped(lively, stopped):
-            return Standstill(True, lively, now.small, after[0].time)
-        taken = stands & (stopped | jump | bare)
-        goes_on = float(np.mean(lively & ~stopped)) > 0.05
-        if not goes_on:
-            taken &= jump | bare
-        part = _largest(taken)
+        if not moving.any() and _all_motion_stopped(was_moving, stopped):
+            return Standstill(True, was_moving, now.small, after[0].time)
+        affected = still_cells & (stopped | jump | lost_texture)
+        motion_continues = float(np.mean(was_moving & ~stopped)) > 0.05
+        if not motion_continues:
+            affected &= jump | lost_texture
+        part = _largest(affected)
         share = float(part.mean())
         if share < self._covered or share > 0.92 or _same_scene(part, then, now.small):
             return None
@@ -166,20 +166,20 @@ def _texture(small: Floats) -> Floats:
 
 
 def _persists(halt: Standstill, small: Floats, still: float) -> bool:
-    """Whether the still part looks the same as it did then."""
+    """Whether the still part changes the same as it did then."""
     if halt.small.shape != small.shape:
         return False
     apart = per_cell(cv2.absdiff(small, halt.small))[halt.cells]
-    return float(np.mean(apart < still + SETTLED)) > (0.9 if halt.whole else 0.6)
+    return float(np.mean(apart < still + STILL_CHANGE)) > (0.9 if halt.whole else 0.6)
 
 
-def _all_stopped(lively: Mask, stopped: Mask) -> bool:
+def _all_motion_stopped(was_moving: Mask, stopped: Mask) -> bool:
     """Whether all motion stopped at once: of more than one object, or in a large part of the view."""
-    moved = int(lively.sum())
+    moved = int(was_moving.sum())
     if moved == 0 or stopped.sum() < 0.97 * moved:
         return False
-    groups = cv2.connectedComponents(lively.astype(np.uint8), connectivity=8)[0] - 1
-    return float(lively.mean()) > (0.04 if groups > 1 else 0.3)
+    groups = cv2.connectedComponents(was_moving.astype(np.uint8), connectivity=8)[0] - 1
+    return float(was_moving.mean()) > (0.04 if groups > 1 else 0.3)
 
 
 def _largest(cells: Mask) -> Mask:

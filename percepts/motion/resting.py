@@ -1,6 +1,6 @@
-"""Motion segmentation that pauses while nothing in the picture changes, as in most cameras most of the time.
+"""Motion segmentation that pauses while nothing in the image changes, as in most cameras most of the time.
 
-A change detector on cell means, at a hundredth of the cost, decides whether the picture differs from that of
+A change detector on cell means, at a hundredth of the cost, decides whether the image differs from that of
 the last full step. While it does not and nothing moved, no regions are reported.
 """
 
@@ -70,7 +70,7 @@ class RestingMotion(MotionBehaviour):
 
 
 def means_of_cells(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A small picture: means over cells of `CELL` x `CELL` pixels.
+    """A small image: means over cells of `CELL` x `CELL` pixels.
 
     Args:
         image: (H, W, 3) uint8.

@@ -9,7 +9,7 @@ Read in this order:
 - `database/`: the file, its views, and the search for views matching a silhouette.
 - `refinement/`: orientations refined with the mesh of the model.
 - `building/`: views rendered from meshes, exemplars of silhouettes, and the database of both.
-- `drawing/`: contact sheets, and pictures that explain a match.
+- `drawing/`: contact sheets, and images that explain a match.
 
 `behaviour.py` adapts this to the agent.
 """

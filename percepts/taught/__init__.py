@@ -1,5 +1,5 @@
-"""Objects taught by a user: outlines drawn in one picture, in their stored form.
+"""Objects taught by a user: outlines drawn in one image, in their stored form.
 
-Read `view.py`; `drawing.py` draws views. The model database stores these views beside those of
+Read `taught_view.py`; `drawing_views.py` draws views. The model database stores these views beside those of
 meshes and silhouettes.
 """

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
 from visup.agent.storage.text_file import read_bounded, read_text_file
-from visup.percepts.picture_size import check_picture_size
+from visup.percepts.image_size import check_image_size
 from visup.percepts.video.quiet_decoder import quiet
 from visup.percepts.video.source import DEFAULT_FPS, Ending, VideoSource, to_bgr
 
@@ -129,7 +129,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
 
 
 def decode_image(data: bytes) -> NDArray[np.uint8]:
-    """The picture of an image file, from its bytes.
+    """The image of an image file, from its bytes.
 
     Returns:
         (H, W, 3) uint8 BGR.
@@ -144,7 +144,7 @@ def decode_image(data: bytes) -> NDArray[np.uint8]:
     if _ends_early(data):
         raise UnreadableImageError("is cut off")
     try:
-        check_picture_size(data)
+        check_image_size(data)
     except ValueError as e:
         raise UnreadableImageError(str(e)) from e
     # JPEG has no alpha, and only the colour flag applies the EXIF orientation.

@@ -1,4 +1,4 @@
-"""The pictures of a ROS 2 bag (`sensor_msgs/Image`, `CompressedImage`); needs `visup[ros]`.
+"""The images of a ROS 2 bag (`sensor_msgs/Image`, `CompressedImage`); needs `visup[ros]`.
 
 Messages are decoded as the two types known to visup. Type definitions inside a bag are ignored: they would be
 compiled to code, and a bag may come from strangers.
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import ExtraMissingError, SourceError
-from visup.percepts.picture_size import check_pixels
+from visup.percepts.image_size import check_pixels
 from visup.percepts.video.image_folder import UnreadableImageError, decode_image
 from visup.percepts.video.source import DEFAULT_FPS, Ending, VideoSource, to_bgr
 from visup.percepts.video.video_file import ContainerClock
@@ -65,12 +65,12 @@ def open_bag(
     Args:
         path: A path for which `is_bag` holds.
         topic: The topic to read; None for the only one.
-        every: Only every n-th picture is decoded.
-        fps: Pictures per second to assume in place of their stamps.
+        every: Only every n-th image is decoded.
+        fps: Images per second to assume in place of their stamps.
 
     Raises:
         ExtraMissingError: rosbags is not installed.
-        SourceError: It cannot be read, has no pictures, or several topics with pictures and none was named.
+        SourceError: It cannot be read, has no images, or several topics with images and none was named.
     """
     try:
         from rosbags.rosbag2 import Reader
@@ -82,8 +82,8 @@ def open_bag(
         reader = Reader(path)
         reader.open()
         chosen = _chosen(path, reader.topics, topic)
-        pictures = _Pictures(reader, chosen, get_typestore(Stores.LATEST))
-        return RosBag(f"{path}#{chosen}", pictures, every=every, fps=fps)
+        images = _ImageTopic(reader, chosen, get_typestore(Stores.LATEST))
+        return RosBag(f"{path}#{chosen}", images, every=every, fps=fps)
     except SourceError:
         _close(reader)
         raise
@@ -128,7 +128,7 @@ def _chosen(path: Path, topics: dict[str, Any], wanted: str | None) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Pictures:
+class _ImageTopic:
     """The messages of one topic.
 
     Attributes:
@@ -153,13 +153,13 @@ class _Pictures:
             yield stamp / 1e9, connection.msgtype, data
 
     def rate(self) -> float | None:
-        """Pictures per second, or None if unknown."""
+        """Images per second, or None if unknown."""
         times = [t for t, _, _ in islice(self.messages(), RATE_MESSAGES)]
         lasted = [b - a for a, b in pairwise(times) if b > a]
         return 1.0 / median(lasted) if lasted else None
 
     def image(self, kind: str, data: bytes) -> NDArray[np.uint8]:
-        """The picture of a message, (H, W, 3) uint8 BGR.
+        """The image of a message, (H, W, 3) uint8 BGR.
 
         Raises:
             UnreadableImageError: It cannot be decoded.
@@ -176,28 +176,28 @@ class _Pictures:
 
 
 class RosBag(VideoSource):
-    """The pictures of one topic as frames, at their recording times.
+    """The images of one topic as frames, at their recording times.
 
     Args:
         name: The bag and its topic.
-        pictures: Its messages.
-        every: Only every n-th picture is decoded.
-        fps: Pictures per second, or None for the rate of the first ones.
+        images: Its messages.
+        every: Only every n-th image is decoded.
+        fps: Images per second, or None for the rate of the first ones.
 
     Raises:
-        SourceError: The first picture cannot be decoded.
+        SourceError: The first image cannot be decoded.
     """
 
     def __init__(
-        self, name: str, pictures: _Pictures, *, every: int = 1, fps: float | None = None
+        self, name: str, images: _ImageTopic, *, every: int = 1, fps: float | None = None
     ) -> None:
-        rate = fps or pictures.rate()
-        self._pictures = pictures
+        rate = fps or images.rate()
+        self._topic = images
         self._clock = ContainerClock(rate or DEFAULT_FPS, constant=fps is not None)
-        self._messages = enumerate(pictures.messages())
+        self._messages = enumerate(images.messages())
         _, self._first = next(self._messages)
         try:
-            first = pictures.image(*self._first[1:])
+            first = images.image(*self._first[1:])
         except UnreadableImageError as fault:
             raise SourceError(f"the first picture {fault}", where=name) from fault
         self._waiting: NDArray[np.uint8] | None = first
@@ -205,7 +205,7 @@ class RosBag(VideoSource):
             name,
             fps=rate or DEFAULT_FPS,
             size=(first.shape[1], first.shape[0]),
-            frame_count=pictures.count,
+            frame_count=images.count,
             every=every,
             notes=()
             if rate
@@ -232,8 +232,8 @@ class RosBag(VideoSource):
         return None
 
     def _image(self, kind: str, data: bytes) -> NDArray[np.uint8]:
-        """One picture, checked to have the size of the first."""
-        image = self._pictures.image(kind, data)
+        """One image, checked to have the size of the first."""
+        image = self._topic.image(kind, data)
         size = (image.shape[1], image.shape[0])
         if size != self.size:
             before = f"{self.size[0]}x{self.size[1]}"
@@ -241,11 +241,11 @@ class RosBag(VideoSource):
         return image
 
     def _release(self) -> None:
-        _close(self._pictures.reader)
+        _close(self._topic.reader)
 
 
 def _plain(message: Any) -> NDArray[np.uint8]:
-    """An uncompressed picture in BGR."""
+    """An uncompressed image in BGR."""
     import cv2
 
     height, width, encoding = int(message.height), int(message.width), str(message.encoding)

@@ -9,7 +9,7 @@ import numpy as np
 
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
-from visup.percepts.picture_size import check_pixels
+from visup.percepts.image_size import check_pixels
 from visup.percepts.video.capture import (
     Capture,
     CaptureFactory,

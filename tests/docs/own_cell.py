@@ -14,7 +14,7 @@ from PIL import Image
 import visup
 from tests.paths import ROOT
 from tests.teaching.browser import Browser
-from visup.percepts.taught.drawing import taught_picture
+from visup.percepts.taught.drawing_views import taught_views_sheet
 from visup.teaching.clip_frames import ClipFrames
 from visup.teaching.outlines import parse_outline
 from visup.teaching.page.server import TeachingPage
@@ -78,7 +78,7 @@ if __name__ == "__main__":
         folder = Path(place)
         save("teach-window.png", window(folder), 1000)
         models = visup.teach(CLIP, outlines(), models=folder / "a.models")
-        save("teach-stored.png", taught_picture(models.taught), 480)
+        save("teach-stored.png", taught_views_sheet(models.taught), 480)
         for step in visup.watch(CLIP, task=CLIP.with_suffix(".task"), models=models):
             if step.time >= 6.6:
                 save("cell-watched.png", step.draw(), 640)

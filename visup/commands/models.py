@@ -129,7 +129,7 @@ def learn(
 
     Both the operator's answers during the run and --thing count as confirmation.
     """
-    from visup.percepts.taught.drawing import taught_picture
+    from visup.percepts.taught.drawing_views import taught_views_sheet
     from visup.teaching.learning import learn_from
     from visup.teaching.outlines import parse_things
 
@@ -137,7 +137,7 @@ def learn(
     for sentence in lesson.told:
         echo(sentence)
     out = out or models.with_name(f"{models.stem}-taught.png")
-    write_picture(out, taught_picture(lesson.views))
+    write_picture(out, taught_views_sheet(lesson.views))
 
 
 @app.command("list")

@@ -121,6 +121,6 @@ def _in_the_browser(frames: ClipFrames, frame: int, models: Path, browser: bool)
 
 def _draw(lesson: Lesson, out: Path) -> None:
     from visup.commands.models import write_picture
-    from visup.percepts.taught.drawing import taught_picture
+    from visup.percepts.taught.drawing_views import taught_views_sheet
 
-    write_picture(out, taught_picture(lesson.views))
+    write_picture(out, taught_views_sheet(lesson.views))

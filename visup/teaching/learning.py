@@ -21,7 +21,7 @@ from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.agent.model.records import Region
 from visup.agent.storage.journal_reader import Recording
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.taught.view import TaughtView, taught_mask
+from visup.percepts.taught.taught_view import TaughtView, taught_view_from_mask
 from visup.runs.resume import recorded_settings
 from visup.teaching.clip_frames import ClipFrames
 from visup.teaching.lesson import Lesson, store
@@ -255,7 +255,7 @@ def _shown(
                 where=frames.name,
                 expected=f"{size[0]} x {size[1]}",
             )
-        yield taught_mask(name, picture, sighting.region.full_mask(found))
+        yield taught_view_from_mask(name, picture, sighting.region.full_mask(found))
 
 
 def _video(recording: Recording, source: str | None) -> ClipFrames:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import SettingsError
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.database.taught_records import checked_name
-from visup.percepts.taught.view import TaughtView, taught_mask, taught_view
+from visup.percepts.taught.taught_view import TaughtView, taught_view, taught_view_from_mask
 from visup.percepts.video.source import to_bgr
 from visup.teaching.briefs import Showing, read_showings
 from visup.teaching.clip_frames import ClipFrames
@@ -162,7 +162,7 @@ def _view(name: str, picture: NDArray[np.uint8], drawn: OutlineLike) -> TaughtVi
                 f"the mask of '{name}' is of shape {drawn.shape}",
                 expected=f"that of the picture, {picture.shape[:2]}",
             )
-        return taught_mask(name, picture, drawn.astype(bool))
+        return taught_view_from_mask(name, picture, drawn.astype(bool))
     return taught_view(name, picture, drawn)
 
 

@@ -14,7 +14,7 @@ from visup.percepts.appearance.models.correlation_filter import CorrelationFilte
 from visup.percepts.appearance.models.features import CELL, cell_features
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.models.scene import Scene, prepare_scene, work_scale
-from visup.percepts.taught.view import TaughtView
+from visup.percepts.taught.taught_view import TaughtView
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]

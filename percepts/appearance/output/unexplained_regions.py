@@ -80,7 +80,7 @@ def _dilated_objects(objects: Sequence[Region], size: tuple[int, int]) -> tuple[
 
 
 def _rasterised(region: Region, shape: tuple[int, int], scale: float) -> Mask:
-    """(h, w) bool: a region in a image of another scale."""
+    """(h, w) bool: a region in an image of another scale."""
     blob = _scaled_blob(region, (shape[1], shape[0]), scale)
     left, top, right, bottom = blob.window
     out = np.zeros(shape, dtype=bool)
@@ -89,7 +89,7 @@ def _rasterised(region: Region, shape: tuple[int, int], scale: float) -> Mask:
 
 
 def _scaled_blob(region: Region, size: tuple[int, int], scale: float) -> Blob:
-    """The pixels of a region in a image of another scale and of a size (width, height)."""
+    """The pixels of a region in an image of another scale and of a size (width, height)."""
     x, y, w, h = region.bbox
     x0, y0 = min(int(x * scale), size[0] - 1), min(int(y * scale), size[1] - 1)
     x1 = min(max(x0 + 1, round((x + w) * scale)), size[0])

@@ -326,7 +326,7 @@ def _without_occluders(track: TaughtObjectTrack, before: Sequence[Blob]) -> Taug
 
 
 def _with_unknown_position(track: TaughtObjectTrack) -> TaughtObjectTrack:
-    """A track in a image of another size: its position is unknown."""
+    """A track in an image of another size: its position is unknown."""
     return replace(track, state=TrackState.ABSENT, visible=None, rest=None, path=())
 
 

@@ -38,7 +38,7 @@ def without_gaps(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     area = np.count_nonzero(mask)
     radius = round(REACH * area**0.5)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
-    # A border of background, since OpenCV takes what lies beyond a picture for whatever suits.
+    # A border of background, since OpenCV takes what lies beyond an image for whatever suits.
     padded = np.pad(mask, radius + 1).astype(np.uint8)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, disc)[radius + 1 : -radius - 1]
     filled = np.asarray(closed[:, radius + 1 : -radius - 1], dtype=np.bool_)

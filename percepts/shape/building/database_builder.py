@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError, SettingsError
 from visup.agent.storage.text_file import read_bounded
-from visup.percepts.picture_size import check_picture_size
+from visup.percepts.image_size import check_image_size
 from visup.percepts.shape.building.build_parts import BuildPart, is_made, parts_of, read_part
 from visup.percepts.shape.building.closed_views import without_gaps
 from visup.percepts.shape.building.mesh_views import (
@@ -35,7 +35,7 @@ from visup.percepts.shape.index.view_records import NewView
 from visup.percepts.shape.matching.exemplars import medoids, similarity_matrix
 from visup.percepts.shape.matching.shape_similarity import shape_of
 from visup.percepts.shape.refinement.mesh_model import MeshModel, mesh_model
-from visup.percepts.shape.silhouette.silhouette import binary_picture, looks_cut, normalise
+from visup.percepts.shape.silhouette.silhouette import binary_image, looks_cut, normalise
 
 VIEWS = 32
 """Default number of views rendered of each mesh."""
@@ -46,10 +46,10 @@ CLUSTERS = 8
 MOST_CLUSTERED = 400
 """Most silhouettes to cluster; more are sampled evenly."""
 
-PICTURES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
-"""Suffixes of picture files read as silhouettes."""
+IMAGE_SUFFIXES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
+"""Suffixes of image files read as silhouettes."""
 
-LARGEST_PICTURE_BYTES = 2**28
+LARGEST_IMAGE_BYTES = 2**28
 UNSCORED = 128
 """Value of mask pixels that are not scored."""
 
@@ -58,18 +58,18 @@ Progress = Callable[[int, int, str], None]
 
 
 def read_silhouette(path: Path) -> NDArray[np.bool_]:
-    """A silhouette picture as a mask (H, W) bool, whichever of object and background is brighter.
+    """A silhouette image as a mask (H, W) bool, whichever of object and background is brighter.
 
     Raises:
-        DatabaseError: The file is missing or no picture.
+        DatabaseError: The file is missing or no image.
     """
-    return binary_picture(_read_grey(path))
+    return binary_image(_read_grey(path))
 
 
 def _read_grey(path: Path) -> NDArray[np.uint8]:
     try:
-        data = read_bounded(path, LARGEST_PICTURE_BYTES)
-        check_picture_size(data)
+        data = read_bounded(path, LARGEST_IMAGE_BYTES)
+        check_image_size(data)
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
     except ValueError as e:
         raise DatabaseError(f"this picture {e}", where=str(path)) from e
@@ -87,29 +87,29 @@ def _read_grey(path: Path) -> NDArray[np.uint8]:
 
 
 def read_silhouettes(folder: Path) -> list[NDArray[np.bool_]]:
-    """All silhouette pictures in a folder as masks (H, W) bool, by file name.
+    """All silhouette images in a folder as masks (H, W) bool, by file name.
 
     Raises:
-        DatabaseError: The folder is missing, holds no pictures, or a picture cannot be read.
+        DatabaseError: The folder is missing, holds no images, or an image cannot be read.
     """
-    return [read_silhouette(f) for f in _pictures_in(folder)]
+    return [read_silhouette(f) for f in _images_in(folder)]
 
 
 def read_masks(folder: Path, label: int | None = None) -> list[NDArray[np.bool_]]:
     """An object's masks in the frames of a video, (H, W) bool each, by file name.
 
     Args:
-        folder: Label pictures: 0 is background, 128 is not scored, every other value is one object.
+        folder: Label images: 0 is background, 128 is not scored, every other value is one object.
         label: Value of the object; all objects as one when None.
 
     Returns:
         A mask for each frame in which the object is visible.
 
     Raises:
-        DatabaseError: The folder is missing, holds no pictures, a picture cannot be read, or no frame
+        DatabaseError: The folder is missing, holds no images, an image cannot be read, or no frame
             shows the object.
     """
-    frames = (_read_grey(f) for f in _pictures_in(folder))
+    frames = (_read_grey(f) for f in _images_in(folder))
     masks = [(f == label) if label is not None else (f != 0) & (f != UNSCORED) for f in frames]
     seen = [np.asarray(m) for m in masks if m.any()]
     if not seen:
@@ -121,15 +121,15 @@ def read_masks(folder: Path, label: int | None = None) -> list[NDArray[np.bool_]
     return seen
 
 
-def _pictures_in(folder: Path) -> list[Path]:
-    files = sorted(p for p in folder.glob("*") if p.suffix.lower() in PICTURES)
+def _images_in(folder: Path) -> list[Path]:
+    files = sorted(p for p in folder.glob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
     if not files:
         raise DatabaseError(
             "there are no silhouette pictures here"
             if folder.is_dir()
             else "there is no such folder",
             where=str(folder),
-            expected=f"a folder of pictures ({', '.join(PICTURES)})",
+            expected=f"a folder of pictures ({', '.join(IMAGE_SUFFIXES)})",
         )
     return files
 
@@ -174,7 +174,7 @@ def silhouette_views(
 
     Args:
         name: Name of the model.
-        masks: (H, W) bool each, whole pictures.
+        masks: (H, W) bool each, whole images.
         clusters: How many exemplars, shared between whole and cut ones by their numbers.
 
     Raises:
@@ -235,7 +235,7 @@ def build_database(
     Args:
         path: Where the database is written; an existing file is replaced at the end.
         meshes: Mesh files with different stems.
-        silhouettes: Name -> masks (H, W) bool, whole pictures; their exemplars are added to that name.
+        silhouettes: Name -> masks (H, W) bool, whole images; their exemplars are added to that name.
         progress: Callback for finished views.
         options: See `BuildOptions`.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import DatabaseError, ExtraMissingError
 from visup.agent.model.orientation import image_axes
 
-PICTURE = 200
+IMAGE_SIDE = 200
 """Pixels along the longer side of a rendered silhouette."""
 
 _MOST_SPREAD = 400
@@ -158,14 +158,14 @@ def _has_size(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> bool:
 
 
 def render_views(
-    mesh: Any, directions: NDArray[np.float64], picture: int = PICTURE
+    mesh: Any, directions: NDArray[np.float64], image_side: int = IMAGE_SIDE
 ) -> list[RenderedView]:
     """Silhouettes of a mesh from given directions.
 
     Args:
         mesh: A ``trimesh.Trimesh``.
         directions: (V, 3) unit vectors from the object to the viewer, mesh frame.
-        picture: Pixels along the longer side of each silhouette.
+        image_side: Pixels along the longer side of each silhouette.
 
     Returns:
         One view for each direction.
@@ -184,7 +184,7 @@ def render_views(
     rays = RayMeshIntersector(unit)
     points = np.asarray(unit.vertices)
     return [
-        _render(rays, points, np.asarray(d, dtype=np.float64), picture, size) for d in directions
+        _render(rays, points, np.asarray(d, dtype=np.float64), image_side, size) for d in directions
     ]
 
 
@@ -192,13 +192,13 @@ def _render(
     rays: Any,
     points: NDArray[np.float64],
     direction: NDArray[np.float64],
-    picture: int,
+    image_side: int,
     size: float,
 ) -> RenderedView:
     """One silhouette of a mesh of unit radius; `size` converts pixels back to mesh units."""
     right, up = image_axes(direction)
     u, v = points @ right, points @ up
-    pixel = max(np.ptp(u), np.ptp(v), 1e-6) / picture
+    pixel = max(np.ptp(u), np.ptp(v), 1e-6) / image_side
     columns = np.arange(u.min() - 1.5 * pixel, u.max() + 2 * pixel, pixel)
     rows = np.arange(v.max() + 1.5 * pixel, v.min() - 2 * pixel, -pixel)
     grid_u, grid_v = np.meshgrid(columns, rows)

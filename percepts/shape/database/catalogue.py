@@ -93,7 +93,7 @@ class Views(Sequence[ModelView]):
 
     @property
     def cut(self) -> NDArray[np.bool_]:
-        """(V,) whether the picture's border cuts each silhouette."""
+        """(V,) whether the image's border cuts each silhouette."""
         return np.asarray(self.records["cut"] > 0)
 
     @cached_property

@@ -52,7 +52,7 @@ TABLES_OF = {OLDEST: TABLES[:-2], VERSION: TABLES}
 """Version -> its tables."""
 
 MOST_BYTES = 1 << 25
-"""Largest row: it must hold the picture of a large object in a large frame."""
+"""Largest row: it must hold the image of a large object in a large frame."""
 
 # Messages about damaged tables quote their content, which may not be valid text.
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
@@ -73,7 +73,7 @@ class TaughtRow:
 
     Attributes:
         name: Name of the object.
-        place: x, y of the image in the picture, and the picture's width and height, pixels.
+        place: x, y of the image in the image, and the image's width and height, pixels.
         image: PNG, three channels.
         mask: PNG, one channel, 0 and 255.
         scene: PNG, three channels.

@@ -42,7 +42,7 @@ from visup.percepts.shape.index.view_records import (
 )
 from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.height_functions import outline_heights
-from visup.percepts.taught.view import TaughtView
+from visup.percepts.taught.taught_view import TaughtView
 
 WHAT = "this model database"
 """Name of a database in messages about the file lock."""

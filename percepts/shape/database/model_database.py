@@ -27,7 +27,7 @@ from visup.percepts.shape.index.view_records import ModelView, NewView
 from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
 from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.silhouette import Silhouette, looks_cut, normalise
-from visup.percepts.taught.view import TaughtView
+from visup.percepts.taught.taught_view import TaughtView
 
 __all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
 

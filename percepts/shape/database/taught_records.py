@@ -1,6 +1,6 @@
-"""Taught views as rows of a database file: pictures as PNG, numbers, and a check sum.
+"""Taught views as rows of a database file: images as PNG, numbers, and a check sum.
 
-Rows are read and their check sums verified when a database is opened; pictures are decoded on first use,
+Rows are read and their check sums verified when a database is opened; images are decoded on first use,
 since a search by shape alone needs none.
 """
 
@@ -22,10 +22,10 @@ from visup.percepts.shape.database.file_format import (
     damaged,
 )
 from visup.percepts.shape.index.view_records import InvalidRecordError
-from visup.percepts.taught.view import LEAST_PIXELS, SCENE_WIDTH, TaughtView
+from visup.percepts.taught.taught_view import LEAST_PIXELS, SCENE_WIDTH, TaughtView
 
-MOST_PICTURE = 1 << 25
-"""Most pixels of a stored picture: a small file may unpack to a huge picture."""
+MOST_PIXELS = 1 << 25
+"""Most pixels of a stored image: a small file may unpack to a huge image."""
 
 _COLUMNS = "name, x, y, width, height, image, mask, scene, crc"
 _PNG_HEADER = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
@@ -50,7 +50,7 @@ def encoded(view: TaughtView) -> TaughtRow:
     """The row of a view.
 
     Raises:
-        DatabaseError: Its name or its picture is too large to be stored.
+        DatabaseError: Its name or its image is too large to be stored.
     """
     name = checked_name(view.name)
     mask = view.mask.astype(np.uint8) * np.uint8(255)
@@ -60,10 +60,10 @@ def encoded(view: TaughtView) -> TaughtRow:
         *(cv2.imencode(".png", p)[1].tobytes() for p in (view.image, mask, view.scene)),
     )
     size = len(row.image) + len(row.mask) + len(row.scene)
-    if size > MOST_BYTES - (1 << 16) or view.mask.size > MOST_PICTURE:
+    if size > MOST_BYTES - (1 << 16) or view.mask.size > MOST_PIXELS:
         raise DatabaseError(
             f"the picture of '{name}' is too large to be stored ({size / 1e6:.0f} MB)",
-            expected=f"at most {MOST_BYTES / 1e6:.0f} MB and {MOST_PICTURE} pixels",
+            expected=f"at most {MOST_BYTES / 1e6:.0f} MB and {MOST_PIXELS} pixels",
             hint="show it in a picture of fewer pixels",
         )
     return row
@@ -100,15 +100,15 @@ def _decode(data: bytes, kind: int) -> NDArray[np.uint8]:
     if not data.startswith(_PNG_HEADER) or len(data) < 33:
         raise InvalidRecordError("a picture that is none")
     width, height = (int.from_bytes(data[a : a + 4], "big") for a in (16, 20))
-    if not 0 < width * height <= MOST_PICTURE:
+    if not 0 < width * height <= MOST_PIXELS:
         raise InvalidRecordError(f"a picture of {width} x {height} pixels")
     try:
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), kind)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), kind)
     except cv2.error:
-        picture = None
-    if picture is None:
+        image = None
+    if image is None:
         raise InvalidRecordError("a picture that is none")
-    return np.asarray(picture, dtype=np.uint8)
+    return np.asarray(image, dtype=np.uint8)
 
 
 def _check(

@@ -12,7 +12,7 @@ from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.drawing.pictures import draw_graph, draw_shape, placed
 from visup.percepts.shape.drawing.sheet import PALE, RULE, Sheet, legend
 from visup.percepts.shape.index.view_records import ModelView
-from visup.percepts.taught.drawing import view_tile
+from visup.percepts.taught.drawing_views import view_tile
 
 TILE = 104
 """Side of one view on a contact sheet, pixels."""

@@ -1,4 +1,4 @@
-"""Pictures that explain why a silhouette matches a view.
+"""Images that explain why a silhouette matches a view.
 
 Colours follow the kinds of shock: protrusions orange, necks red, bends green, seeds blue.
 """
@@ -96,7 +96,7 @@ def match_picture(
         database: The searched database.
         silhouette: The query.
         ranking: Its result.
-        title: Title above the picture.
+        title: Title above the image.
         best: Number of views to show.
 
     Returns:

@@ -88,7 +88,7 @@ class Sheet:
             self._draw.ellipse((x - r * _FINE, y - r * _FINE, x + r * _FINE, y + r * _FINE), fill)
 
     def photo(self, corner: Point, picture: NDArray[np.uint8], side: float) -> None:
-        """A picture (H, W, 3) uint8, BGR, fitted into a square with this upper left corner."""
+        """An image (H, W, 3) uint8, BGR, fitted into a square with this upper left corner."""
         image = Image.fromarray(np.ascontiguousarray(picture[:, :, ::-1]))
         zoom = side * _FINE / max(image.size)
         width, height = (max(1, round(n * zoom)) for n in image.size)

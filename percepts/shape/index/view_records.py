@@ -93,9 +93,9 @@ class ModelView:
         name: Name of the model.
         number: Number of the view within the model, from 0.
         direction: Unit vector from the object to the viewer in the model's frame (roll: the model's +z
-            is up in the picture, +y when looking along z), or None when unknown.
+            is up in the image, +y when looking along z), or None when unknown.
         area: Area of the silhouette in model units squared, or None when unknown.
-        cut: Whether the picture's border cuts the silhouette.
+        cut: Whether the image's border cuts the silhouette.
         also: Further directions from which the model shows this silhouette, rotated in the plane:
             symmetric views are stored once.
         smoothing: Standard deviation of the Gaussian that smoothed it, in square roots of its area.

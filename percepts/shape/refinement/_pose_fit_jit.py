@@ -219,7 +219,7 @@ def surface_depth(
 
     Args:
         mesh: Vertices (V, 3), faces (F, 3), normals (F, 3).
-        seen: `cover` and `tone` of a `RegionPicture`.
+        seen: `cover` and `tone` of a `RegionImage`.
         turn: (3, 3) orientation, model to camera.
         distance: From the viewer to the mesh's centre, in units of its radius.
 
@@ -263,7 +263,7 @@ def climb(
 
     Args:
         mesh: Vertices (V, 3), faces (F, 3), normals (F, 3).
-        seen: `cover` and `tone` of a `RegionPicture`.
+        seen: `cover` and `tone` of a `RegionImage`.
         start: (3, 3) orientation, model to camera.
         distance: From the viewer to the mesh's centre, in units of its radius.
         steps: Rotations to try, radians, largest first; each for up to three rounds.

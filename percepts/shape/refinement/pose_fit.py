@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.shape.refinement._pose_fit_jit import climb, surface_depth
 from visup.percepts.shape.refinement.mesh_model import MeshModel
-from visup.percepts.shape.refinement.region_picture import RegionPicture
+from visup.percepts.shape.refinement.region_image import RegionImage
 
 SHADING = 0.3
 """Weight of the explained shading relative to the overlap."""
@@ -33,7 +33,7 @@ STILL = np.zeros(0)
 """No steps: the orientation is only compared."""
 
 USUAL_FOCAL = 1.2
-"""Focal length of a usual lens, in widths of the picture (a horizontal field of view of 45 degrees)."""
+"""Focal length of a usual lens, in widths of the image (a horizontal field of view of 45 degrees)."""
 
 SAME = np.radians(12.0)
 """Orientations closer than this are the same, radians."""
@@ -66,7 +66,7 @@ class PoseFit:
 
 def fitted_poses(
     model: MeshModel,
-    picture: RegionPicture,
+    image: RegionImage,
     starts: Iterable[NDArray[np.float64]],
     *,
     steps: NDArray[np.float64] = COARSE,
@@ -76,18 +76,18 @@ def fitted_poses(
 
     Args:
         model: The mesh.
-        picture: The observed region.
+        image: The observed region.
         starts: (3, 3) orientations, model to camera.
         steps: Rotations to try, radians.
         focal_px: Focal length, pixels of the frame.
     """
     mesh = (model.vertices, model.faces, model.normals)
-    distance, cover = _distance(picture, focal_px), float(picture.cover.sum())
+    distance, cover = _distance(image, focal_px), float(image.cover.sum())
     found = []
     for number, start in enumerate(starts):
         at = np.ascontiguousarray(start, dtype=np.float64)
         turn, overlap, explained, scale = climb(
-            mesh, (picture.cover, picture.tone), at, distance, steps, SHADING
+            mesh, (image.cover, image.tone), at, distance, steps, SHADING
         )
         found.append(PoseFit(turn, overlap, explained, cover * (model.radius / scale) ** 2, number))
     found.sort(key=lambda f: (-f.worth, f.start))
@@ -96,7 +96,7 @@ def fitted_poses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfacePoints:
-    """Where points of a picture lie on a mesh.
+    """Where points of an image lie on a mesh.
 
     Attributes:
         bodies: (N, 3) relative to the mesh's centre, z away from the viewer, pixels of the frame; NaN beside
@@ -110,7 +110,7 @@ class SurfacePoints:
 
 def surface_points(
     model: MeshModel,
-    picture: RegionPicture,
+    image: RegionImage,
     orientation: NDArray[np.float64],
     points: NDArray[np.floating],
     focal_px: float,
@@ -119,34 +119,34 @@ def surface_points(
 
     Args:
         model: The mesh.
-        picture: The region.
+        image: The region.
         orientation: (3, 3) model to camera, as fitted to it.
         points: (N, 2) (x, y) from the centre of the region's box, pixels of the frame.
         focal_px: Focal length, pixels of the frame.
     """
-    mesh, seen = (model.vertices, model.faces, model.normals), (picture.cover, picture.tone)
-    _, place = surface_depth(mesh, seen, orientation, _distance(picture, focal_px))
+    mesh, seen = (model.vertices, model.faces, model.normals), (image.cover, image.tone)
+    _, place = surface_depth(mesh, seen, orientation, _distance(image, focal_px))
     # The orientation is known here, and with it the radius.
-    far = max(2.0, focal_px / float(place[2] * picture.pixel))
+    far = max(2.0, focal_px / float(place[2] * image.pixel))
     depth, place = surface_depth(mesh, seen, orientation, far)
     side = len(depth)
-    column, row = (points / picture.pixel + side / 2).astype(int).clip(0, side - 1).T
+    column, row = (points / image.pixel + side / 2).astype(int).clip(0, side - 1).T
     z = np.where(np.isfinite(depth[row, column]), depth[row, column], np.nan)
-    about = points - (place[:2] - side / 2) * picture.pixel
-    radius = float(place[2] * picture.pixel)
+    about = points - (place[:2] - side / 2) * image.pixel
+    radius = float(place[2] * image.pixel)
     bodies = np.column_stack([about * (1 + z / far)[:, None], z * radius])
     return SurfacePoints(bodies, far * radius)
 
 
-def _distance(picture: RegionPicture, focal_px: float) -> float:
+def _distance(image: RegionImage, focal_px: float) -> float:
     """Approximate distance of the object, in units of its radius; at least two.
 
-    Its radius is taken as half its longer side in the picture, which is too small for a view along a
+    Its radius is taken as half its longer side in the image, which is too small for a view along a
     long axis; perspective is then underestimated, towards a parallel projection.
     """
-    rows, columns = np.nonzero(picture.cover > 0.5)
+    rows, columns = np.nonzero(image.cover > 0.5)
     longer = max(np.ptp(rows), np.ptp(columns)) + 1 if len(rows) else 1
-    return max(2.0, focal_px / (0.5 * float(longer) * picture.pixel))
+    return max(2.0, focal_px / (0.5 * float(longer) * image.pixel))
 
 
 def _distinct(fits: Sequence[PoseFit]) -> list[PoseFit]:

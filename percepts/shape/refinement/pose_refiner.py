@@ -22,7 +22,7 @@ from visup.percepts.shape.refinement.pose_fit import (
     apart,
     fitted_poses,
 )
-from visup.percepts.shape.refinement.region_picture import RegionPicture, region_picture
+from visup.percepts.shape.refinement.region_image import RegionImage, region_image
 from visup.percepts.shape.refinement.surface_motion import FollowedSurface, followed_surface
 
 SizedHypothesis = tuple[Hypothesis, float | None]
@@ -64,7 +64,7 @@ class FittedModel:
         overlap: Overlap of the best fit then.
         orientations: (K, 3, 3), best first, as last fitted.
         views: (K,) numbers of the views from which each was found.
-        surface: The surface, with the same orientations in an earlier picture, or None where it shows
+        surface: The surface, with the same orientations in an earlier image, or None where it shows
             too little.
     """
 
@@ -81,7 +81,7 @@ FitMemory = Mapping[tuple[int, str], FittedModel]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _KnownOrientations:
-    """Orientations known before a picture is searched.
+    """Orientations known before an image is searched.
 
     Attributes:
         orientations: (K, 3, 3).
@@ -116,12 +116,12 @@ class _KnownOrientations:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Fitted:
-    """What a fit is stored with: the picture, the hypothesis; time and overlap of the last full search."""
+class _FittedImage:
+    """What a fit is stored with: the image, the hypothesis; time and overlap of the last full search."""
 
     frame: Frame
     region: Region
-    picture: RegionPicture
+    image: RegionImage
     best: Hypothesis
     time: float
     overlap: float
@@ -163,11 +163,11 @@ class PoseRefiner:
         names = self._names(hypotheses)
         if not names or region.cut:
             return tuple(hypotheses)
-        picture = region_picture(frame, region)
+        image = region_image(frame, region)
         out = [(h, area) for h, area in hypotheses if h.name not in names]
         for name in names:
             own = [(h, area) for h, area in hypotheses if h.name == name]
-            out += self._fitted(frame, region, picture, own, more) or own
+            out += self._fitted(frame, region, image, own, more) or own
         return tuple(sorted(out, key=lambda sized: -sized[0].similarity))
 
     def _names(self, hypotheses: Sequence[SizedHypothesis]) -> list[str]:
@@ -178,7 +178,7 @@ class PoseRefiner:
         self,
         frame: Frame,
         region: Region,
-        picture: RegionPicture,
+        image: RegionImage,
         own: Sequence[SizedHypothesis],
         more: MoreViews,
     ) -> list[SizedHypothesis]:
@@ -187,10 +187,10 @@ class PoseRefiner:
         before = self.memory.get((region.id, best.name))
         known = self._known(frame, region, before)
         if known is not None and before is not None:
-            found = self._kept(frame, region, picture, best, before, known)
+            found = self._kept(frame, region, image, best, before, known)
             if found:
                 return found
-        return self._searched(frame, region, picture, own, more, known)
+        return self._searched(frame, region, image, own, more, known)
 
     def followed(
         self, frame: Frame, region: Region, hypotheses: Sequence[SizedHypothesis]
@@ -204,7 +204,7 @@ class PoseRefiner:
         known = self._known(frame, region, before)
         if before is None or known is None or not known.followed:
             return None
-        found = self._kept(frame, region, region_picture(frame, region), best, before, known)
+        found = self._kept(frame, region, region_image(frame, region), best, before, known)
         if not found:
             return None
         rest = [(h, area) for h, area in hypotheses if h.name != best.name]
@@ -228,7 +228,7 @@ class PoseRefiner:
         self,
         frame: Frame,
         region: Region,
-        picture: RegionPicture,
+        image: RegionImage,
         best: Hypothesis,
         before: FittedModel,
         known: _KnownOrientations,
@@ -238,17 +238,17 @@ class PoseRefiner:
         if frame.time - before.time >= s.renew_s:
             return []
         steps = STILL if known.followed else FINE
-        fits = self._search(frame, best.name, picture, list(known.orientations), steps)
+        fits = self._search(frame, best.name, image, list(known.orientations), steps)
         if not fits or fits[0].overlap < before.overlap - s.lost:
             return []
-        at = _Fitted(frame, region, picture, best, before.time, before.overlap)
+        at = _FittedImage(frame, region, image, best, before.time, before.overlap)
         return self._stored(at, fits, known.views, known.surface)
 
     def _searched(
         self,
         frame: Frame,
         region: Region,
-        picture: RegionPicture,
+        image: RegionImage,
         own: Sequence[SizedHypothesis],
         more: MoreViews,
         known: _KnownOrientations | None,
@@ -260,7 +260,7 @@ class PoseRefiner:
         numbers = tuple(view for view, _ in wide)
         if known is not None:
             starts, numbers = [*known.orientations, *starts], (*known.views, *numbers)
-        fits = self._search(frame, best.name, picture, starts, COARSE)
+        fits = self._search(frame, best.name, image, starts, COARSE)
         if not fits or fits[0].overlap < s.least_overlap:
             self.memory.pop((region.id, best.name), None)
             return []
@@ -268,30 +268,30 @@ class PoseRefiner:
         if known is not None and known.followed:
             fits, surface = known.steadied(fits)
             first = [fits[0].orientation]
-            overlap = self._search(frame, best.name, picture, first, STILL)[0].overlap
-        at = _Fitted(frame, region, picture, best, frame.time, overlap)
+            overlap = self._search(frame, best.name, image, first, STILL)[0].overlap
+        at = _FittedImage(frame, region, image, best, frame.time, overlap)
         return self._stored(at, fits, numbers, surface)
 
     def _search(
         self,
         frame: Frame,
         name: str,
-        picture: RegionPicture,
+        image: RegionImage,
         starts: Sequence[NDArray[np.float64]],
         steps: NDArray[np.float64],
     ) -> list[PoseFit]:
         focal = USUAL_FOCAL * frame.size[0]
         mesh, kept = self.meshes[name], self.settings.kept
-        fits = fitted_poses(mesh, picture, starts, steps=steps, focal_px=focal)[:kept]
+        fits = fitted_poses(mesh, image, starts, steps=steps, focal_px=focal)[:kept]
         if steps is not COARSE:
             return fits
         near = [f.orientation for f in fits]
-        fine = fitted_poses(mesh, picture, near, steps=FINE, focal_px=focal)
+        fine = fitted_poses(mesh, image, near, steps=FINE, focal_px=focal)
         return [replace(f, start=fits[f.start].start) for f in fine]
 
     def _stored(
         self,
-        at: _Fitted,
+        at: _FittedImage,
         fits: Sequence[PoseFit],
         numbers: Sequence[int],
         surface: FollowedSurface | None,
@@ -304,7 +304,7 @@ class PoseRefiner:
         if surface is None or sorted(starts) != list(range(len(surface.orientations))):
             focal = USUAL_FOCAL * at.frame.size[0]
             mesh = self.meshes[best.name]
-            surface = followed_surface(at.frame, at.region, mesh, at.picture, turns, focal)
+            surface = followed_surface(at.frame, at.region, mesh, at.image, turns, focal)
         else:
             surface = surface.ordered(starts)
         self.memory[key] = FittedModel(at.time, at.overlap, turns, chosen, surface)

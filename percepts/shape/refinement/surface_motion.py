@@ -1,8 +1,8 @@
-"""Rotation of a rigid body since an earlier picture, from points on its surface.
+"""Rotation of a rigid body since an earlier image, from points on its surface.
 
 An outline tells the orientation of a body to some degrees, and its errors last as long as the outline. Points
 on the surface are followed to a fraction of a pixel, so what they tell is how far the body has turned: the
-points lie on the mesh as it was fitted to the earlier picture, and the mesh is turned, moved and scaled until
+points lie on the mesh as it was fitted to the earlier image, and the mesh is turned, moved and scaled until
 they are where they were found again.
 """
 
@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from visup.agent.model.records import Frame, Region
 from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.refinement.pose_fit import SurfacePoints, surface_points
-from visup.percepts.shape.refinement.region_picture import RegionPicture
+from visup.percepts.shape.refinement.region_image import RegionImage
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ EXPLAINED_PX = 1.0
 """Distance within which a rotation explains a point, pixels."""
 
 FAR = np.cos(np.radians(12.0))
-"""Cosine of the rotation after which a new picture is taken, since the surface looks different."""
+"""Cosine of the rotation after which a new image is taken, since the surface looks different."""
 
 _MARGIN = 0.25
 _QUALITY, _APART_PX = 0.02, 4
@@ -54,8 +54,8 @@ _STEP = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SurfacePicture:
-    """A picture of a body with points on it that can be found again.
+class SurfaceImage:
+    """An image of a body with points on it that can be found again.
 
     Attributes:
         grey: (h, w) uint8, the surroundings of its region.
@@ -90,15 +90,15 @@ class SurfacePicture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FollowedSurface:
-    """The surface of a body, followed from an earlier picture.
+    """The surface of a body, followed from an earlier image.
 
     Attributes:
-        picture: The picture.
+        image: The image.
         orientations: (K, 3, 3) possible orientations in it.
         points: Where its points lie on the mesh, for each of them.
     """
 
-    picture: SurfacePicture
+    image: SurfaceImage
     orientations: Floats
     points: tuple[SurfacePoints, ...]
 
@@ -108,8 +108,8 @@ class FollowedSurface:
         Returns:
             (M,) numbers of those that agree with how the surface moved, and (M, 3, 3) what they are now.
         """
-        there, found = self.picture.found_in(frame, region)
-        height, width = self.picture.grey.shape
+        there, found = self.image.found_in(frame, region)
+        height, width = self.image.grey.shape
         there -= (np.array([width, height]) - 1) / 2
         agree, turns = [], []
         for k, on in enumerate(self.points):
@@ -121,7 +121,7 @@ class FollowedSurface:
         return np.array(agree, np.intp), np.array(turns).reshape(-1, 3, 3)
 
     def is_worn(self, numbers: NDArray[np.intp], now: Floats) -> bool:
-        """Whether the body has turned so far since the picture that a new one is needed."""
+        """Whether the body has turned so far since the image that a new one is needed."""
         if len(numbers) < len(self.orientations):
             return True
         cosine = (np.einsum("kij,kij->k", now, self.orientations[numbers]) - 1) / 2
@@ -130,14 +130,14 @@ class FollowedSurface:
     def ordered(self, numbers: Sequence[int]) -> FollowedSurface:
         """The same surface with its orientations in another order."""
         points = tuple(self.points[k] for k in numbers)
-        return FollowedSurface(self.picture, self.orientations[list(numbers)], points)
+        return FollowedSurface(self.image, self.orientations[list(numbers)], points)
 
 
 def followed_surface(
     frame: Frame,
     region: Region,
     model: MeshModel,
-    picture: RegionPicture,
+    image: RegionImage,
     orientations: Floats,
     focal_px: float,
 ) -> FollowedSurface | None:
@@ -147,21 +147,21 @@ def followed_surface(
         frame: The frame that shows it.
         region: Its region.
         model: Its mesh.
-        picture: The region as poses are fitted to it.
+        image: The region as poses are fitted to it.
         orientations: (K, 3, 3) those fitted.
         focal_px: Focal length, pixels.
     """
-    seen = surface_picture(frame, region)
+    seen = surface_image(frame, region)
     if seen is None:
         return None
     height, width = seen.grey.shape
     centred = seen.points.astype(np.float64) - (np.array([width, height]) - 1) / 2
-    points = (surface_points(model, picture, o, centred, focal_px) for o in orientations)
+    points = (surface_points(model, image, o, centred, focal_px) for o in orientations)
     return FollowedSurface(seen, orientations, tuple(points))
 
 
-def surface_picture(frame: Frame, region: Region) -> SurfacePicture | None:
-    """The picture of a region; None where too few points could be found again.
+def surface_image(frame: Frame, region: Region) -> SurfaceImage | None:
+    """The image of a region; None where too few points could be found again.
 
     Args:
         frame: The frame that shows it.
@@ -178,7 +178,7 @@ def surface_picture(frame: Frame, region: Region) -> SurfacePicture | None:
     points = cv2.goodFeaturesToTrack(grey, MOST_POINTS, _QUALITY, _APART_PX, mask=inside)
     if points is None or len(points) < FEWEST:
         return None
-    return SurfacePicture(grey, np.asarray(points[:, 0], np.float32))
+    return SurfaceImage(grey, np.asarray(points[:, 0], np.float32))
 
 
 def _is_plain_around(mask: NDArray[np.uint8], grey: NDArray[np.uint8]) -> bool:
@@ -197,7 +197,7 @@ def _is_plain_around(mask: NDArray[np.uint8], grey: NDArray[np.uint8]) -> bool:
 
 
 def _surroundings(frame: Frame, region: Region, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """The grey picture of a size (width, height) about the centre of a region's box."""
+    """The grey image of a size (width, height) about the centre of a region's box."""
     x, y, w, h = region.bbox
     crop = cv2.getRectSubPix(frame.image, size, (x + (w - 1) / 2, y + (h - 1) / 2))
     return np.asarray(cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY), np.uint8)

@@ -88,7 +88,7 @@ def normalise(
         None when it has fewer than `LEAST_AREA` pixels.
 
     Raises:
-        SettingsError: The mask is not a binary picture.
+        SettingsError: The mask is not a binary image.
 
     Example:
         >>> disc = np.hypot(*np.mgrid[-30:31, -30:31]) <= 25
@@ -269,26 +269,26 @@ def resample_closed(
 
 
 def looks_cut(mask: NDArray[np.bool_]) -> bool:
-    """Whether a picture's border seems to cut its silhouette.
+    """Whether an image's border seems to cut its silhouette.
 
-    A tightly cropped picture touches all four sides and does not count as cut; one that touches some sides
+    A tightly cropped image touches all four sides and does not count as cut; one that touches some sides
     along at least 3 pixels does.
 
     Args:
-        mask: (H, W) bool, the whole picture.
+        mask: (H, W) bool, the whole image.
     """
     touches = [int(np.count_nonzero(side)) for side in (mask[0], mask[-1], mask[:, 0], mask[:, -1])]
     return any(t >= 3 for t in touches) and not all(t >= 1 for t in touches)
 
 
-def binary_picture(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """A silhouette picture as a mask, whether object or background is brighter.
+def binary_image(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """A silhouette image as a mask, whether object or background is brighter.
 
     Args:
         image: (H, W) uint8.
 
     Returns:
-        (H, W) bool. The background is what most of the picture's border shows; when the border is
+        (H, W) bool. The background is what most of the image's border shows; when the border is
         undecided, the brighter part is the object.
     """
     bright = image > 127

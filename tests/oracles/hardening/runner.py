@@ -25,7 +25,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.evaluation.figures import Progress, silent
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.taught.view import taught_view
+from visup.percepts.taught.taught_view import taught_view
 
 OUTCOMES = ("read", "refused", "raised", "slow", "crashed", "memory", "ran")
 BAD = OUTCOMES[2:]

@@ -23,7 +23,7 @@ from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.agent.storage.seal import own_key, seal, unsealed
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.signals import read_signals
-from visup.percepts.taught.view import taught_view
+from visup.percepts.taught.taught_view import taught_view
 from visup.rules.language.parser import load_rules
 from visup.runs.checkpoints import CHECKPOINT, read_checkpoint
 from visup.runs.inputs.zones import load_ground, load_zones

@@ -19,7 +19,7 @@ from tests.oracles.tracking.peers import PEERS, Found, Tracked, mog2_blobs
 from tests.oracles.tracking.walkers import street
 from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth, truth_of_images
 from visup.evaluation.motion.runner import find_sequences
-from visup.percepts.detections.numbering import BoxNumbering
+from visup.percepts.detections.box_tracker import MultiBoxTracker
 from visup.percepts.video import open_source
 from visup.percepts.video.image_folder import images_in
 
@@ -49,7 +49,7 @@ class Scene:
 
 def visup(found: Found, fps: float) -> Tracked:
     """The numbers of `percepts/detections`."""
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     return {k: {d.track: d.box for d in numbering.number(k, found[k])} for k in sorted(found)}
 
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.taught.view import TaughtView, taught_mask
+from visup.percepts.taught.taught_view import TaughtView, taught_view_from_mask
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -59,4 +59,4 @@ def picture(
 def shown(places: Mapping[str, tuple[int, int]], *names: str) -> tuple[TaughtView, ...]:
     """Views of some of the things of a picture."""
     image, masks = picture(places, seed=99)
-    return tuple(taught_mask(n, image, masks[n]) for n in names)
+    return tuple(taught_view_from_mask(n, image, masks[n]) for n in names)

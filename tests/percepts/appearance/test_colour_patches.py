@@ -23,7 +23,7 @@ from visup.agent import Frame, Observation
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.models.appearance_model import view_models
 from visup.percepts.appearance.tracking.redetection import candidates_by_colour, is_unique_by_colour
-from visup.percepts.taught.view import taught_mask
+from visup.percepts.taught.taught_view import taught_view_from_mask
 
 WIDE, HIGH = SIZES["tool"]
 SIZE = WIDTH, HEIGHT
@@ -79,7 +79,7 @@ def test_colours_are_distinctive_where_they_find_the_thing_where_it_was_taught(
     taught, masks = picture({"tool": (60, 80)})
     if not alone:
         taught[80 : 80 + HIGH, 160 : 160 + WIDE] = taught[masks["tool"]].reshape(HIGH, WIDE, 3)
-    view = taught_mask("tool", taught, masks["tool"])
+    view = taught_view_from_mask("tool", taught, masks["tool"])
     assert is_unique_by_colour(view_models([view])[0]) is alone
     behaviour = AppearanceBehaviour([view])
     found = behaviour.perceive(Frame(0, 0.0, turned(90)[0]), Observation(0, 0.0, SIZE), ())
@@ -93,7 +93,7 @@ def test_colours_that_find_something_else_where_it_was_taught_are_not_distinctiv
     taught[80 : 80 + HIGH, 160 : 160 + WIDE] = whole
     for rail in range(80, 80 + HIGH, 14):
         taught[rail : rail + 6, 60 : 60 + WIDE] = table()[rail : rail + 6, 60 : 60 + WIDE]
-    (view,) = view_models([taught_mask("tool", taught, masks["tool"])])
+    (view,) = view_models([taught_view_from_mask("tool", taught, masks["tool"])])
     (other,) = candidates_by_colour(scene(view.scene), view, 0)
     assert other.match.pose.x == pytest.approx(160 + (WIDE - 1) / 2, abs=2.0)
     assert not is_unique_by_colour(view)

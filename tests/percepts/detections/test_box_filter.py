@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.percepts.detections.box_filter import (
-    DRIFTS,
-    MEASURED,
-    TURNS,
-    begun,
-    expected,
+    ACCELERATION_NOISE,
+    BOX_NOISE,
+    MEASUREMENT_NOISE,
+    centre_and_size,
+    corrected,
+    initial_state,
     innovation,
-    middle_and_size,
-    updated,
+    predicted,
 )
 
 BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.floats(5, 40))
@@ -25,31 +25,35 @@ BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.float
 def test_as_the_filter_in_matrices(
     first: tuple[float, ...], second: tuple[float, ...], frames: int
 ) -> None:
-    start = begun(first)  # type: ignore[arg-type]
-    got = updated(expected(start, frames), second)  # type: ignore[arg-type]
+    start = initial_state(first)  # type: ignore[arg-type]
+    got = corrected(predicted(start, frames), second)  # type: ignore[arg-type]
     for k in range(4):
-        x = np.array([start.place[k], start.speed[k]])
+        x = np.array([start.mean[k], start.velocity[k]])
         p = np.array(
-            [[start.spread[0][k], start.spread[1][k]], [start.spread[1][k], start.spread[2][k]]]
+            [
+                [start.covariance[0][k], start.covariance[1][k]],
+                [start.covariance[1][k], start.covariance[2][k]],
+            ]
         )
         step = np.array([[1.0, 1.0], [0.0, 1.0]])
-        q = np.diag([(DRIFTS[k] * start.size) ** 2, (TURNS[k] * start.size) ** 2])
+        q = np.diag([(BOX_NOISE[k] * start.size) ** 2, (ACCELERATION_NOISE[k] * start.size) ** 2])
         for _ in range(frames):
             x, p = step @ x, step @ p @ step.T + q
-        r = (MEASURED[k] * expected(start, frames).size) ** 2
+        r = (MEASUREMENT_NOISE[k] * predicted(start, frames).size) ** 2
         gain = p[:, 0] / (p[0, 0] + r)
-        x = x + gain * (middle_and_size(second)[k] - x[0])  # type: ignore[arg-type]
+        x = x + gain * (centre_and_size(second)[k] - x[0])  # type: ignore[arg-type]
         p = p - np.outer(gain, p[0])
-        assert [got.place[k], got.speed[k]] == pytest.approx(x.tolist())
-        assert got.spread[:, k] == pytest.approx([p[0, 0], p[0, 1], p[1, 1]], abs=1e-9)
+        assert [got.mean[k], got.velocity[k]] == pytest.approx(x.tolist())
+        assert got.covariance[:, k] == pytest.approx([p[0, 0], p[0, 1], p[1, 1]], abs=1e-9)
 
 
 def test_what_goes_on_evenly_is_expected_ever_more_exactly() -> None:
-    state = begun((0.0, 0.0, 10.0, 20.0))
+    state = initial_state((0.0, 0.0, 10.0, 20.0))
     for k in range(1, 20):
-        state = updated(expected(state, 1), (2.0 * k, 0.0, 10.0, 20.0))
-    off, variance = innovation(expected(state, 1), (40.0, 0.0, 10.0, 20.0))
+        state = corrected(predicted(state, 1), (2.0 * k, 0.0, 10.0, 20.0))
+    off, variance = innovation(predicted(state, 1), (40.0, 0.0, 10.0, 20.0))
     assert np.abs(off).max() < 0.2
     assert (
-        variance[0] < innovation(expected(begun((0.0, 0.0, 10.0, 20.0)), 1), (0, 0, 10, 20))[1][0]
+        variance[0]
+        < innovation(predicted(initial_state((0.0, 0.0, 10.0, 20.0)), 1), (0, 0, 10, 20))[1][0]
     )

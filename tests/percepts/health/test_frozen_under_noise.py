@@ -17,7 +17,7 @@ START, LENGTH, FPS = 20, 50, 25.0
 GROUND = cv2.resize(texture(1, (80, 120), 20, 230), SIZE[::-1]).astype(np.float32)
 
 
-def stirred(rng: np.random.Generator) -> np.ndarray:
+def changed_share(rng: np.random.Generator) -> np.ndarray:
     """The ground as a codec leaves it: a little off, and alike in neighbouring pixels."""
     off = rng.normal(0, 1.2, (40, 60)).astype(np.float32)
     return np.asarray(GROUND + cv2.resize(off, SIZE[::-1]))
@@ -37,10 +37,10 @@ def told(images: list[np.ndarray]) -> set[HealthStatus]:
 @pytest.mark.parametrize("sigma", [0.3, 0.8])
 def test_a_frozen_image_under_fresh_noise_is_told_though_nothing_had_moved(sigma: float) -> None:
     rng = np.random.default_rng(3)
-    live = [stirred(rng) for _ in range(START)]
+    live = [changed_share(rng) for _ in range(START)]
     frozen = [live[-1] + rng.normal(0, sigma, SIZE) for _ in range(LENGTH - START)]
     assert told(live + frozen) == {HealthStatus.FROZEN}
-    assert told(live + [stirred(rng) for _ in frozen]) == set()
+    assert told(live + [changed_share(rng) for _ in frozen]) == set()
 
 
 def test_a_camera_whose_own_noise_is_white_is_not_frozen_when_nothing_moves() -> None:
@@ -50,7 +50,7 @@ def test_a_camera_whose_own_noise_is_white_is_not_frozen_when_nothing_moves() ->
 
 def test_what_moves_under_noise_that_has_just_come_is_not_frozen() -> None:
     rng = np.random.default_rng(5)
-    live = [stirred(rng) for _ in range(START)]
+    live = [changed_share(rng) for _ in range(START)]
     ys, xs = np.mgrid[: SIZE[0], : SIZE[1]]
     images = []
     for n in range(LENGTH - START):
@@ -66,9 +66,9 @@ def test_the_change_of_white_noise_is_white_and_that_of_a_shift_is_not(sigma: fl
         measure_quality(f.image) for f in frames([GROUND, GROUND + rng.normal(0, sigma, SIZE)])
     )
     change = change_statistics(one, two)
-    assert change.middle == pytest.approx(1.0, abs=0.15)
+    assert change.median_ratio == pytest.approx(1.0, abs=0.15)
     assert change.is_white
     moved = measure_quality(frames([np.roll(GROUND, 1, axis=1)])[0].image)
-    assert change_statistics(one, moved).middle > 3
+    assert change_statistics(one, moved).median_ratio > 3
     assert not change_statistics(one, moved).is_white
     assert not change_statistics(one, one).is_white

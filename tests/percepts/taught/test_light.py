@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.percepts.appearance.scenes import Image, picture, shown
-from visup.percepts.taught.light import light_change, relit
+from visup.percepts.taught.lighting import light_change, relit_views
 
 START = {"tray": (150, 110), "part": (40, 60)}
 MOVED = {"tray": (150, 110), "part": (170, 20), "tool": (100, 90)}
@@ -32,13 +32,13 @@ def test_what_fills_a_third_of_the_picture_changes_no_light() -> None:
 
 @pytest.mark.parametrize("light", [(1.0, 1.0, 1.0), (0.9, 0.95, 1.0)])
 def test_in_almost_the_same_light_there_is_no_other_view(light: tuple[float, ...]) -> None:
-    assert not list(relit(shown(START, "part", "tray"), dimmed(picture(MOVED)[0], light)))
+    assert not list(relit_views(shown(START, "part", "tray"), dimmed(picture(MOVED)[0], light)))
 
 
 def test_views_look_as_things_look_in_that_light() -> None:
     light = (0.5, 0.6, 0.7)
     views = shown(START, "part", "tray")
-    found = dict(relit(views, dimmed(picture(MOVED)[0], light)))
+    found = dict(relit_views(views, dimmed(picture(MOVED)[0], light)))
     assert list(found) == [0, 1]
     for number, view in found.items():
         assert view.name == views[number].name
@@ -51,10 +51,13 @@ def test_a_picture_without_colours_tells_how_light_it_is() -> None:
     grey = picture(START)[0].mean(axis=2).astype(np.uint8)
     views = shown(START, "part")
     for image in (grey // 2, (grey // 2)[..., None]):
-        ((number, _),) = relit(views, image)
+        ((number, _),) = relit_views(views, image)
         assert number == 0
 
 
 @pytest.mark.parametrize(("light", "views"), [(0.4, 1), (0.2, 0), (0.0, 0)])
 def test_a_picture_in_the_dark_tells_nothing_of_the_light(light: float, views: int) -> None:
-    assert len(list(relit(shown(START, "part"), dimmed(picture(START)[0], (light,) * 3)))) == views
+    assert (
+        len(list(relit_views(shown(START, "part"), dimmed(picture(START)[0], (light,) * 3))))
+        == views
+    )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame, Health, HealthStatus, Observation, Percept, Report, ReportState
 from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.percepts.appearance.placed_objects import PlacedObjectBehaviour
-from visup.percepts.taught.pointed import outline_at
+from visup.percepts.taught.point_segmentation import outline_at_point
 
 GREEN, RED = (60, 140, 70), (40, 40, 200)
 
@@ -44,19 +44,19 @@ def test_a_thing_is_outlined_from_any_place_in_it(
     box: tuple[int, int, int, int], across: float, down: float
 ) -> None:
     x, y, w, h = box
-    outline = outline_at(scene(box), (x + across * w, y + down * h))
+    outline = outline_at_point(scene(box), (x + across * w, y + down * h))
     assert outline is not None
     assert overlap(outline, box) > 0.7
 
 
 def test_the_ground_is_no_thing() -> None:
-    assert outline_at(scene((150, 100, 30, 30)), (20.0, 20.0)) is None
-    assert outline_at(np.full((240, 320, 3), 90, np.uint8), (160.0, 120.0)) is None
+    assert outline_at_point(scene((150, 100, 30, 30)), (20.0, 20.0)) is None
+    assert outline_at_point(np.full((240, 320, 3), 90, np.uint8), (160.0, 120.0)) is None
 
 
 @pytest.mark.parametrize("at", [(-1.0, 5.0), (5.0, 240.0)])
 def test_a_place_outside_the_picture_shows_nothing(at: tuple[float, float]) -> None:
-    assert outline_at(scene((150, 100, 30, 30)), at) is None
+    assert outline_at_point(scene((150, 100, 30, 30)), at) is None
 
 
 def test_what_lies_at_a_place_is_seen_at_rest_and_remembered_by_a_copy() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from visup.agent.model.errors import SettingsError
-from visup.percepts.taught.view import taught_view
+from visup.percepts.taught.taught_view import taught_view
 
 
 def test_the_outline_is_where_it_was_drawn() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from visup.agent.model.errors import DatabaseError, SourceError
-from visup.percepts.picture_size import picture_size
+from visup.percepts.image_size import image_size
 from visup.percepts.shape.building.database_builder import read_silhouette
 from visup.percepts.video import open_source
 from visup.percepts.video.video_file import check_frame_size
@@ -53,8 +53,8 @@ def test_a_picture_of_many_pixels_is_refused_at_once(
 
 
 def test_the_size_of_a_picture_is_that_of_its_header() -> None:
-    assert picture_size(bomb(300, 20)) == (300, 20)
-    assert picture_size(b"no picture") is None
+    assert image_size(bomb(300, 20)) == (300, 20)
+    assert image_size(b"no picture") is None
 
 
 class Announces:

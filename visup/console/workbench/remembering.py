@@ -7,7 +7,7 @@ from pathlib import Path
 from visup.agent import Presence
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.console.run_view import RunView
-from visup.percepts.taught.view import taught_mask
+from visup.percepts.taught.taught_view import taught_view_from_mask
 from visup.teaching.lesson import Lesson, store
 
 MODELS = "console.models"
@@ -40,5 +40,5 @@ def remember(run: RunView, number: int, object_id: int, name: str, folder: Path)
         raise OutputError(
             f"there is no picture of this moment: {why[:1].lower()}{why[1:]}", where=run.folder.name
         )
-    view = taught_mask(name, picture, belief.region.full_mask(mind.frame_size))
+    view = taught_view_from_mask(name, picture, belief.region.full_mask(mind.frame_size))
     return store(folder / MODELS, [view])

@@ -21,7 +21,7 @@ from visup.agent import Frame
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
-from visup.percepts.taught.view import TaughtView, taught_mask
+from visup.percepts.taught.taught_view import TaughtView, taught_view_from_mask
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
 from visup.teaching.lesson import store
@@ -113,7 +113,7 @@ def _views(desk: Image) -> Iterator[TaughtView]:
     for number, (x, y, w, h) in enumerate(BOXES, start=1):
         mask = np.zeros(desk.shape[:2], dtype=bool)
         mask[y : y + h, x : x + w] = True
-        yield taught_mask(f"thing_{number}", desk, mask)
+        yield taught_view_from_mask(f"thing_{number}", desk, mask)
 
 
 def _desk(rng: np.random.Generator) -> Image:

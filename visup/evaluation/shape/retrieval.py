@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.workers import worker_pool
-from visup.percepts.shape.building.database_builder import PICTURES, read_silhouette
+from visup.percepts.shape.building.database_builder import IMAGE_SUFFIXES, read_silhouette
 from visup.percepts.shape.database.model_database import candidates_wanted
 from visup.percepts.shape.index.view_index import ViewIndex
 from visup.percepts.shape.matching.graph_matching import WEIGHTS, match_nodes
@@ -88,7 +88,7 @@ def _listed(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Pat
     found = [
         (sub.name, file)
         for sub in sorted(p for p in folder.iterdir() if p.is_dir())
-        for file in sorted(f for f in sub.iterdir() if f.suffix.lower() in PICTURES)[:limit]
+        for file in sorted(f for f in sub.iterdir() if f.suffix.lower() in IMAGE_SUFFIXES)[:limit]
     ]
     if len(found) < 2:
         raise SettingsError(

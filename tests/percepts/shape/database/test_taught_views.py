@@ -18,7 +18,7 @@ from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.building.database_builder import silhouette_views
 from visup.percepts.shape.database.file_format import OLDEST, VERSION, TaughtRow
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.taught.view import TaughtView, taught_mask, taught_view
+from visup.percepts.taught.taught_view import TaughtView, taught_view, taught_view_from_mask
 
 SQUARE = [(40, 20), (90, 20), (90, 60), (40, 60)]
 
@@ -48,7 +48,7 @@ def test_what_is_taught_is_read_back(
     """Every pixel and every number, whatever the size of the picture and of the outline."""
     mask = np.zeros((height, width), bool)
     mask[: max(5, int(share * height)), -max(5, int(share * width)) :] = True
-    view = taught_mask("a thing", picture(seed, (height, width)), mask)
+    view = taught_view_from_mask("a thing", picture(seed, (height, width)), mask)
     path = tmp_path_factory.mktemp("db") / "a.models"
     (read,) = ModelDatabase.open_or_new(path).teach([view]).taught
     assert same(view, read)
@@ -69,7 +69,7 @@ def test_a_silhouette_is_a_view_where_that_is_asked_for(tmp_path: Path) -> None:
     mask = np.zeros((300, 300), bool)
     mask[: ZOO["star"].shape[0], : ZOO["star"].shape[1]] = ZOO["star"]
     mask = np.roll(mask, (20, 20), (0, 1))
-    view = taught_mask("star", picture(0, (300, 300)), mask)
+    view = taught_view_from_mask("star", picture(0, (300, 300)), mask)
     shown = ModelDatabase.create(tmp_path / "a.models").teach([view], silhouettes=True)
     assert shown.query(np.rot90(ZOO["star"])).matches[0].similarity > 0.9
     bare = ModelDatabase.create(tmp_path / "b.models").teach([view])

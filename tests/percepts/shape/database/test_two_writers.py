@@ -12,7 +12,7 @@ from visup.agent.model.errors import OutputError
 from visup.agent.storage import file_lock
 from visup.agent.storage.file_lock import acquire_lock
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.taught.view import taught_view
+from visup.percepts.taught.taught_view import taught_view
 
 SQUARE = [[10.0, 10.0], [40.0, 10.0], [40.0, 40.0], [10.0, 40.0]]
 

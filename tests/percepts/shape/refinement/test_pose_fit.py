@@ -22,7 +22,7 @@ from visup.percepts.shape.refinement.mesh_model import (
     stored_mesh,
 )
 from visup.percepts.shape.refinement.pose_fit import fitted_poses
-from visup.percepts.shape.refinement.region_picture import SIDE, RegionPicture
+from visup.percepts.shape.refinement.region_image import SIDE, RegionImage
 from visup.render.meshes.spacecraft import spartan
 
 FAR = 8.0
@@ -33,7 +33,7 @@ def satellite() -> MeshModel:
     return mesh_model("satellite", mesh.vertices, mesh.faces)
 
 
-def drawn(model: MeshModel, orientation: NDArray[np.float64]) -> RegionPicture:
+def drawn(model: MeshModel, orientation: NDArray[np.float64]) -> RegionImage:
     """What a camera sees, lit from the upper left; drawn with the same loops."""
     side = (np.empty((len(model.vertices), 3)), np.empty((SIDE, SIDE)))
     number = np.empty((SIDE, SIDE), np.int32)
@@ -47,7 +47,7 @@ def drawn(model: MeshModel, orientation: NDArray[np.float64]) -> RegionPicture:
     normals *= np.where(normals[..., 2:] > 0, -1.0, 1.0)
     light = np.clip(normals @ np.array([-0.5, -0.6, -0.6]), 0, None)
     tone = np.where(number >= 0, 40 + 180 * light, 0.0)
-    return RegionPicture((number >= 0).astype(np.float64), tone, 1.0)
+    return RegionImage((number >= 0).astype(np.float64), tone, 1.0)
 
 
 def apart_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

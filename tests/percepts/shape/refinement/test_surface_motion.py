@@ -11,11 +11,11 @@ from visup.percepts.shape.refinement._pose_fit_jit import _draw, _project
 from visup.percepts.shape.refinement.mesh_model import MeshModel, mesh_model
 from visup.percepts.shape.refinement.pose_fit import USUAL_FOCAL, PoseFit
 from visup.percepts.shape.refinement.pose_refiner import _KnownOrientations
-from visup.percepts.shape.refinement.region_picture import region_picture
+from visup.percepts.shape.refinement.region_image import region_image
 from visup.percepts.shape.refinement.surface_motion import (
     FollowedSurface,
     followed_surface,
-    surface_picture,
+    surface_image,
 )
 from visup.render.meshes.spacecraft import spartan
 from visup.testing import region_of
@@ -48,7 +48,7 @@ def seen(model: MeshModel, turn: NDArray[np.float64], tones: int = 0) -> tuple[F
 
 def begun(model: MeshModel, true: NDArray[np.float64]) -> FollowedSurface:
     frame, region = seen(model, true)
-    picture = region_picture(frame, region)
+    picture = region_image(frame, region)
     focal = USUAL_FOCAL * SIDE
     surface = followed_surface(frame, region, model, picture, true[None], focal)
     assert surface is not None
@@ -85,7 +85,7 @@ def test_corners_of_the_outline_are_followed_only_beside_a_plain_background(
         noise = np.random.default_rng(2).integers(0, 255, (SIDE, SIDE, 3)).astype(np.uint8)
         image = np.where(mask[..., None], frame.image, noise)
         frame = Frame(0, 0.0, image)
-    picture = surface_picture(frame, region)
+    picture = surface_image(frame, region)
     assert picture is not None
     x, y, w, h = region.bbox
     height, width = picture.grey.shape

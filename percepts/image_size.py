@@ -1,4 +1,4 @@
-"""Picture sizes from headers, checked before memory is allocated for the pixels."""
+"""Image sizes from headers, checked before memory is allocated for the pixels."""
 
 from __future__ import annotations
 
@@ -6,44 +6,44 @@ import warnings
 from io import BytesIO
 
 MOST_PIXELS = 2**26
-"""Most pixels of a picture or frame, 67 million: twice an 8K frame. Beyond, decoding alone takes seconds and
+"""Most pixels of an image or frame, 67 million: twice an 8K frame. Beyond, decoding alone takes seconds and
 gigabytes."""
 _AT_MOST = f"visup decodes at most {MOST_PIXELS / 1e6:.0f} million"
 
 
-def picture_size(data: bytes) -> tuple[int, int] | None:
-    """Width and height of a picture file in pixels, or None where its header cannot be read.
+def image_size(data: bytes) -> tuple[int, int] | None:
+    """Width and height of an image file in pixels, or None where its header cannot be read.
 
     Raises:
-        ValueError: Pillow refuses the picture as too large to report its size.
+        ValueError: Pillow refuses the image as too large to report its size.
     """
     from PIL import Image
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(BytesIO(data)) as picture:
-                return picture.size
+            with Image.open(BytesIO(data)) as image:
+                return image.size
     except Image.DecompressionBombError as fault:
         raise ValueError(f"has far too many pixels; {_AT_MOST}") from fault
     except Exception:
-        # Pillow's readers may raise anything; the picture's decoder decides.
+        # Pillow's readers may raise anything; the image's decoder decides.
         return None
 
 
-def check_picture_size(data: bytes) -> None:
-    """Reject a picture that is too large to decode.
+def check_image_size(data: bytes) -> None:
+    """Reject an image that is too large to decode.
 
     Raises:
         ValueError: It is too large; the message says how large.
     """
-    size = picture_size(data)
+    size = image_size(data)
     if size is not None:
         check_pixels(*size)
 
 
 def check_pixels(width: float, height: float) -> None:
-    """Reject a picture with too many pixels.
+    """Reject an image with too many pixels.
 
     Raises:
         ValueError: They are too many.

@@ -1,4 +1,4 @@
-"""Pictures of taught views: each view's pixels with its outline, and the name below."""
+"""Images of taught views: each view's pixels with its outline, and the name below."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.taught.view import TaughtView
+from visup.percepts.taught.taught_view import TaughtView
 
 TILE = 200
 """Side of a view, pixels."""
@@ -19,7 +19,7 @@ _PAPER, _INK, _LINE = (255, 255, 255), (47, 39, 35), (60, 180, 255)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
-def taught_picture(views: Sequence[TaughtView]) -> NDArray[np.uint8]:
+def taught_views_sheet(views: Sequence[TaughtView]) -> NDArray[np.uint8]:
     """All views side by side, in rows.
 
     Args:

@@ -1,4 +1,4 @@
-"""Segmentation of the object at a point of a picture.
+"""Segmentation of the object at a point of an image.
 
 The region reachable from the point by colour steps below a threshold grows with the threshold, and jumps
 where it spills over the object's edge. The outline is the region before the greatest jump (as for maximally
@@ -16,38 +16,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 SIDE = 320
-"""Width to which the picture is reduced, pixels: finer detail is texture."""
+"""Width to which the image is reduced, pixels: finer detail is texture."""
 
 STEPS = np.arange(1.0, 60.0, 0.5)
 """Tested thresholds, in CIE L*a*b*; larger colour steps do not occur within one object."""
 
 LEAST, MOST = 0.0008, 0.15
-"""Shares of the picture that an object may cover: less is a speck, more is the ground."""
+"""Shares of the image that an object may cover: less is a speck, more is the ground."""
 
 LEAST_JUMP = math.log(1.5)
 """Least logarithmic growth of area that counts as spilling over an edge."""
 
-_CLOSED = 7  # holes and slits narrower than this are closed, pixels of the reduced picture
+_CLOSED = 7  # holes and slits narrower than this are closed, pixels of the reduced image
 
 
-def outline_at(
-    picture: NDArray[np.uint8], at: tuple[float, float]
+def outline_at_point(
+    image: NDArray[np.uint8], at: tuple[float, float]
 ) -> tuple[tuple[float, float], ...] | None:
     """The outline of the object at a point.
 
     Args:
-        picture: (H, W, 3) uint8, BGR.
-        at: (x, y) in the picture, pixels.
+        image: (H, W, 3) uint8, BGR.
+        at: (x, y) in the image, pixels.
 
     Returns:
         Corners (x, y) in order, pixels; None where no edge surrounds the point.
     """
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     if not (0 <= at[0] < width and 0 <= at[1] < height):
         return None
     by = min(1.0, SIDE / max(height, width))
     size = max(1, round(width * by)), max(1, round(height * by))
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     calm = cv2.bilateralFilter(small, 7, 30.0, 5.0)
     lab = cv2.cvtColor(calm.astype(np.float32) / np.float32(255.0), cv2.COLOR_BGR2Lab)
     seed = min(size[0] - 1, int(at[0] * by)), min(size[1] - 1, int(at[1] * by))
@@ -69,7 +69,7 @@ def _before_the_jump(lab: NDArray[np.float32], seed: tuple[int, int]) -> NDArray
     """(h, w) of 0 and 1: the region before the greatest jump; None without a jump."""
     whole = lab.shape[0] * lab.shape[1]
     found = [_reached(lab, seed, float(step)) for step in STEPS]
-    # Beyond the largest step the region would jump to the whole picture.
+    # Beyond the largest step the region would jump to the whole image.
     areas = [*(int(np.count_nonzero(m)) for m in found), whole]
     best, most = None, LEAST_JUMP
     for mask, (area, after) in zip(found, pairwise(areas), strict=True):

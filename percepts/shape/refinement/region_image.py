@@ -17,7 +17,7 @@ _MARGIN = 0.12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RegionPicture:
+class RegionImage:
     """A region resampled to a square.
 
     Attributes:
@@ -31,7 +31,7 @@ class RegionPicture:
     pixel: float
 
 
-def region_picture(frame: Frame, region: Region) -> RegionPicture:
+def region_image(frame: Frame, region: Region) -> RegionImage:
     """Resample a region.
 
     Args:
@@ -56,4 +56,4 @@ def region_picture(frame: Frame, region: Region) -> RegionPicture:
     warp = np.array([[1 / pixel, 0.0, shift[0]], [0.0, 1 / pixel, shift[1]]])
     cover = cv2.warpAffine(mask, warp, (SIDE, SIDE))
     tone = cv2.warpAffine(grey, warp, (SIDE, SIDE), borderMode=cv2.BORDER_REPLICATE)
-    return RegionPicture(np.clip(cover, 0, 1).astype(np.float64), tone.astype(np.float64), pixel)
+    return RegionImage(np.clip(cover, 0, 1).astype(np.float64), tone.astype(np.float64), pixel)

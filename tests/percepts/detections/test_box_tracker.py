@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from visup.percepts.detections.box_tracker import LEAST_OVERLAP, MOST_MISSED_FRAMES, MultiBoxTracker
 from visup.percepts.detections.boxes import Box, Detection, overlap
-from visup.percepts.detections.numbering import LEAST_OVERLAP, PATIENCE_FRAMES, BoxNumbering
 
 BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.floats(5, 40))
 NAMES = st.sampled_from([None, "cup", "hand"])
@@ -28,7 +28,7 @@ def found(boxes: list[tuple[Box, str | None]]) -> list[Detection]:
 def test_no_two_boxes_of_a_frame_share_a_number_and_a_number_keeps_its_name(
     frames: list[list[tuple[Box, str | None]]],
 ) -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     names: dict[int, str | None] = {}
     for index, boxes in enumerate(frames):
         given_ = found(boxes)
@@ -44,11 +44,11 @@ def test_no_two_boxes_of_a_frame_share_a_number_and_a_number_keeps_its_name(
 def test_a_state_that_was_saved_goes_on_as_the_one_that_was_not(
     frames: list[list[tuple[Box, str | None]]], chance: random.Random
 ) -> None:
-    one, other = BoxNumbering(), BoxNumbering()
+    one, other = MultiBoxTracker(), MultiBoxTracker()
     for index, boxes in enumerate(frames):
         if chance.random() < 0.5:
             state = json.loads(json.dumps(other.save()))
-            other = BoxNumbering()
+            other = MultiBoxTracker()
             other.load(state)
         assert one.number(index, found(boxes)) == other.number(index, found(boxes))
 
@@ -57,7 +57,7 @@ def test_a_state_that_was_saved_goes_on_as_the_one_that_was_not(
 def test_numbers_go_on_so_that_boxes_overlap_the_most_in_all(
     before: list[Box], now: list[Box]
 ) -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     numbering.number(0, found([(b, None) for b in before]))
     kept = numbering.number(1, found([(b, None) for b in now]))
 
@@ -94,13 +94,13 @@ def walker(frames: int, scores: Sequence[float]) -> list[list[Detection]]:
 def test_what_is_told_of_a_thing_follows_from_scores_and_from_its_coming_again(
     scores: list[float], told: bool
 ) -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     numbered = [numbering.number(k, boxes) for k, boxes in enumerate(walker(6, scores))]
     assert {d.track for boxes in numbered for d in boxes} == ({1} if told else set())
 
 
 def test_what_was_told_goes_before_what_was_not() -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     first = Detection(0, (20.0, 10.0, 10.0, 24.0), 0.9)
     assert [d.track for d in numbering.number(0, [first])] == [1]
     unsure = Detection(0, (24.0, 10.0, 10.0, 24.0), 0.4)  # begins a thing that is not believed yet
@@ -110,7 +110,7 @@ def test_what_was_told_goes_before_what_was_not() -> None:
 
 
 def test_a_sure_box_goes_before_a_nearer_one_that_is_unsure() -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     numbering.number(0, [Detection(0, (20.0, 10.0, 10.0, 24.0), 0.9)])
     near = Detection(0, (20.0, 10.0, 10.0, 24.0), 0.2)
     sure = Detection(0, (23.0, 10.0, 10.0, 24.0), 0.8)
@@ -118,7 +118,7 @@ def test_a_sure_box_goes_before_a_nearer_one_that_is_unsure() -> None:
 
 
 def test_who_passes_behind_another_keeps_its_number_by_how_it_moves() -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     for k in range(30):
         boxes: list[tuple[Box, str | None]] = [((50.0, 20.0, 10.0, 20.0), None)]
         if not 13 <= k <= 17:  # hidden for a moment
@@ -128,13 +128,13 @@ def test_who_passes_behind_another_keeps_its_number_by_how_it_moves() -> None:
 
 
 def test_who_was_away_for_long_is_somebody_new() -> None:
-    numbering = BoxNumbering()
+    numbering = MultiBoxTracker()
     box: list[tuple[Box, str | None]] = [((5.0, 5.0, 10.0, 10.0), "cup")]
     assert numbering.number(0, found(box))[0].track == 1
-    assert numbering.number(PATIENCE_FRAMES + 1, found(box))[0].track == 1
-    assert numbering.number(2 * PATIENCE_FRAMES + 3, found(box))[0].track == 2
+    assert numbering.number(MOST_MISSED_FRAMES + 1, found(box))[0].track == 1
+    assert numbering.number(2 * MOST_MISSED_FRAMES + 3, found(box))[0].track == 2
 
 
 def test_numbers_of_a_tracker_are_kept() -> None:
     boxes = [Detection(7, (0.0, 0.0, 9.0, 9.0)), Detection(3, (1.0, 0.0, 9.0, 9.0))]
-    assert list(BoxNumbering().number(0, boxes)) == boxes
+    assert list(MultiBoxTracker().number(0, boxes)) == boxes
