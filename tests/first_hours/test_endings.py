@@ -13,7 +13,7 @@ import cv2
 import pytest
 
 from tests.cli import Call
-from tests.clips import moving_disc
+from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
 from visup.agent import Frame, Step, Verdict
 from visup.runs.result import ExitCode, RunResult
@@ -129,7 +129,8 @@ def test_a_stop_signal_ends_a_run_with_its_own_code_and_a_report(
     tmp_path: Path, how: signal.Signals
 ) -> None:
     run = tmp_path / "run"
-    words = ["watch", BOTTLES, "--no-video", "--json", "--out", str(run)]
+    endless = write_clip(tmp_path / "clip.avi", moving_disc() * 50)
+    words = ["watch", str(endless), "--no-video", "--json", "--out", str(run)]
     process = subprocess.Popen(
         [sys.executable, "-m", "visup.cli", *words],
         stdout=subprocess.PIPE,
