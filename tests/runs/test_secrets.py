@@ -43,7 +43,7 @@ def server(tmp_path: Path) -> Iterator[http.server.ThreadingHTTPServer]:
     handler = functools.partial(Quiet, directory=str(folder))
     made = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     made.bodies = []  # type: ignore[attr-defined]
-    threading.Thread(target=made.serve_forever, daemon=True).start()
+    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
     yield made
     made.shutdown()
     made.server_close()
@@ -72,8 +72,12 @@ def leaks(*texts: bytes, folder: Path) -> list[str]:
 
 
 def test_a_run_keeps_the_password_to_itself(
-    visup: Call, server: http.server.ThreadingHTTPServer, tmp_path: Path
+    visup: Call,
+    server: http.server.ThreadingHTTPServer,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("visup.sinks.webhook.FIRST_WAIT_S", 0.05)
     hook = f"webhook:http://guard:{WORDS[0]}@127.0.0.1:{server.server_port}/{WORDS[1]}"
     lost = f"webhook:http://127.0.0.1:1/services/{WORDS[1]}"
     sinks = ["--sink", hook, "--sink", lost, "--sink", "file:alerts.jsonl"]

@@ -146,7 +146,7 @@ def server(*codes: int) -> Iterator[tuple[str, list[bytes]]]:
             pass
 
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as web:
-        thread = threading.Thread(target=web.serve_forever)
+        thread = threading.Thread(target=web.serve_forever, args=(0.02,))
         thread.start()
         yield f"http://127.0.0.1:{web.server_address[1]}/x", bodies
         web.shutdown()

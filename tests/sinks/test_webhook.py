@@ -68,8 +68,8 @@ def without_end(begin: bytes, more: bytes, pause_s: float = 0.0) -> Answer:
     return answer
 
 
-def hook(url: str) -> Webhook:
-    return Webhook(url, timeout_s=0.5, tries=2, wait=lambda seconds: None)
+def hook(url: str, timeout_s: float = 0.5) -> Webhook:
+    return Webhook(url, timeout_s=timeout_s, tries=2, wait=lambda seconds: None)
 
 
 @pytest.mark.parametrize("status", [301, 302, 303, 307, 308])
@@ -90,19 +90,19 @@ def test_no_redirect_is_followed_and_none_counts_as_delivered(status: int, schem
     [
         without_end(b"HTTP/1.1 200 OK\r\n", b"X-More: and more\r\n"),
         without_end(b"HTTP/1.1 200 OK\r\nX: ", b"y"),
-        without_end(b"", b"H", 0.1),
-        without_end(b"HTTP/1.1 200 ", b"O", 0.1),
+        without_end(b"", b"H", 0.05),
+        without_end(b"HTTP/1.1 200 ", b"O", 0.05),
         says(b"nonsense\r\n\r\n"),
         says(b"HTTP/1.1 abc OK\r\n\r\n"),
         says(b""),
-        lambda client: time.sleep(1.5),
+        lambda client: time.sleep(0.6),
     ],
 )
 def test_an_answer_without_end_ends_in_time(answer: Answer) -> None:
     with server(answer) as (url, _):
         begin = time.monotonic()
         with pytest.raises(OSError, match=r"."):
-            hook(url).deliver({"a": 1})
+            hook(url, timeout_s=0.2).deliver({"a": 1})
         assert time.monotonic() - begin < 4.0
 
 

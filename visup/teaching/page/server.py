@@ -29,6 +29,9 @@ HOST = "127.0.0.1"
 MOST_BODY = 1 << 22
 """Bytes that are read of a request at most."""
 
+POLL_S = 0.05
+"""Seconds after which the server sees that it is to end; by default `socketserver` takes half of one."""
+
 _STATIC = {
     "": ("page.html", "text/html; charset=utf-8"),
     "page.js": ("page.js", "text/javascript; charset=utf-8"),
@@ -77,7 +80,8 @@ class TeachingPage:
         return f"http://{HOST}:{self.port}{self.prefix}"
 
     def __enter__(self) -> Self:
-        Thread(target=self._server.serve_forever, name="teaching page", daemon=True).start()
+        target = self._server.serve_forever
+        Thread(target=target, args=(POLL_S,), name="teaching page", daemon=True).start()
         return self
 
     def __exit__(
