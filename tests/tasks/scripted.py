@@ -34,6 +34,8 @@ from visup.tasks.supervision.supervise import task_reasoner
 
 DOCK = load_task("dock")
 
+FPS = 5.0
+"""Of most plays: a step takes milliseconds, and what is supervised is told alike at any rate."""
 ARM, SATELLITE, INTRUDER = 1, 2, 3
 IDENTITIES: Mapping[int, Mapping[str, float]] = {
     ARM: {"arm": 0.7, "guitar": 0.3},
@@ -194,7 +196,7 @@ class Played:
         return [(e.kind, str(e.data.get("stage", ""))) for e in self.events]
 
 
-def play(reasoner: Reasoner, script: Script, until: float, fps: float = 10.0) -> Played:
+def play(reasoner: Reasoner, script: Script, until: float, fps: float = FPS) -> Played:
     """Let a reasoner live through a script."""
     mind, minds, outcomes = Mind(), [], []
     for index in range(round(until * fps) + 1):
@@ -207,7 +209,7 @@ def play(reasoner: Reasoner, script: Script, until: float, fps: float = 10.0) ->
     return Played(tuple(minds), tuple(outcomes))
 
 
-def watch(script: Script, until: float, text: str = "", fps: float = 10.0) -> Played:
+def watch(script: Script, until: float, text: str = "", fps: float = FPS) -> Played:
     """The play of a task, that of docking unless another is given."""
     return play(task_reasoner([parse_task(text) if text else DOCK]), script, until, fps)
 

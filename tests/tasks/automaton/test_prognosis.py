@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from tests.tasks.scripted import Played, Script, Spell, play
+from tests.tasks.scripted import FPS, Played, Script, Spell, play
 from visup.agent import TaskBelief, Verdict
 from visup.tasks import load_task, parse_task
 from visup.tasks.automaton.hidden_phases import hidden_filter
@@ -27,7 +27,7 @@ SUCCEEDS = (
 )
 
 
-def watch(*spells: Spell, until: float = 26.0, text: str = "", fps: float = 10.0) -> Played:
+def watch(*spells: Spell, until: float = 26.0, text: str = "", fps: float = FPS) -> Played:
     task = parse_task(text) if text else load_task("dock")
     return play(task_reasoner([task]), Script(spells), until, fps)
 
@@ -41,7 +41,7 @@ def test_hypotheses_share_all_probability_and_what_is_told_is_a_marginal(
     spells: tuple[Spell, ...],
 ) -> None:
     played = watch(*spells)
-    for mind in played.minds[5:]:
+    for mind in played.minds[3:]:
         weighted = mind.memory["tasks"][0].posterior.hypotheses.values()
         masses = [w.mass for w in weighted]
         assert math.isclose(sum(masses), 1.0)
@@ -82,7 +82,7 @@ def test_what_comes_next_is_told_with_its_probability() -> None:
 def test_what_comes_next_has_room_for_what_ends_well() -> None:
     """What fails is not told to go to its end with 93 % and to end well with 27 % at once."""
     played = watch(*FAILS)
-    for mind in played.minds[5:]:
+    for mind in played.minds[3:]:
         (task,) = mind.tasks
         coming = sum(p.probability for p in task.prospects)
         assert task.success is not None

@@ -321,7 +321,7 @@ def test_a_file_may_hold_several_tasks(tmp_path: Path) -> None:
         load_task(file)
     with pytest.raises(TaskError, match=r"no task `land`[\s\S]*dock, meet"):
         load_task(f"{file}:land")
-    played = play(task_reasoner([dock, meet]), Script((NEARS, MEETS)), 15.0)
+    played = play(task_reasoner([dock, meet]), Script((NEARS, MEETS)), 15.0, fps=10.0)
     assert [finish(t) for t in played.last.tasks] == [Verdict.IN_PROGRESS, Verdict.SUCCEEDED]
 
 

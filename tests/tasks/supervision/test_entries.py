@@ -125,7 +125,7 @@ def test_what_held_until_the_other_was_confirmed_has_held_with_it(
         Spell("diverging", 5.3, 12.0, hold),
     )
     script = Script(told, dict.fromkeys((ARM, SATELLITE, INTRUDER), (0.0, 1000000000.0)))
-    played = play(task_reasoner([parse_task(PUT)]), script, 10.0)
+    played = play(task_reasoner([parse_task(PUT)]), script, 10.0, fps=10.0)
     fails = [
         m.time
         for m in played.minds

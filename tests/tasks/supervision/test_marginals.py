@@ -73,7 +73,7 @@ def test_a_stage_that_is_done_is_told_so_in_whatever_order(
 
 def test_the_confidence_in_a_stage_is_the_mass_of_all_orders_in_which_it_is_done() -> None:
     played = followed(3, "touching", "touching", 2.0, (0, 1, 2))
-    for mind in played.minds[25:]:
+    for mind in played.minds[12:]:
         weighted = mind.memory["tasks"][0].posterior.hypotheses.values()
         for stage in mind.tasks[0].stages:
             if stage.status is Status.DONE:

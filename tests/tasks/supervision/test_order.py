@@ -324,4 +324,5 @@ def test_what_follows_eight_touches_in_any_order_is_reached(lasts: float) -> Non
     meetings.append((10, 20.0, 1e9))
     spells = tuple(Spell("touching", since, until, (TOP, leg)) for leg, since, until in meetings)
     script = Script(spells, objects=dict.fromkeys(names, (0.0, 1e9)), identities=names)
-    assert verdict(text, script, 24.0) is Verdict.SUCCEEDED
+    played = play(task_reasoner([parse_task(text)]), script, 24.0, fps=10.0)
+    assert finish(task_of(played)) is Verdict.SUCCEEDED
