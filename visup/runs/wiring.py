@@ -26,7 +26,7 @@ from visup.percepts.detections import (
 )
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
-from visup.percepts.motion.resting import RestingMotion
+from visup.percepts.motion.pausing import PausingMotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.video import VideoSource, open_source
@@ -283,7 +283,7 @@ def _behaviours(
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
     taught = database.taught if database is not None else ()
-    eyes = RestingMotion(settings.rest_s) if settings.rest_s else MotionBehaviour()
+    eyes = PausingMotionBehaviour(settings.rest_s) if settings.rest_s else MotionBehaviour()
     moving: Behaviour = AppearanceBehaviour(taught) if taught else eyes
     if places:
         moving = PlacedObjectBehaviour(places, taught)

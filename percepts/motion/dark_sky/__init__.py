@@ -5,6 +5,6 @@ tracked body), `splitting.py` (division of a component among bodies that touch i
 (data association from frame to frame), `reporting.py` (gives moving regions the outlines of bodies, and
 reports bodies that drift slowly), then `sky_segmenter.py`, which runs all of these on a frame.
 
-Names used throughout: the *look* of a body is its appearance template, `tone` is the brightness of pixels,
-and the *ground* is the background whose motion shows that of the camera.
+Names used throughout: `tone` is the brightness of pixels, and the *ground* is the background whose motion
+shows that of the camera.
 """

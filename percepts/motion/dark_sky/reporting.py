@@ -15,7 +15,8 @@ from visup.percepts.motion.dark_sky.tracking import Bodies
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-OVER = 0.5  # share of a region's bright pixels that must be a body's for the region to belong to it
+LEAST_OVERLAP = 0.5
+"""Share of a region's bright pixels that must be a body's for the region to belong to it."""
 BRIGHT = 0.3  # share of a region that must be brighter than the sky
 COVERED = 0.6  # share of a body cut by the border that must move; otherwise it is background
 SIGMA = 1.0  # standard deviation of a velocity measured on a body's path, pixels per second
@@ -31,14 +32,14 @@ def bodies_with_ids(
 
     Args:
         bodies: The bodies.
-        members: The moving regions of each, from `members_of`; a body takes over the id of one, if it can.
+        members: The moving regions of each, from `regions_of_bodies`; a body takes over the id of one.
         ids: Allocates new ids.
         diagonal: Of the image, frame pixels.
     """
     used = {b.id for b in bodies}
     out = []
     for body, regions in zip(bodies, members, strict=True):
-        if body.id == 0 and (regions or body.drifted(diagonal) or body.stands_alone):
+        if body.id == 0 and (regions or body.has_drifted(diagonal) or body.is_fully_visible):
             free = [r.id for r in regions if r.id not in used]
             body = replace(body, id=min(free, default=0) or ids.new())
             used.add(body.id)
@@ -46,7 +47,9 @@ def bodies_with_ids(
     return tuple(out)
 
 
-def members_of(bodies: Bodies, regions: Regions, bright: Mask, now: float) -> list[list[Region]]:
+def regions_of_bodies(
+    bodies: Bodies, regions: Regions, bright: Mask, now: float
+) -> list[list[Region]]:
     """For each body, the moving regions that lie mainly on it.
 
     Args:
@@ -64,7 +67,10 @@ def members_of(bodies: Bodies, regions: Regions, bright: Mask, now: float) -> li
         if lit < BRIGHT * region.area:
             continue
         for k, body in enumerate(bodies):
-            if body.seen == now and np.count_nonzero(mine & body.visible[part]) > OVER * lit:
+            if (
+                body.last_seen == now
+                and np.count_nonzero(mine & body.visible[part]) > LEAST_OVERLAP * lit
+            ):
                 found[k].append(region)
     return [_unless_ground(b, some) for b, some in zip(bodies, found, strict=True)]
 
@@ -81,7 +87,7 @@ def _unless_ground(body: SkyBody, regions: list[Region]) -> list[Region]:
     return regions if np.count_nonzero(covered & body.visible) > enough else []
 
 
-def regions_of(
+def reported_regions(
     bodies: Bodies, members: Sequence[Sequence[Region]], regions: Regions, now: float
 ) -> Regions:
     """The regions to report: one for each body with an id, and the moving ones that are not of a body; by id.
@@ -92,11 +98,11 @@ def regions_of(
 
     Args:
         bodies: The bodies, from `bodies_with_ids`.
-        members: The moving regions of each, from `members_of`.
+        members: The moving regions of each, from `regions_of_bodies`.
         regions: All moving regions.
         now: Time of the frame, seconds.
     """
-    kept = [(b, m) for b, m in zip(bodies, members, strict=True) if b.id and b.seen == now]
+    kept = [(b, m) for b, m in zip(bodies, members, strict=True) if b.id and b.last_seen == now]
     taken = {r.id for _, m in kept for r in m} | {b.id for b, _ in kept}
     others = [r for r in regions if r.id not in taken]
     return tuple(sorted([*others, *(_region(b, m) for b, m in kept)], key=lambda r: r.id))

@@ -6,9 +6,13 @@ import numpy as np
 
 from visup.agent import Frame, Region
 from visup.percepts.motion.dark_sky.body import Point
-from visup.percepts.motion.dark_sky.reporting import bodies_with_ids, members_of, regions_of
+from visup.percepts.motion.dark_sky.reporting import (
+    bodies_with_ids,
+    regions_of_bodies,
+    reported_regions,
+)
 from visup.percepts.motion.dark_sky.sky import bright_components, brightness
-from visup.percepts.motion.dark_sky.tracking import Bodies, SkyFrame, follow
+from visup.percepts.motion.dark_sky.tracking import Bodies, SkyFrame, track_bodies
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_region_area
@@ -18,7 +22,7 @@ class DarkSkySegmenter:
     """Replaces moving regions by the bodies in front of a dark sky that they lie on; one per video.
 
     Also reports bodies without a moving region, once they have drifted relative to the ground, or stand alone
-    (`SkyBody.stands_alone`).
+    (`SkyBody.is_fully_visible`).
     """
 
     def __init__(self) -> None:
@@ -80,9 +84,9 @@ class DarkSkySegmenter:
             self._bodies = ()
             return regions
         here = SkyFrame(tone, found, frame.time, self._ground)
-        bodies = follow(self._bodies, here, self._last_key + 1)
+        bodies = track_bodies(self._bodies, here, self._last_key + 1)
         self._last_key = max([self._last_key, *(b.key for b in bodies)])
-        members = members_of(bodies, regions, found.bright, frame.time)
+        members = regions_of_bodies(bodies, regions, found.bright, frame.time)
         diagonal = float(np.hypot(*frame.size))
         self._bodies = bodies_with_ids(bodies, members, ids, diagonal)
-        return regions_of(self._bodies, members, regions, frame.time)
+        return reported_regions(self._bodies, members, regions, frame.time)

@@ -9,36 +9,44 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.dark_sky.body import BodyLook, Corner, SkyBody, Slices, overlap
+from visup.percepts.motion.dark_sky.body import (
+    BodyTemplate,
+    Corner,
+    SkyBody,
+    Slices,
+    template_overlap,
+)
 from visup.percepts.motion.dark_sky.sky import Mask
 
 Tones = NDArray[np.uint8]
 
 REACH = 4  # search range around the predicted position, pixels
-ALIKE = 30.0  # greatest RMS difference of levels at which a template matches
-STRAY = 10.0  # penalty on the mean squared difference per squared pixel from the predicted position
-FEW = 16  # fewest pixels on which templates are compared
-HELD = 0.7  # factor on the difference of a body that was in front of the other one before
+MOST_DIFFERENCE = 30.0  # greatest RMS difference of levels at which a template matches
+DISTANCE_PENALTY = 10.0
+"""Added to the mean squared difference per squared pixel from the predicted position."""
+FEWEST_PIXELS = 16  # fewest pixels on which templates are compared
+WAS_IN_FRONT_FACTOR = 0.7
+"""Factor on the difference of a body that was in front of the other one before."""
 
 _STEPS = np.arange(-REACH, REACH + 1, dtype=np.float32) ** 2
-_FAR = _STEPS[:, None] + _STEPS
+_SQUARED_DISTANCES = _STEPS[:, None] + _STEPS
 """Squared distances of the searched positions from the predicted one, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Share:
+class ComponentShare:
     """The part of a component that belongs to a body.
 
     Attributes:
         mask: (H, W) bool, its visible pixels.
-        covers: Keys of the bodies behind it.
+        occludes: Keys of the bodies behind it.
     """
 
     mask: Mask
-    covers: frozenset[int]
+    occludes: frozenset[int]
 
 
-def placed(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
+def locate(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
     """Locate a body that touches others, by matching its template near the predicted position.
 
     Args:
@@ -50,33 +58,41 @@ def placed(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
         The corner (x, y) of its box, frame pixels, and whether the template matches there; if it matches
         nowhere, the predicted corner and False.
     """
-    x, y = body.expected(now)
-    look, (dx, dy) = _within(body.look, (x, y), tone.shape)
-    h, w = look.mask.shape
+    x, y = body.predicted_corner(now)
+    template, (dx, dy) = _inside_image(body.template, (x, y), tone.shape)
+    h, w = template.mask.shape
     window = tone[y + dy - REACH : y + dy + h + REACH, x + dx - REACH : x + dx + w + REACH]
-    area = np.count_nonzero(look.mask)
-    if area < FEW or window.shape != (h + 2 * REACH, w + 2 * REACH):
+    area = np.count_nonzero(template.mask)
+    if area < FEWEST_PIXELS or window.shape != (h + 2 * REACH, w + 2 * REACH):
         return (x, y), False
-    cost = cv2.matchTemplate(window, look.tone, cv2.TM_SQDIFF, mask=look.mask.view(np.uint8)) / area
-    _, _, at, _ = cv2.minMaxLoc(cost + STRAY * _FAR)
-    fits = bool(cost[at[1], at[0]] <= ALIKE**2)
+    cost = (
+        cv2.matchTemplate(window, template.tone, cv2.TM_SQDIFF, mask=template.mask.view(np.uint8))
+        / area
+    )
+    _, _, at, _ = cv2.minMaxLoc(cost + DISTANCE_PENALTY * _SQUARED_DISTANCES)
+    fits = bool(cost[at[1], at[0]] <= MOST_DIFFERENCE**2)
     return ((x - REACH + at[0], y - REACH + at[1]) if fits else (x, y)), fits
 
 
-def _within(look: BodyLook, corner: Corner, shape: tuple[int, ...]) -> tuple[BodyLook, Corner]:
+def _inside_image(
+    template: BodyTemplate, corner: Corner, shape: tuple[int, ...]
+) -> tuple[BodyTemplate, Corner]:
     """The part of a template that stays in the image at all searched positions, and its offset (x, y)."""
     x, y = corner
-    h, w = look.mask.shape
+    h, w = template.mask.shape
     left, top = max(REACH - x, 0), max(REACH - y, 0)
     right, bottom = min(w, shape[1] - REACH - x), min(h, shape[0] - REACH - y)
     part = np.s_[top : max(bottom, top), left : max(right, left)]
-    tone, mask = np.ascontiguousarray(look.tone[part]), np.ascontiguousarray(look.mask[part])
-    return BodyLook(mask, tone, look.corner), (left, top)
+    tone, mask = (
+        np.ascontiguousarray(template.tone[part]),
+        np.ascontiguousarray(template.mask[part]),
+    )
+    return BodyTemplate(mask, tone, template.corner), (left, top)
 
 
-def split(
+def split_component(
     tone: Tones, union: Mask, bodies: Sequence[SkyBody], corners: Sequence[Corner]
-) -> tuple[Share, ...]:
+) -> tuple[ComponentShare, ...]:
     """Divide the bright pixels of a component among bodies that touch in the image.
 
     Where the templates of two bodies overlap, the one that matches the pixels better is in front. Pixels
@@ -87,30 +103,30 @@ def split(
         tone: (H, W) uint8, brightness of the frame.
         union: (H, W) bool, bright pixels of the component that the bodies share.
         bodies: At least one body.
-        corners: (x, y) of the box of each, frame pixels, from `placed`.
+        corners: (x, y) of the box of each, frame pixels, from `locate`.
 
     Returns:
         The share of each body, in order.
     """
     x, y, w, h = cv2.boundingRect(union.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
-    places = [
-        _PlacedLook(b, (at[0] - x, at[1] - y), union[part])
+    placed_templates = [
+        _PlacedTemplate(b, (at[0] - x, at[1] - y), union[part])
         for b, at in zip(bodies, corners, strict=True)
     ]
-    fronts = [frozenset(_behind(p, places, tone[part])) for p in places]
+    occluded = [frozenset(_behind(p, placed_templates, tone[part])) for p in placed_templates]
     owner = np.full((h, w), -1, np.int8)
-    for k in sorted(range(len(places)), key=lambda k: (len(fronts[k]), -bodies[k].key)):
-        owner[places[k].mask] = k
-    left = union[part] & (owner < 0)
-    if len(bodies) > 1 and left.any():
-        owner[left] = _nearest([owner == k for k in range(len(bodies))])[left]
+    for k in sorted(range(len(placed_templates)), key=lambda k: (len(occluded[k]), -bodies[k].key)):
+        owner[placed_templates[k].mask] = k
+    unassigned = union[part] & (owner < 0)
+    if len(bodies) > 1 and unassigned.any():
+        owner[unassigned] = _nearest([owner == k for k in range(len(bodies))])[unassigned]
     masks = [_in_image(owner == k, part, union.shape) for k in range(len(bodies))]
-    return tuple(Share(m, f) for m, f in zip(masks, fronts, strict=True))
+    return tuple(ComponentShare(m, f) for m, f in zip(masks, occluded, strict=True))
 
 
-class _PlacedLook:
-    """The template of a body placed in a window of the image.
+class _PlacedTemplate:
+    """The template of a body, placed in a window of the image.
 
     Attributes:
         body: The body.
@@ -121,33 +137,40 @@ class _PlacedLook:
     def __init__(self, body: SkyBody, corner: Corner, bright: Mask) -> None:
         self.body, self.corner = body, corner
         self.mask = np.zeros(bright.shape, bool)
-        inside, part = overlap(body.look, corner, (bright.shape[0], bright.shape[1]))
-        self.mask[inside] = body.look.mask[part] & bright[inside]
+        inside, part = template_overlap(body.template, corner, (bright.shape[0], bright.shape[1]))
+        self.mask[inside] = body.template.mask[part] & bright[inside]
 
-    def unlike(self, tone: Tones, where: Mask) -> float:
+    def difference(self, tone: Tones, where: Mask) -> float:
         """Mean absolute difference of levels between window and template over `where`, (h, w) bool."""
-        inside, part = overlap(self.body.look, self.corner, (tone.shape[0], tone.shape[1]))
-        gap = cv2.absdiff(tone[inside], np.ascontiguousarray(self.body.look.tone[part]))
+        inside, part = template_overlap(
+            self.body.template, self.corner, (tone.shape[0], tone.shape[1])
+        )
+        gap = cv2.absdiff(tone[inside], np.ascontiguousarray(self.body.template.tone[part]))
         return float(gap[where[inside]].mean())
 
 
-def _behind(one: _PlacedLook, places: Sequence[_PlacedLook], tone: Tones) -> list[int]:
+def _behind(
+    one: _PlacedTemplate, placed_templates: Sequence[_PlacedTemplate], tone: Tones
+) -> list[int]:
     """Keys of the bodies that are behind `one`."""
-    return [o.body.key for o in places if o is not one and _covers(one, o, tone)]
+    return [o.body.key for o in placed_templates if o is not one and _is_in_front(one, o, tone)]
 
 
-def _covers(one: _PlacedLook, other: _PlacedLook, tone: Tones) -> bool:
+def _is_in_front(one: _PlacedTemplate, other: _PlacedTemplate, tone: Tones) -> bool:
     """Whether one body is in front of another: its template matches better where both overlap.
 
     If they hardly overlap, the order is as in the last frame; ties go to the larger body.
     """
-    before, after = other.body.key in one.body.covers, one.body.key in other.body.covers
+    was_in_front, was_behind = (
+        other.body.key in one.body.occludes,
+        one.body.key in other.body.occludes,
+    )
     both = one.mask & other.mask
-    if np.count_nonzero(both) < FEW:
-        return before
-    mine = one.unlike(tone, both) * (HELD if before else 1)
-    yours = other.unlike(tone, both) * (HELD if after else 1)
-    return (mine, -one.body.area) < (yours, -other.body.area)
+    if np.count_nonzero(both) < FEWEST_PIXELS:
+        return was_in_front
+    cost = one.difference(tone, both) * (WAS_IN_FRONT_FACTOR if was_in_front else 1)
+    other_cost = other.difference(tone, both) * (WAS_IN_FRONT_FACTOR if was_behind else 1)
+    return (cost, -one.body.area) < (other_cost, -other.body.area)
 
 
 def _in_image(mask: Mask, part: Slices, shape: tuple[int, ...]) -> Mask:

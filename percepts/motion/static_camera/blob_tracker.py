@@ -29,11 +29,11 @@ from visup.percepts.motion.static_camera.blob_track import (
     template_window,
     tone_histogram,
 )
-from visup.percepts.motion.static_camera.bodies import (
+from visup.percepts.motion.static_camera.side_by_side import (
     APART,
-    are_bodies,
-    body_width,
-    with_bodies_apart,
+    are_side_by_side,
+    person_width,
+    split_people,
 )
 from visup.percepts.motion.static_camera.templates import best_template_shift, split_blob
 
@@ -58,8 +58,8 @@ def track_blobs(known: BlobTracks, view: Foreground, last_key: int) -> tuple[Blo
         All tracks, including hidden ones; the greatest key assigned.
     """
     ahead = [_predicted(s, view.seconds) for s in known]
-    slender = body_width(ahead)
-    view = with_bodies_apart(view, ahead, slender)
+    slender = person_width(ahead)
+    view = split_people(view, ahead, slender)
     claims = _claims(ahead, view)
     out: list[BlobTrack] = []
     taken = np.zeros(view.count + 1, dtype=bool)
@@ -172,7 +172,7 @@ def _merged_parts(
     # A static occluder, such as a post, splits an object only until the object has passed it.
     two = s.split_px > PASSED * max(s.shape.shape)
     for part in order[1:]:
-        bodies = s.split_px > 0 and are_bodies(_box(whole), _box(part), slender)
+        bodies = s.split_px > 0 and are_side_by_side(_box(whole), _box(part), slender)
         if (two or bodies) and _is_large_part(part, whole):
             others.append(part)
             continue

@@ -9,7 +9,8 @@ from visup.percepts.motion.layers.affine import STILL, Affine, distances
 from visup.percepts.motion.layers.dominant_motion import BALANCE_GRID
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
-TELLS = 16.0  # least information of a point that would reveal motion, 1 / pixels squared
+LEAST_FILLED_CELLS = 16.0
+"""Least information of a point that would reveal motion, 1 / pixels squared."""
 FITS = 9.0  # squared Mahalanobis distance up to which a point fits a static camera
 SPREAD = 0.5  # least share of the grid cells that must hold points with that information
 RESTS = 0.85  # least share of those cells that fit when the camera is static
@@ -34,7 +35,7 @@ def is_camera_static(scene: FrameMeasurements) -> bool | None:
 def _still_share(scene: FrameMeasurements, number: int) -> float | None:
     """Share of the grid cells at rest in one measurement; None if too few cells hold points."""
     c = scene.measured[number].constraints
-    use = c.information[:, 0] + c.information[:, 2] > TELLS
+    use = c.information[:, 0] + c.information[:, 2] > LEAST_FILLED_CELLS
     use &= scene.owner[scene.cell_of(c)] == 0
     rows, cols = BALANCE_GRID
     place = grid_cells(c.xy, scene.image.shape, BALANCE_GRID)[use]

@@ -42,11 +42,11 @@ from visup.percepts.motion.static_camera.blob_track import (
 )
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
 from visup.percepts.motion.static_camera.camera_static import is_camera_static
-from visup.percepts.motion.static_camera.slow_parts import (
+from visup.percepts.motion.static_camera.slow_motion import (
     GroundBelief,
-    SlowChange,
-    hardly_moves,
-    with_slow_parts,
+    SlowChangeDetector,
+    extend_by_slow_parts,
+    is_nearly_still,
 )
 from visup.percepts.motion.static_camera.track_fusion import (
     FusionFrame,
@@ -57,9 +57,8 @@ from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 REST_S = 1.0  # how long the camera must be static before the background is used, seconds
-LONGEST_S = (
-    4.0  # most time at rest, seconds, that is credited against frames with too little structure
-)
+LONGEST_S = 4.0
+"""Most time at rest, seconds, that is credited against frames with too little structure."""
 FLOODED = 0.6  # foreground share of the image above which the view itself has changed
 MANY_CELLS = 15  # superpixels from which the layers resolve the outline of a region well
 YOUNG_S = 0.3  # how long a track that was never reported is continued while missed, seconds
@@ -78,7 +77,7 @@ class StaticCameraSegmenter:
     """
 
     def __init__(self) -> None:
-        self._slow = SlowChange()
+        self._slow = SlowChangeDetector()
         self._forget()
         self._fusion = TrackFusion()
 
@@ -88,7 +87,7 @@ class StaticCameraSegmenter:
         self._time = self._since = self._static_s = 0.0
         self._last_key = 0
         self._bare = GroundBelief()
-        self._slow.forget()
+        self._slow.reset()
         self.active = False
 
     def step(
@@ -114,7 +113,7 @@ class StaticCameraSegmenter:
             Regions by id: those of the layers unless the camera is static.
         """
         regions = self._completed(scene, regions, frame.size)
-        fresh = [r for r in regions if not self._fusion.knows(r.id)]
+        fresh = [r for r in regions if not self._fusion.was_seen_recently(r.id)]
         self._fusion.note(regions, frame.time, settings.memory_s)
         many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
         foreground = self._foreground(frame, scene, regions, fresh, settings)
@@ -138,19 +137,20 @@ class StaticCameraSegmenter:
         old = [
             r
             for r in regions
-            if (not self.active or self._fusion.is_old(r.id)) and hardly_moves(r.velocity, scale)
+            if (not self.active or self._fusion.predates_background(r.id))
+            and is_nearly_still(r.velocity, scale)
         ]
         if self._static_s <= 0 or (self.active and not old):
-            self._slow.forget()
+            self._slow.reset()
             return tuple(regions)
-        self._slow.note(scene.image)
-        slow = self._slow.pixels() if old else None
+        self._slow.update(scene.image)
+        slow = self._slow.changed_pixels() if old else None
         if slow is None:
             return tuple(regions)
         slowly = {r.id for r in old}
         others = [r for r in regions if r.id not in slowly]
-        known, parts = with_slow_parts(old, others, slow, self._bare.share, scene, size)
-        self._slow.keep(parts)
+        known, parts = extend_by_slow_parts(old, others, slow, self._bare.share, scene, size)
+        self._slow.set_parts(parts)
         whole = {r.id: r for r in known}
         return tuple(whole.get(r.id, r) for r in regions)
 
@@ -196,7 +196,7 @@ class StaticCameraSegmenter:
         reported = region_mask(regions, frame.size, shape)
         self._background = background
         reveal_background(background, image, ~reported)
-        self._bare.cover(reported)
+        self._bare.reset(reported)
 
     def _is_static(self, static: bool | None, seconds: float) -> bool:
         """Whether the camera is static, as far as known; otherwise the state is reset."""

@@ -18,18 +18,20 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.static_camera.blob_filters import is_salient_blob
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, Foreground
-from visup.percepts.motion.static_camera.bodies import SLENDER, are_bodies
+from visup.percepts.motion.static_camera.side_by_side import SLENDER, are_side_by_side
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-KNOWN = 0.4  # foreground share of a region from which background subtraction shows it
-COMMON = 0.5  # least overlap of two outlines of one object, as a share of the smaller
-WHOLE = 0.6  # intersection over union above which background subtraction shows all of an object
-MAIN = 0.4  # least share of a region that a blob must fill to take over its id: a limb fills less
-MISSED = 0.15  # share of a region's motion evidence outside of the foreground, above which parts are missed
-PIECE = 0.35  # least size of a body in a region, as a share of the largest body there
-LARGE = 4.0  # least area of a region of which parts may be missed, in `well_known_area`
-RECENT = 0.9  # decay factor of motion evidence per frame
-BESIDE = 5  # tolerance, pixels: points lie on edges, half of them outside of the blob
+FOREGROUND_SHARE = 0.4  # foreground share of a region from which background subtraction shows it
+LEAST_OVERLAP = 0.5  # least overlap of two outlines of one object, as a share of the smaller
+WHOLE_IOU = 0.6  # intersection over union above which background subtraction shows all of an object
+MAIN_SHARE = 0.4
+"""Least share of a region that a blob must fill to take over its id: a limb fills less."""
+MISSED_SHARE = 0.15
+"""Share of a region's motion evidence outside of the foreground, above which parts are missed."""
+LEAST_SIZE = 0.35  # least size of a body in a region, as a share of the largest body there
+LARGE_FACTOR = 4.0  # least area of a region of which parts may be missed, in `well_known_area`
+EVIDENCE_DECAY = 0.9  # decay factor of motion evidence per frame
+NEAR_PX = 5  # tolerance, pixels: points lie on edges, half of them outside of the blob
 LEAST_AREA = 0.0005  # least area of an object when first reported, as a share of the image
 
 
@@ -69,20 +71,19 @@ class TrackFusion:
     def __init__(self) -> None:
         # All by the layers' id of a region.
         self._last: dict[int, float] = {}  # time when it was last seen
-        self._shown: set[int] = set()  # regions that were reported without blobs
+        self._reported_without_blob: set[int] = set()  # regions that were reported without blobs
         self._alias: dict[int, int] = {}  # id under which it is reported, if another one
-        self._old: set[int] = (
-            set()
-        )  # well resolved regions that are older than the background model, not yet shown by a blob
+        # Well resolved regions that are older than the background model, not yet shown by a blob.
+        self._predating: set[int] = set()
         self._missed_evidence: dict[int, tuple[float, float]] = {}  # outside the foreground, all
 
-    def knows(self, number: int) -> bool:
+    def was_seen_recently(self, number: int) -> bool:
         """Whether a region of the layers was seen recently."""
         return number in self._last
 
-    def is_old(self, number: int) -> bool:
+    def predates_background(self, number: int) -> bool:
         """Whether a region was reported before the background was known, and is not yet shown by a blob."""
-        return number in self._old
+        return number in self._predating
 
     def note(self, regions: Sequence[Region], now: float, memory_s: float) -> None:
         """Record the current regions of the layers, and forget expired ones.
@@ -98,8 +99,8 @@ class TrackFusion:
             del self._last[i]
             self._alias.pop(i, None)
             self._missed_evidence.pop(i, None)
-        self._old -= gone
-        self._shown -= gone - set(self._alias.values())
+        self._predating -= gone
+        self._reported_without_blob -= gone - set(self._alias.values())
 
     def passthrough(
         self, regions: Sequence[Region], ids: IdAllocator, well_known_area: float
@@ -114,8 +115,8 @@ class TrackFusion:
         Returns:
             The same regions under their public ids, sorted by id.
         """
-        self._shown |= {r.id for r in regions}
-        self._old |= {r.id for r in regions if r.area >= well_known_area}
+        self._reported_without_blob |= {r.id for r in regions}
+        self._predating |= {r.id for r in regions if r.area >= well_known_area}
         taken: set[int] = set()
         out = []
         for r in regions:
@@ -141,9 +142,9 @@ class TrackFusion:
         seen = _visible_regions(blobs, frame)
         numbered = {s.id: seen[s.key] for s in blobs if s.id and s.key in seen}
         # Background subtraction resolves small regions better, such as people who walk together.
-        large = [r for r in regions if r.area >= LARGE * frame.well_known_area]
-        missed = self._missed(large, tuple(numbered.values()), frame)
-        older, heirs = self._older(regions, seen, missed)
+        large = [r for r in regions if r.area >= LARGE_FACTOR * frame.well_known_area]
+        missed = self._with_missed_parts(large, tuple(numbered.values()), frame)
+        older, heirs = self._preferred_regions(regions, seen, missed)
         out: list[Region] = []
         known: list[BlobTrack] = []
         taken = {s.id for s in blobs} | {self._known_id(r) for r in older}
@@ -163,9 +164,9 @@ class TrackFusion:
             known.append(s)
             if own is not None and free and s.id:
                 out.append(replace(own, id=s.id))
-        return self._with_regions(out, regions, older, frame, ids), tuple(known)
+        return self._merge_reports(out, regions, older, frame, ids), tuple(known)
 
-    def _with_regions(
+    def _merge_reports(
         self,
         blobs: list[Region],
         regions: Sequence[Region],
@@ -182,13 +183,13 @@ class TrackFusion:
             x, y, w, h = r.bbox
             if r not in older and self._is_shown(r, out):
                 continue
-            if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
+            if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= FOREGROUND_SHARE:
                 self._note_alias(r, out)
                 # A small region that was reported stays so until its blob is reported.
-                small = r.id in self._shown and r.area < frame.well_known_area
+                small = r.id in self._reported_without_blob and r.area < frame.well_known_area
                 if not small or any(common_pixels(s, r) for s in out):
                     continue
-            out = [s for s in out if not common_pixels(s, r) >= COMMON * s.area]
+            out = [s for s in out if not common_pixels(s, r) >= LEAST_OVERLAP * s.area]
             out.append(replace(r, id=self._public_id(r, {s.id for s in out}, ids)))
         return tuple(sorted(out, key=lambda r: r.id))
 
@@ -199,7 +200,7 @@ class TrackFusion:
         alike.
         """
         return any(
-            s.id == self._known_id(r) and common_pixels(s, r) > COMMON * min(s.area, r.area)
+            s.id == self._known_id(r) and common_pixels(s, r) > LEAST_OVERLAP * min(s.area, r.area)
             for s in blobs
         )
 
@@ -227,7 +228,7 @@ class TrackFusion:
         large = own.area >= LEAST_AREA * (frame.size[0] * frame.size[1])
         return large and is_salient_blob(s) and not self._is_part(own, regions, numbered)
 
-    def _missed(
+    def _with_missed_parts(
         self, regions: Sequence[Region], seen: Sequence[Region], frame: FusionFrame
     ) -> set[int]:
         """Ids of regions of which background subtraction misses parts: of the background's tone, or slow.
@@ -238,7 +239,7 @@ class TrackFusion:
         for s in seen:
             x, y, w, h = s.bbox
             shown[y : y + h, x : x + w] |= s.mask
-        beside = cv2.dilate(shown, np.ones((BESIDE, BESIDE), np.uint8)) > 0
+        beside = cv2.dilate(shown, np.ones((NEAR_PX, NEAR_PX), np.uint8)) > 0
         column, row = np.clip(frame.evidence.xy.astype(np.int64), 0, np.array(frame.size) - 1).T
         out = set()
         for r in regions:
@@ -249,13 +250,13 @@ class TrackFusion:
             sure = np.maximum(frame.evidence.sure[mine], 0)
             lost = float(sure[~beside[row[mine], column[mine]]].sum())
             before = self._missed_evidence.get(r.id, (0.0, 0.0))
-            now = RECENT * before[0] + lost, RECENT * before[1] + float(sure.sum())
+            now = EVIDENCE_DECAY * before[0] + lost, EVIDENCE_DECAY * before[1] + float(sure.sum())
             self._missed_evidence[r.id] = now
-            if now[0] > MISSED * max(now[1], 1.0):
+            if now[0] > MISSED_SHARE * max(now[1], 1.0):
                 out.add(r.id)
         return out
 
-    def _older(
+    def _preferred_regions(
         self, regions: Sequence[Region], seen: Mapping[int, Region], missed: set[int]
     ) -> tuple[list[Region], dict[int, int]]:
         """Regions to be reported instead of blobs, and the ids of others that pass to blobs.
@@ -276,13 +277,13 @@ class TrackFusion:
             if r.id in missed:
                 out.append(r)
                 continue
-            if r.id not in self._old:
+            if r.id not in self._predating:
                 continue
-            parts = _whole_in(r, seen)
+            parts = _blobs_covering(r, seen)
             if not parts:
                 out.append(r)
                 continue
-            self._old.discard(r.id)
+            self._predating.discard(r.id)
             heirs[parts[0]] = self._known_id(r)
         return out, heirs
 
@@ -294,7 +295,7 @@ class TrackFusion:
             host = numbered.get(self._known_id(r))
             if (
                 host is not None
-                and common_pixels(own, r) > COMMON * own.area
+                and common_pixels(own, r) > LEAST_OVERLAP * own.area
                 and are_near(own, host)
             ):
                 return True
@@ -306,33 +307,33 @@ class TrackFusion:
         """The id of a new blob: the one under which it was reported before, or a new one."""
         for r in regions:
             number = self._known_id(r)
-            main = common_pixels(own, r) > MAIN * r.area
-            if number in self._shown and number not in taken and main:
+            main = common_pixels(own, r) > MAIN_SHARE * r.area
+            if number in self._reported_without_blob and number not in taken and main:
                 return number
         return ids.new()
 
     def _note_alias(self, r: Region, reported: Sequence[Region]) -> None:
         """Record the id under which a region of the layers is reported."""
         best = max(reported, key=lambda s: common_pixels(s, r), default=None)
-        if best is not None and common_pixels(best, r) > COMMON * min(r.area, best.area):
+        if best is not None and common_pixels(best, r) > LEAST_OVERLAP * min(r.area, best.area):
             self._alias[r.id] = best.id
 
 
-def _whole_in(r: Region, seen: Mapping[int, Region]) -> list[int]:
+def _blobs_covering(r: Region, seen: Mapping[int, Region]) -> list[int]:
     """Keys of the blobs that show all of a region, the one with the largest part first; empty if none do.
 
     Either one blob, or people side by side whom the layers have segmented as one, since they walk together.
     """
     common = {key: common_pixels(s, r) for key, s in seen.items()}
     order = sorted(common, key=lambda key: -common[key])
-    large = [
-        key for key in order if common[key] > max(COMMON * seen[key].area, PIECE * common[order[0]])
-    ]
-    bodies = all(are_bodies(seen[a].bbox, seen[b].bbox, SLENDER) for a, b in combinations(large, 2))
-    both = large if bodies and len(large) > 1 else []
+    least = LEAST_SIZE * common[order[0]] if order else 0.0
+    large = [key for key in order if common[key] > max(LEAST_OVERLAP * seen[key].area, least)]
+    boxes = combinations((seen[key].bbox for key in large), 2)
+    people = all(are_side_by_side(a, b, SLENDER) for a, b in boxes)
+    both = large if people and len(large) > 1 else []
     for parts in (order[:1], both):
         shared = sum(common[key] for key in parts)
-        if shared > WHOLE * (sum(seen[key].area for key in parts) + r.area - shared):
+        if shared > WHOLE_IOU * (sum(seen[key].area for key in parts) + r.area - shared):
             return parts
     return []
 
@@ -348,7 +349,7 @@ def _visible_regions(blobs: BlobTracks, frame: FusionFrame) -> dict[int, Region]
 
 
 def _is_mostly_in(own: Region, other: Region) -> bool:
-    return common_pixels(own, other) > COMMON * own.area
+    return common_pixels(own, other) > LEAST_OVERLAP * own.area
 
 
 def common_pixels(a: Region, b: Region) -> int:
@@ -362,11 +363,12 @@ def common_pixels(a: Region, b: Region) -> int:
 
 
 def are_near(a: Region, b: Region) -> bool:
-    """Whether two regions are within `BESIDE` pixels of each other."""
+    """Whether two regions are within `NEAR_PX` pixels of each other."""
     x, y, w, h = a.bbox
-    wide = np.pad(a.mask.view(np.uint8), BESIDE)
-    near = cv2.dilate(wide, np.ones((2 * BESIDE + 1, 2 * BESIDE + 1), np.uint8)) > 0
-    grown = replace(a, bbox=(x - BESIDE, y - BESIDE, w + 2 * BESIDE, h + 2 * BESIDE), mask=near)
+    wide = np.pad(a.mask.view(np.uint8), NEAR_PX)
+    near = cv2.dilate(wide, np.ones((2 * NEAR_PX + 1, 2 * NEAR_PX + 1), np.uint8)) > 0
+    box = (x - NEAR_PX, y - NEAR_PX, w + 2 * NEAR_PX, h + 2 * NEAR_PX)
+    grown = replace(a, bbox=box, mask=near)
     return common_pixels(grown, b) > 0
 
 

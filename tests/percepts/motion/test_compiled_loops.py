@@ -24,7 +24,7 @@ from visup.percepts.motion.layers._affine_jit import (
 )
 from visup.percepts.motion.outlines.region_outline import chosen, label_areas, marked, renumbered
 from visup.percepts.motion.static_camera._background_model_jit import has_exposure
-from visup.percepts.motion.static_camera._slow_parts_jit import squared_difference
+from visup.percepts.motion.static_camera._slow_motion_jit import squared_difference
 from visup.percepts.motion.static_camera._templates_jit import best_shift
 from visup.percepts.motion.static_camera.background_model import (
     EVEN,

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.resting import means_of_cells
+from visup.percepts.motion.pausing import cell_means
 from visup.report.video import playable_size
 
 QUALITY = 80
@@ -77,7 +77,7 @@ class FrameEncoder:
             image: (H, W, 3) uint8 BGR.
             time: Seconds of the source.
         """
-        small = means_of_cells(image)
+        small = cell_means(image)
         fresh = 0.0 <= time - self._since < SAME_S
         if self._last and fresh and self._small is not None and _alike(self._small, small):
             self._last = EncodedFrame(time, self._last.jpeg)

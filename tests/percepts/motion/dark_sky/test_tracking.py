@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.percepts.motion.dark_sky.scenes import alike, bar, disc, painted
 from visup.percepts.motion.dark_sky.body import SkyBody
 from visup.percepts.motion.dark_sky.sky import bright_components
-from visup.percepts.motion.dark_sky.tracking import Bodies, SkyFrame, follow
+from visup.percepts.motion.dark_sky.tracking import Bodies, SkyFrame, track_bodies
 
 FPS = 12.5
 Masks = Sequence[np.ndarray]
@@ -29,7 +29,7 @@ def followed(scene: Scene, frames: int) -> list[Bodies]:
         assert found is not None
         first = max((b.key for bodies in out for b in bodies), default=0) + 1
         here = SkyFrame(tone, found, k / FPS, (0.0, 0.0))
-        out.append(follow(out[-1] if out else (), here, first))
+        out.append(track_bodies(out[-1] if out else (), here, first))
     return out
 
 
@@ -38,7 +38,7 @@ def body_at(bodies: Bodies, mask: np.ndarray) -> SkyBody:
 
 
 def seen(body: SkyBody, k: int) -> bool:
-    return abs(body.seen - k / FPS) < 1e-6
+    return abs(body.last_seen - k / FPS) < 1e-6
 
 
 @settings(deadline=None, max_examples=12)
@@ -107,7 +107,7 @@ def test_a_body_that_is_hauled_into_the_light_is_followed_to_where_it_stops() ->
     last = next(b for b in all_[-1] if b.key == satellite)
     assert alike(last.visible, scene(109)[0][0] & ~scene(109)[0][1]) > 0.8
     # It is remembered as it looks now, not as it looked when it was last alone.
-    assert abs(float(last.look.tone[last.look.mask].mean()) - 200) < 20
+    assert abs(float(last.template.tone[last.template.mask].mean()) - 200) < 20
 
 
 def test_what_comes_off_for_a_moment_is_a_part() -> None:
@@ -188,8 +188,8 @@ def test_a_slow_drift_is_told_from_rest(speed: float, angle: float) -> None:
             picture = tone(k, moving)
             found = bright_components(picture, 40.0)
             assert found is not None
-            bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)), 1)
-            told = told or bodies[0].drifted(200.0)
+            bodies = track_bodies(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)), 1)
+            told = told or bodies[0].has_drifted(200.0)
         assert told == moving
 
 
@@ -199,8 +199,8 @@ def test_a_drift_with_the_ground_is_no_drift() -> None:
         picture = painted([disc(40 + k, 60, 12)], [120], seed=k)
         found = bright_components(picture, 40.0)
         assert found is not None
-        bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (float(k), 0.0)), 1)
-        assert not bodies[0].drifted(200.0)
+        bodies = track_bodies(bodies, SkyFrame(picture, found, k / FPS, (float(k), 0.0)), 1)
+        assert not bodies[0].has_drifted(200.0)
 
 
 def test_what_wobbles_in_place_has_not_drifted() -> None:
@@ -211,8 +211,8 @@ def test_what_wobbles_in_place_has_not_drifted() -> None:
         picture = painted([disc(80 + dx, 60 + dy, 14)], [120], seed=k)
         found = bright_components(picture, 40.0)
         assert found is not None
-        bodies = follow(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)), 1)
-        assert not bodies[0].drifted(200.0)
+        bodies = track_bodies(bodies, SkyFrame(picture, found, k / FPS, (0.0, 0.0)), 1)
+        assert not bodies[0].has_drifted(200.0)
 
 
 def test_what_comes_in_moves_as_its_end_in_view_does() -> None:

@@ -10,12 +10,12 @@ from hypothesis.extra.numpy import arrays
 
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, Foreground, find_blobs
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
-from visup.percepts.motion.static_camera.bodies import (
+from visup.percepts.motion.static_camera.side_by_side import (
     SLENDER,
-    are_bodies,
-    body_width,
-    parting_columns,
-    with_bodies_apart,
+    are_side_by_side,
+    person_width,
+    split_columns,
+    split_people,
 )
 
 SIZE = (120, 200)
@@ -59,7 +59,7 @@ def test_bodies_side_by_side_are_as_many_as_they_are(
 ) -> None:
     wide = round(SLENDER * tall)
     bodies = [body(5 + k * (wide - overlap), 105 + steps[k], tall) for k in range(count)]
-    columns = parting_columns(in_its_box(np.logical_or.reduce(bodies)), SLENDER)
+    columns = split_columns(in_its_box(np.logical_or.reduce(bodies)), SLENDER)
     assert len(columns) == count - 1
     for k, column in enumerate(columns, start=1):
         assert abs(column - k * (wide - overlap)) <= max(3, wide // 3)
@@ -67,20 +67,20 @@ def test_bodies_side_by_side_are_as_many_as_they_are(
 
 @pytest.mark.parametrize(("wide", "high"), [(60, 25), (80, 30), (30, 60), (24, 60), (90, 90)])
 def test_what_has_no_notch_stays_whole(wide: int, high: int) -> None:
-    assert parting_columns(np.ones((high, wide), bool), SLENDER) == ()
+    assert split_columns(np.ones((high, wide), bool), SLENDER) == ()
 
 
 def test_a_body_beside_something_low_stays_whole() -> None:
     mask = body(10, 100)
     mask[92:100, 34:60] = True  # its shadow
-    assert parting_columns(in_its_box(mask), SLENDER) == ()
+    assert split_columns(in_its_box(mask), SLENDER) == ()
 
 
 @given(arrays(bool, (24, 40)), st.floats(0.2, 0.6))
 @settings(max_examples=60, deadline=None)
 def test_blobs_are_only_divided(change: Mask, slender: float) -> None:
     view = find_blobs(np.zeros((24, 40, 3), np.float32), change, 4, 0.0, 0.1)
-    apart = with_bodies_apart(view, (), slender)
+    apart = split_people(view, (), slender)
     assert ((apart.labels > 0) == (view.labels > 0)).all()
     assert set(np.unique(apart.labels)) - {0} == set(range(1, apart.count + 1))
     for number in range(1, apart.count + 1):
@@ -93,10 +93,10 @@ def test_two_halves_behind_a_post_are_no_bodies() -> None:
     post[:, 28:36] = True
     left, right = one & ~post, one & ~post
     left[:, 28:], right[:, :36] = False, False
-    assert not are_bodies(box(left), box(right), SLENDER)
-    assert are_bodies(box(one), box(body(60, 103)), SLENDER)
+    assert not are_side_by_side(box(left), box(right), SLENDER)
+    assert are_side_by_side(box(one), box(body(60, 103)), SLENDER)
     # A child's height apart: they share too little.
-    assert not are_bodies(box(one), box(body(60, 100, 24)), SLENDER)
+    assert not are_side_by_side(box(one), box(body(60, 100, 24)), SLENDER)
 
 
 def followed(frames: list[Mask]) -> tuple[BlobTrack, ...]:
@@ -122,4 +122,4 @@ def test_one_walker_is_followed_as_one() -> None:
 
 
 def test_how_wide_bodies_are_is_known_of_people_where_nothing_was_followed() -> None:
-    assert body_width(()) == SLENDER
+    assert person_width(()) == SLENDER

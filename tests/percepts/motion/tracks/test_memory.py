@@ -44,5 +44,5 @@ def test_what_is_kept_is_bounded_by_what_lives(camera: float) -> None:
     living = set(fusion._last)
     newest = max(fusion._last.values())
     assert all(newest - last <= segmenter.settings.memory_s for last in fusion._last.values())
-    assert {*fusion._alias, *fusion._old} <= living
-    assert fusion._shown <= living | set(fusion._alias.values())
+    assert {*fusion._alias, *fusion._predating} <= living
+    assert fusion._reported_without_blob <= living | set(fusion._alias.values())

@@ -26,7 +26,7 @@ CALM_S = 5.0
 """Segmentation pauses once nothing has changed or moved for this many seconds."""
 
 
-class RestingMotion(MotionBehaviour):
+class PausingMotionBehaviour(MotionBehaviour):
     """Reports regions; runs seldom while nothing changes.
 
     Args:
@@ -56,8 +56,8 @@ class RestingMotion(MotionBehaviour):
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report the regions of one frame; none, without segmentation, while nothing changes."""
-        small = means_of_cells(frame.image)
-        if self._last is None or _differ(self._last, small):
+        small = cell_means(frame.image)
+        if self._last is None or _have_changed(self._last, small):
             self._moved = frame.time
         calm = frame.time - self._moved > CALM_S
         if calm and not directives and frame.time - self._looked < self._rest_s:
@@ -69,7 +69,7 @@ class RestingMotion(MotionBehaviour):
         return found
 
 
-def means_of_cells(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def cell_means(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """A small image: means over cells of `CELL` x `CELL` pixels.
 
     Args:
@@ -80,5 +80,5 @@ def means_of_cells(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _differ(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
+def _have_changed(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
     return a.shape != b.shape or int(cv2.absdiff(a, b).max()) >= CHANGE

@@ -25,7 +25,10 @@ from visup.percepts.motion.features.diffusion import solve_symmetric, weighted_l
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.outlines.region_outline import chosen, describe_mask, marked
-from visup.percepts.motion.static_camera._slow_parts_jit import believe_bare, squared_difference
+from visup.percepts.motion.static_camera._slow_motion_jit import (
+    squared_difference,
+    update_ground_belief,
+)
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 Mask = NDArray[np.bool_]
@@ -34,61 +37,66 @@ MEMORY_S = 0.5  # time constant of the change over one frame, seconds
 LEAST_NOISE = 0.5  # least mean squared change over one frame, squared grey levels
 AVERAGE = 1.0  # standard deviation of the average of change about a pixel, pixels
 SURE, LIKELY = 8.0, 3.0  # squared change over a span, in units of that over one frame: hysteresis
-NEAR = 5  # width of the surroundings whose greatest change over one frame counts, pixels
-GRADUAL = 1.0  # least change over one frame, as a share of what a steady shift would cause
-OWN, CHANGED = 2.0, 0.3  # seed weight of a region, and of slow change, as body
-BARE = 1.0  # seed weight, as ground, of ground that no object has hidden for long
-FLAT = 0.05  # seed weight, as ground, of an unchanged cell without structure: change would not show
-BUSY = 3.0  # gradient at which a cell has structure, grey levels per pixel
-LINK = 0.3  # weight of the affinity of neighbouring cells
-THICK = 13  # least thickness of an added part, pixels: a thinner one may be an error of the outline
-REACH = 0.5  # gaps that are closed, as a share of the square root of the regions' area
-MOST_REACH = 0.04  # the same as a share of the image's longer side
-BACK_S = 0.3  # how long ground that was hidden must be seen to be certainly bare, seconds
-ALWAYS_S = (
-    2.4  # the same for ground that was never hidden: a body may have been there from the start
-)
+NOISE_NEIGHBOURHOOD = 5
+"""Width of the surroundings whose greatest change over one frame counts, pixels."""
+LEAST_GRADUAL_SHARE = 1.0
+"""Least change over one frame, as a share of what a steady shift would cause."""
+REGION_WEIGHT, CHANGE_WEIGHT = 2.0, 0.3  # seed weight of a region, and of slow change, as body
+BARE_WEIGHT = 1.0  # seed weight, as ground, of ground that no object has hidden for long
+FLAT_WEIGHT = 0.05
+"""Seed weight, as ground, of an unchanged cell without structure: change would not show."""
+STRUCTURE_GRADIENT = 3.0  # gradient at which a cell has structure, grey levels per pixel
+LINK_WEIGHT = 0.3  # weight of the affinity of neighbouring cells
+LEAST_THICKNESS = 13
+"""Least thickness of an added part, pixels: a thinner one may be an error of the outline."""
+CLOSED_GAP = 0.5  # gaps that are closed, as a share of the square root of the regions' area
+MOST_CLOSED_GAP = 0.04  # the same as a share of the image's longer side
+UNCOVERED_S = 0.3  # how long ground that was hidden must be seen to be certainly bare, seconds
+NEVER_HIDDEN_S = 2.4
+"""The same for ground that was never hidden: a body may have been there from the start."""
 
 
-class SlowChange:
+class SlowChangeDetector:
     """Detects change over some tenths of a second that noise and trembling do not explain; one per video."""
 
     def __init__(self) -> None:
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Reset, after the camera has moved."""
         self._past: tuple[WorkImage, ...] = ()
         self._parts: Mask | None = None  # (h, w) parts found in the frame before
-        self._last: Floats | None = None  # (h, w) squared change since the frame before
-        self._brief: Floats | None = None  # (h, w) the same, averaged over time
+        self._frame_change: Floats | None = None  # (h, w) squared change since the frame before
+        self._mean_change: Floats | None = None  # (h, w) the same, averaged over time
 
-    def note(self, image: WorkImage) -> None:
+    def update(self, image: WorkImage) -> None:
         """Add the next image, and update the change over one frame."""
         if self._past and self._past[-1].shape != image.shape:
-            self.forget()
+            self.reset()
         if self._past:
             last = self._past[-1]
-            self._last = _squared_change(image, last)
-            brief = np.asarray(cv2.blur(self._last, (5, 5)), np.float32)
-            if self._brief is not None:
-                passed = 1 - float(np.exp(-(image.time - last.time) / MEMORY_S))
-                weight = np.float32(max(passed, 1 / len(self._past)))
-                brief = self._brief + weight * (brief - self._brief)
-            self._brief = brief
-        kept = max(SPANS_S) * 1.2
-        self._past = (*(p for p in self._past if image.time - p.time <= kept), image)
+            self._frame_change = _squared_change(image, last)
+            mean = np.asarray(cv2.blur(self._frame_change, (5, 5)), np.float32)
+            if self._mean_change is not None:
+                forgotten = 1 - float(np.exp(-(image.time - last.time) / MEMORY_S))
+                weight = np.float32(max(forgotten, 1 / len(self._past)))
+                mean = self._mean_change + weight * (mean - self._mean_change)
+            self._mean_change = mean
+        memory_s = max(SPANS_S) * 1.2
+        self._past = (*(p for p in self._past if image.time - p.time <= memory_s), image)
 
-    def pixels(self) -> Mask | None:
+    def changed_pixels(self) -> Mask | None:
         """(h, w) bool: where the newest image has changed slowly; None before the first span is over."""
-        if self._brief is None or self._last is None:
+        if self._mean_change is None or self._frame_change is None:
             return None
         *past, image = self._past
-        last = _averaged(self._last)
+        last = _averaged(self._frame_change)
         # The greatest change nearby counts as noise: leaves have trembled beside a pixel before it changes
         # itself, and what moves fast is segmented by its motion anyway.
-        brief = cv2.dilate(self._brief, np.ones((NEAR, NEAR), np.uint8))
-        noise = np.maximum(brief, max(float(np.median(self._brief)), LEAST_NOISE))
+        nearby = cv2.dilate(
+            self._mean_change, np.ones((NOISE_NEIGHBOURHOOD, NOISE_NEIGHBOURHOOD), np.uint8)
+        )
+        noise = np.maximum(nearby, max(float(np.median(self._mean_change)), LEAST_NOISE))
         seconds, out = image.time - past[-1].time, None
         for span in SPANS_S:
             old = [p for p in past if image.time - p.time >= 0.9 * span]
@@ -97,7 +105,7 @@ class SlowChange:
             change = _averaged(_squared_change(image, old[-1]))
             # A pixel that changed once and is at rest now is uncovered ground, or an object that has stopped,
             # which needs no completion.
-            gradual = last > GRADUAL * (seconds / span) ** 2 * change
+            gradual = last > LEAST_GRADUAL_SHARE * (seconds / span) ** 2 * change
             found = _likely_pixels(np.asarray(change / noise, np.float32)) & gradual
             out = found if out is None else out | found
         if out is None or self._parts is None:
@@ -105,7 +113,7 @@ class SlowChange:
         # A swaying body is still for a moment at either end: its parts are kept meanwhile.
         return out | (self._parts & (last < LIKELY * noise))
 
-    def keep(self, parts: Mask) -> None:
+    def set_parts(self, parts: Mask) -> None:
         """Set the parts, (h, w) bool, that `pixels` reports in the next frame even if unchanged there."""
         self._parts = parts
 
@@ -128,17 +136,17 @@ class GroundBelief:
         """Update with where the ground is hidden or unknown, (h, w) bool, `seconds` after the last image."""
         if self.share is None or self._was_hidden is None:
             self.share, self._was_hidden = np.zeros(hidden.shape, np.float32), hidden.copy()
-        pace = np.float32(seconds / BACK_S), np.float32(seconds / ALWAYS_S)
-        believe_bare(self.share, self._was_hidden, hidden, pace)
+        pace = np.float32(seconds / UNCOVERED_S), np.float32(seconds / NEVER_HIDDEN_S)
+        update_ground_belief(self.share, self._was_hidden, hidden, pace)
 
-    def cover(self, reported: Mask) -> None:
+    def reset(self, reported: Mask) -> None:
         """Reset the belief to 0 where bodies are reported, (h, w) bool."""
         if self.share is not None:
             self.share[reported] = 0
 
 
-def hardly_moves(velocity: tuple[float, float], scale: float) -> bool:
-    """Whether a region moves by less than `THICK` within the longest span.
+def is_nearly_still(velocity: tuple[float, float], scale: float) -> bool:
+    """Whether a region moves by less than `LEAST_THICKNESS` within the longest span.
 
     A faster region is segmented by its motion, and uncovers ground, whose change would be taken for its own.
 
@@ -147,10 +155,10 @@ def hardly_moves(velocity: tuple[float, float], scale: float) -> bool:
         scale: Working pixels per frame pixel.
     """
     speed = float(np.hypot(*velocity)) * scale
-    return speed * max(SPANS_S) < THICK
+    return speed * max(SPANS_S) < LEAST_THICKNESS
 
 
-def with_slow_parts(
+def extend_by_slow_parts(
     regions: Sequence[Region],
     others: Sequence[Region],
     slow: Mask,
@@ -163,7 +171,7 @@ def with_slow_parts(
     Args:
         regions: Regions to extend, in frame pixels.
         others: Further regions, whose pixels are not available.
-        slow: (h, w) bool, working pixels, from `SlowChange`.
+        slow: (h, w) bool, working pixels, from `SlowChangeDetector`.
         bare: Belief that no object hides the ground, from `GroundBelief`, of any size; None if unknown.
         scene: The frame.
         size: (width, height) of the frame.
@@ -171,46 +179,50 @@ def with_slow_parts(
     Returns:
         The regions, in the same order, and the added pixels, (h, w) bool; each goes to the nearest region.
     """
-    masks = np.array([_reduced(r, slow.shape, size) for r in regions])
+    masks = np.array([_reduced_mask(r, slow.shape, size) for r in regions])
     own = np.asarray(masks.any(axis=0)) if len(masks) else np.zeros_like(slow)
     if not own.any():
         return tuple(regions), own  # no pixel
-    taken = np.any([own, *(_reduced(r, slow.shape, size) for r in others)], axis=0)
-    added = _thick(_body(own, slow, bare, scene) & ~taken)
+    taken = np.any([own, *(_reduced_mask(r, slow.shape, size) for r in others)], axis=0)
+    added = _thick_parts(_body_cells(own, slow, bare, scene) & ~taken)
     if not added.any():
         return tuple(regions), added
     away = [cv2.distanceTransform((~m).view(np.uint8), cv2.DIST_L2, 3) for m in masks]
     nearest = np.argmin(away, axis=0)
     parts = [added & (nearest == i) for i in range(len(regions))]
     pairs = zip(regions, parts, strict=True)
-    return tuple(_joined(r, part, size) if part.any() else r for r, part in pairs), added
+    return tuple(_extended(r, part, size) if part.any() else r for r, part in pairs), added
 
 
-def _body(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) -> Mask:
+def _body_cells(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurements) -> Mask:
     """(h, w) bool: cells that are more likely body than ground, in components that touch the regions."""
     cells, image = scene.cells, scene.image
     mine, change = (cells.mean(m.astype(np.float32)) for m in (own, slow))
-    enclosed = cells.mean(_closed(own, slow).astype(np.float32))
+    enclosed = cells.mean(_closed_mask(own, slow).astype(np.float32))
     busy = cells.mean(np.abs(image.gx) + np.abs(image.gy))
     unchanged = (1 - mine) * (1 - change) * (1 - enclosed)
-    ground = unchanged * (FLAT + busy / (busy + BUSY))
+    ground = unchanged * (FLAT_WEIGHT + busy / (busy + STRUCTURE_GRADIENT))
     if bare is not None:
         seen = cv2.resize(bare, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
-        ground = ground + BARE * cells.mean(np.asarray(seen, np.float32))
-    body = np.asarray(OWN * mine + CHANGED * change, np.float32)
+        ground = ground + BARE_WEIGHT * cells.mean(np.asarray(seen, np.float32))
+    body = np.asarray(REGION_WEIGHT * mine + CHANGE_WEIGHT * change, np.float32)
     share = _random_walk(body, np.asarray(ground, np.float32), cells)
     inside = cells.paint(share > 0.5) | own
     count, labels = cv2.connectedComponents(inside.view(np.uint8), connectivity=4)
     return chosen(labels, marked(labels, own, count))
 
 
-def _thick(added: Mask) -> Mask:
-    """(h, w) bool: parts at least about `THICK` wide; thinner ones are errors of the outline."""
+def _thick_parts(added: Mask) -> Mask:
+    """(h, w) bool: parts at least about `LEAST_THICKNESS` wide; thinner ones are errors of the outline."""
     if not added.any():
         return added
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (THICK, THICK))
-    core = cv2.morphologyEx(np.pad(added.view(np.uint8), THICK, mode="edge"), cv2.MORPH_OPEN, disc)
-    near = cv2.dilate(core[THICK:-THICK, THICK:-THICK], disc)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (LEAST_THICKNESS, LEAST_THICKNESS))
+    core = cv2.morphologyEx(
+        np.pad(added.view(np.uint8), LEAST_THICKNESS, mode="edge"), cv2.MORPH_OPEN, disc
+    )
+    near = cv2.dilate(
+        core[LEAST_THICKNESS:-LEAST_THICKNESS, LEAST_THICKNESS:-LEAST_THICKNESS], disc
+    )
     return np.asarray((near > 0) & added)
 
 
@@ -226,17 +238,17 @@ def _random_walk(body: Floats, ground: Floats, cells: Superpixels) -> Floats:
         (cells,) float32, 0 to 1.
     """
     here = np.arange(cells.count)
-    ends = (body.astype(np.float64) + ground + 1e-6) / LINK
+    ends = (body.astype(np.float64) + ground + 1e-6) / LINK_WEIGHT
     system, _ = weighted_laplacian(cells.link, here, ends)
-    return np.asarray(solve_symmetric(system, body.astype(np.float64) / LINK), np.float32)
+    return np.asarray(solve_symmetric(system, body.astype(np.float64) / LINK_WEIGHT), np.float32)
 
 
-def _closed(own: Mask, slow: Mask) -> Mask:
+def _closed_mask(own: Mask, slow: Mask) -> Mask:
     """(h, w) bool: regions and slow change after closing.
 
     A body without texture changes only along its outline; closing includes what that encloses.
     """
-    reach = int(min(REACH * np.sqrt(np.count_nonzero(own)), MOST_REACH * max(own.shape)))
+    reach = int(min(CLOSED_GAP * np.sqrt(np.count_nonzero(own)), MOST_CLOSED_GAP * max(own.shape)))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     both = own | slow
     x, y, w, h = cv2.boundingRect(both.view(np.uint8))
@@ -263,11 +275,11 @@ def _squared_change(now: WorkImage, old: WorkImage) -> Floats:
     return squared_difference(now.grey, old.grey, np.float32(np.median(a / b)))
 
 
-def _reduced(r: Region, shape: tuple[int, ...], size: tuple[int, int]) -> Mask:
+def _reduced_mask(r: Region, shape: tuple[int, ...], size: tuple[int, int]) -> Mask:
     full = r.full_mask(size).view(np.uint8)
     return np.asarray(cv2.resize(full, shape[1::-1], interpolation=cv2.INTER_NEAREST) > 0)
 
 
-def _joined(r: Region, added: Mask, size: tuple[int, int]) -> Region:
+def _extended(r: Region, added: Mask, size: tuple[int, int]) -> Region:
     large = cv2.resize(added.view(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
     return describe_mask(large | r.full_mask(size), (0, 0), size).applied_to(r)

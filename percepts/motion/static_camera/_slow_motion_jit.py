@@ -1,4 +1,4 @@
-"""Compiled loops of `slow_parts`."""
+"""Compiled loops of `slow_motion`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def squared_difference(
 
 
 @compiled
-def believe_bare(
+def update_ground_belief(
     share: Floats, was_hidden: Mask, hidden: Mask, pace: tuple[np.float32, np.float32]
 ) -> None:
     """Update, in place, the belief that no object hides the ground.

@@ -11,7 +11,7 @@ from visup.agent import Frame
 from visup.agent.cycle.agent import Agent
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
-from visup.percepts.motion.resting import CALM_S, RestingMotion
+from visup.percepts.motion.pausing import CALM_S, PausingMotionBehaviour
 from visup.percepts.motion.segmenter import MotionSegmenter
 
 FPS = 5.0
@@ -53,7 +53,7 @@ class Watched:
 
 def test_it_rests_and_sees_what_comes_as_soon(monkeypatch: pytest.MonkeyPatch) -> None:
     always = Watched(MotionBehaviour(), monkeypatch)
-    resting = Watched(RestingMotion(4.0), monkeypatch)
+    resting = Watched(PausingMotionBehaviour(4.0), monkeypatch)
     idle = [t for t in resting.looks if t < EMPTY_S]
     assert len([t for t in always.looks if t < EMPTY_S]) == EMPTY_S * FPS
     assert len(idle) <= (CALM_S + 1.0) * FPS + (EMPTY_S - CALM_S) / 4.0
@@ -65,13 +65,13 @@ def test_it_rests_and_sees_what_comes_as_soon(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_it_goes_on_as_it_was_saved() -> None:
-    whole, first = RestingMotion(4.0), RestingMotion(4.0)
+    whole, first = PausingMotionBehaviour(4.0), PausingMotionBehaviour(4.0)
     agents = [Agent([one]) for one in (whole, first)]
     frames = [Frame(i, i / FPS, image) for i, image in enumerate(PICTURES[:60])]
     for frame in frames[:40]:
         for agent in agents:
             agent.step(frame)
-    again = RestingMotion(4.0)
+    again = PausingMotionBehaviour(4.0)
     again.load(first.save())
     resumed = Agent([again])
     for frame in frames[40:]:

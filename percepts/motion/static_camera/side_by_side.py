@@ -36,7 +36,7 @@ WHOLE = 0.6  # least width of a piece that counts as a body, as a share of a bod
 AROUND = 0.3  # search range of a cut about the equal division, as a share of a body's width
 
 
-def with_bodies_apart(view: Foreground, tracks: Sequence[BlobTrack], slender: float) -> Foreground:
+def split_people(view: Foreground, tracks: Sequence[BlobTrack], slender: float) -> Foreground:
     """The foreground with the bodies of people side by side as separate blobs.
 
     Args:
@@ -49,7 +49,7 @@ def with_bodies_apart(view: Foreground, tracks: Sequence[BlobTrack], slender: fl
         mask = view.labels[box] == blob
         if mask.shape[1] < WIDE * slender * mask.shape[0] or _shared(blob, view.labels, tracks) > 1:
             continue
-        columns = parting_columns(mask, slender)
+        columns = split_columns(mask, slender)
         if not columns:
             continue
         labels = labels.copy() if labels is view.labels else labels
@@ -60,7 +60,7 @@ def with_bodies_apart(view: Foreground, tracks: Sequence[BlobTrack], slender: fl
     return view if labels is view.labels else replace(view, labels=labels, count=count)
 
 
-def body_width(tracks: Sequence[BlobTrack]) -> float:
+def person_width(tracks: Sequence[BlobTrack]) -> float:
     """Width of a body as a share of its height: the median of isolated tracks and the prior."""
     alone = [
         s.shape.shape[1] / s.shape.shape[0]
@@ -70,7 +70,7 @@ def body_width(tracks: Sequence[BlobTrack]) -> float:
     return float(np.median([SLENDER, SLENDER, *(r for r in alone if r <= UPRIGHT)]))
 
 
-def parting_columns(mask: Mask, slender: float) -> tuple[int, ...]:
+def split_columns(mask: Mask, slender: float) -> tuple[int, ...]:
     """The columns at which the second and further bodies of a blob begin; empty for a single body.
 
     Args:
@@ -98,7 +98,9 @@ def parting_columns(mask: Mask, slender: float) -> tuple[int, ...]:
     return tuple(columns)
 
 
-def are_bodies(a: tuple[int, int, int, int], b: tuple[int, int, int, int], slender: float) -> bool:
+def are_side_by_side(
+    a: tuple[int, int, int, int], b: tuple[int, int, int, int], slender: float
+) -> bool:
     """Whether two pieces of an object are bodies side by side, rather than halves of one behind a post.
 
     Args:

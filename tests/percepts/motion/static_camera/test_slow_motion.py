@@ -15,15 +15,15 @@ from visup.percepts.motion.features.superpixels import superpixels
 from visup.percepts.motion.features.work_image import WorkImage, prepare_image
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.static_camera.slow_parts import (
-    ALWAYS_S,
-    BACK_S,
+from visup.percepts.motion.static_camera.slow_motion import (
+    LEAST_THICKNESS,
+    NEVER_HIDDEN_S,
     SPANS_S,
-    THICK,
+    UNCOVERED_S,
     GroundBelief,
-    SlowChange,
-    hardly_moves,
-    with_slow_parts,
+    SlowChangeDetector,
+    extend_by_slow_parts,
+    is_nearly_still,
 )
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 
@@ -40,10 +40,10 @@ def work_image(n: int, grey: np.ndarray) -> WorkImage:
 
 
 def slow_after(greys: list[np.ndarray]) -> np.ndarray:
-    change = SlowChange()
+    change = SlowChangeDetector()
     for n, grey in enumerate(greys):
-        change.note(work_image(n, grey))
-    found = change.pixels()
+        change.update(work_image(n, grey))
+    found = change.changed_pixels()
     assert found is not None
     return found
 
@@ -89,7 +89,7 @@ def test_ground_is_the_surer_the_longer_it_is_seen_and_soon_after_it_was_hidden(
         seen_s = 0.0 if now else seen_s + step
         was = any(hidden)
         assert belief.share is not None
-        at_most, at_least = min(seen_s / BACK_S, 1), min(seen_s / ALWAYS_S, 1)
+        at_most, at_least = min(seen_s / UNCOVERED_S, 1), min(seen_s / NEVER_HIDDEN_S, 1)
         assert at_least - 1e-4 <= belief.share[0, 0] <= at_most + 1e-4
         if was and now:
             assert belief.share[0, 0] == 0
@@ -99,7 +99,7 @@ def test_what_is_reported_is_no_bare_ground() -> None:
     belief = GroundBelief()
     for _ in range(80):
         belief.update(np.zeros((2, 2), dtype=bool), 1 / FPS)
-    belief.cover(np.eye(2, dtype=bool))
+    belief.reset(np.eye(2, dtype=bool))
     assert belief.share is not None
     assert np.allclose(belief.share, 1 - np.eye(2), atol=1e-5)
 
@@ -136,7 +136,7 @@ def test_the_slow_part_beside_a_region_is_its_own_unless_it_is_a_region_already(
     scene: Any = SimpleNamespace(image=image, cells=superpixels(image, 8, 8.0))
     left, right = BODY & (XS < 115), BODY & (XS >= 115)
     others = [region(right, 2)] if known else []
-    (own,), parts = with_slow_parts([region(left, 1)], others, BODY, None, scene, SIZE[::-1])
+    (own,), parts = extend_by_slow_parts([region(left, 1)], others, BODY, None, scene, SIZE[::-1])
     assert parts[right].mean() == pytest.approx(0.0 if known else 1.0, abs=0.25)
     assert own.full_mask(SIZE[::-1])[right].mean() == pytest.approx(0.0 if known else 1.0, abs=0.25)
 
@@ -148,7 +148,9 @@ def test_no_region_takes_another_whether_that_moves_or_not(speed: float) -> None
     halves = [region(BODY & (XS < 115), 1), region(BODY & (XS >= 115), 2, speed)]
     segmenter: Any = StaticCameraSegmenter()
     segmenter._static_s = 1.0
-    segmenter._slow = SimpleNamespace(note=lambda _: None, pixels=lambda: BODY, keep=lambda _: None)
+    segmenter._slow = SimpleNamespace(
+        update=lambda _: None, changed_pixels=lambda: BODY, set_parts=lambda _: None
+    )
     whole = segmenter._completed(scene, halves, SIZE[::-1])
     one, other = (r.full_mask(SIZE[::-1]) for r in whole)
     assert not (one & other).any()
@@ -159,6 +161,8 @@ def test_what_moves_farther_than_a_part_is_thick_shows_itself(
     speed: float, way: float, scale: float
 ) -> None:
     velocity = (speed * float(np.cos(way)), speed * float(np.sin(way)))
-    assert hardly_moves((0.0, 0.0), scale)
-    assert hardly_moves(velocity, scale) or speed * scale * max(SPANS_S) > THICK * 0.999
-    assert hardly_moves(velocity, scale / 2) or not hardly_moves(velocity, scale)
+    assert is_nearly_still((0.0, 0.0), scale)
+    assert (
+        is_nearly_still(velocity, scale) or speed * scale * max(SPANS_S) > LEAST_THICKNESS * 0.999
+    )
+    assert is_nearly_still(velocity, scale / 2) or not is_nearly_still(velocity, scale)
