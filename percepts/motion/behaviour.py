@@ -54,7 +54,7 @@ class MotionBehaviour:
     def missed(self, observation: Observation) -> None:
         """Reserve the ids of regions reported since the restored state."""
         for region in observation.of("region"):
-            self._segmenter.used(region.id)
+            self._segmenter.reserve_id(region.id)
 
     def new_id(self) -> int:
         """An id that no region of this video has had or will have."""

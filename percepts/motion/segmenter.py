@@ -31,13 +31,13 @@ from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import Superpixels, superpixels
 from visup.percepts.motion.features.work_image import Floats, ImageHistory, WorkImage, prepare_image
 from visup.percepts.motion.foreground.cues import CueMemory, FrameCues, flow_cues
-from visup.percepts.motion.foreground.following import (
+from visup.percepts.motion.foreground.foreground_tracking import (
     TrackPosterior,
-    follow_foreground,
-    no_foreground,
-    resting,
+    initial_foreground,
+    update_foreground,
+    without_model,
 )
-from visup.percepts.motion.foreground.objects import Admission
+from visup.percepts.motion.foreground.objects import ReportingConditions
 from visup.percepts.motion.foreground.perceptron import (
     ForegroundModel,
     read_model,
@@ -63,16 +63,16 @@ from visup.percepts.motion.output.cast_shadows import CastShadowFilter
 from visup.percepts.motion.output.region_report import (
     OutlinedFrame,
     apply_ignore,
-    looked_at,
     motion_evidence,
     report_objects,
     report_regions,
     select_regions,
+    tracks_to_look_at,
 )
-from visup.percepts.motion.output.trace import SegmentationTrace
+from visup.percepts.motion.output.segmentation_trace import SegmentationTrace
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.lifecycle import Clarity, confirm, delete, initiate, update
+from visup.percepts.motion.tracks.lifecycle import ConfirmContext, confirm, delete, initiate, update
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
@@ -84,7 +84,7 @@ from visup.percepts.motion.tracks.measurements import (
 )
 from visup.percepts.motion.tracks.merge_split import assign_unknown, merge_tracks, split_occluded
 from visup.percepts.motion.tracks.salience import (
-    stands_there,
+    moves_like_standing,
     stationary_cells,
     update_salience,
 )
@@ -94,8 +94,8 @@ from visup.percepts.motion.tracks.track_prediction import label_priors, predict_
 from visup.percepts.motion.tracks.warping import dense_likelihood, flow_back
 
 Numbered = TypeVar("Numbered", Track, Region)
-Shown = Future[tuple[FrameCues, CueMemory]]
-FARTHEST = 0.02  # farthest the camera may move over a baseline, as a share of the image
+FlowCues = Future[tuple[FrameCues, CueMemory]]
+MOST_CAMERA_SHIFT = 0.02  # farthest the camera may move over a baseline, as a share of the image
 
 
 class MotionSegmenter:
@@ -136,7 +136,7 @@ class MotionSegmenter:
         self._sway = CameraSway()
         self._shadows = CastShadowFilter()
         self._sky = DarkSkySegmenter()
-        self._foreground = no_foreground()
+        self._foreground = initial_foreground()
         self._count = self._last_key = 0
 
     @property
@@ -152,7 +152,7 @@ class MotionSegmenter:
         """Restore the state of a segmenter with the same settings."""
         vars(self).update(state)
 
-    def used(self, region_id: int) -> None:
+    def reserve_id(self, region_id: int) -> None:
         """Reserve the id of a region reported before."""
         self._ids.reserve(region_id)
 
@@ -178,18 +178,18 @@ class MotionSegmenter:
         if self._cells is None:
             self._begin(image)
             return ()
-        scene, predicted, prior = self._measured_frame(image, self._cells)
+        scene, predicted, prior = self._measure(image, self._cells)
         self._cells = scene.cells
-        tracks, prior = self._initiated(fit_tracks(predicted, scene), scene, prior)
-        evidence, labelling, shown = self._labelled(scene, tracks, prior, directives)
+        tracks, prior = self._with_new_tracks(fit_tracks(predicted, scene), scene, prior)
+        evidence, labelling, shown = self._label(scene, tracks, prior, directives)
         keys = tuple(t.key for t in tracks)
         tracks = self._updated(tracks, scene, evidence, labelling)
         ground = scene.measured[0].background.models[-1]
         self._sway = self._sway.after(ground.shift((image.shape[1] / 2, image.shape[0] / 2)))
-        asked = Clarity(looked_at(directives, tracks, scene), self._sway.in_place)
+        asked = ConfirmContext(tracks_to_look_at(directives, tracks, scene), self._sway.in_place)
         tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, asked)
         self._follow_foreground(scene, shown, TrackPosterior(tracks, keys, labelling.posterior))
-        regions = self._reported(scene, tracks)
+        regions = self._report(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
         regions = self._shadows.step(frame, scene, regions, static=self._static.active)
@@ -197,30 +197,30 @@ class MotionSegmenter:
         return select_regions(regions, directives)
 
     @property
-    def _asks(self) -> bool:
+    def _uses_model(self) -> bool:
         """Whether the foreground model is evaluated in this frame."""
         unused = self._static.active or self._foreground.calm
         return self._model is not None and (self._always or not unused)
 
     def _follow_foreground(
-        self, scene: FrameMeasurements, shown: Shown | None, tracked: TrackPosterior
+        self, scene: FrameMeasurements, shown: FlowCues | None, tracked: TrackPosterior
     ) -> None:
         """Update the foreground belief and its objects, if there is a model."""
         if self._model is None or shown is None:
-            self._foreground = resting(self._foreground, scene)
+            self._foreground = without_model(self._foreground, scene)
             tracks = self._with_object_ids(tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return
-        least, stands = min_region_area(scene, self.settings), partial(stands_there, scene)
-        admission = Admission(least, self._ids, stands, alone=not self._foreground.calm)
-        cues, self._foreground = follow_foreground(
-            self._foreground, self._model, scene, shown.result(), tracked, admission
+        least, stands = min_region_area(scene, self.settings), partial(moves_like_standing, scene)
+        conditions = ReportingConditions(least, self._ids, stands, alone=not self._foreground.calm)
+        cues, self._foreground = update_foreground(
+            self._foreground, self._model, scene, shown.result(), tracked, conditions
         )
         tracks = self._with_object_ids(tracked.tracks)
         share = self._foreground.belief.share
         self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior, cues, share)
 
-    def _reported(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
+    def _report(self, scene: FrameMeasurements, tracks: Tracks) -> tuple[Region, ...]:
         """Regions of the foreground objects; of the tracks while the background hardly moves."""
         frame = OutlinedFrame(scene, self._history.back(1), self._size)
         asked = self._foreground.memory is not None
@@ -239,7 +239,7 @@ class MotionSegmenter:
         self._cells = superpixels(image, self.settings.cell, self.settings.contrast)
         self._prevalence = empty_prevalence(image.shape)
 
-    def _initiated(
+    def _with_new_tracks(
         self, known: Tracks, scene: FrameMeasurements, prior: Floats
     ) -> tuple[Tracks, Floats]:
         """The tracks with new ones added, and the label priors of all."""
@@ -251,13 +251,13 @@ class MotionSegmenter:
     def _note_keys(self, tracks: Tracks) -> None:
         self._last_key = max([self._last_key, *(t.key for t in tracks)])
 
-    def _labelled(
+    def _label(
         self,
         scene: FrameMeasurements,
         tracks: Tracks,
         prior: Floats,
         directives: Sequence[Directive],
-    ) -> tuple[PointEvidence, Labelling, Shown | None]:
+    ) -> tuple[PointEvidence, Labelling, FlowCues | None]:
         """Evidence of the points for the tracks, and the labels of the superpixels that follow (the E step).
 
         Also the foreground cues from flow, where they are needed: they are computed in parallel.
@@ -268,7 +268,7 @@ class MotionSegmenter:
             dense_likelihood, scene, tracks, old, near, self.settings.noise
         )
         last, memory = self._history.back(1), self._foreground.memory
-        shown = self._executor.submit(flow_cues, scene, last, memory) if self._asks else None
+        shown = self._executor.submit(flow_cues, scene, last, memory) if self._uses_model else None
         evidence = point_likelihoods(scene, tracks, near, self.settings)
         evidence = apply_ignore(directives, scene, evidence)
         by_appearance = appearance_prior(scene.cells, prior)
@@ -293,7 +293,7 @@ class MotionSegmenter:
         tracks = merge_tracks(tracks, scene, winner, self.settings)
         return delete(tracks, scene, self.settings)
 
-    def _measured_frame(
+    def _measure(
         self, image: WorkImage, before: Superpixels
     ) -> tuple[FrameMeasurements, Tracks, Floats]:
         """Measure motion and predict the tracks, with the label priors, in the newest image."""
@@ -302,7 +302,7 @@ class MotionSegmenter:
         found = self._executor.submit(find_points, image, cell, self.settings.noise)
         coming = self._executor.submit(superpixels, image, cell, self.settings.contrast)
         flow = flow_back(image.grey, old.grey, self._engine)
-        carried = self._executor.submit(self._carried, flow, before, coming, seconds)
+        carried = self._executor.submit(self._predict_tracks, flow, before, coming, seconds)
         points = found.result()
         first = self._track_one_frame(points, flow, old, image)
         cells, tracks, prior = carried.result()
@@ -317,7 +317,7 @@ class MotionSegmenter:
             prior,
         )
 
-    def _carried(
+    def _predict_tracks(
         self, flow: Floats, before: Superpixels, coming: Future[Superpixels], seconds: float
     ) -> tuple[Superpixels, Tracks, Floats]:
         """The newest cells, the predicted tracks, and the label priors of the cells."""
@@ -331,7 +331,7 @@ class MotionSegmenter:
         They serve slow motion. When the camera has turned far, there is little to compare, which misleads;
         while it moves, single frames decide what is reported, and every other frame is enough.
         """
-        every, far = 2 if self._foreground.moves else 1, FARTHEST * max(image.shape)
+        every, far = 2 if self._foreground.moves else 1, MOST_CAMERA_SHIFT * max(image.shape)
         wanted = () if self._count % every else self.settings.lags_s
         all_ = self._history.lags(wanted)
         lags = [lag for lag in all_ if lag > 1 and self._camera_shift(image, lag) < far]
@@ -339,7 +339,7 @@ class MotionSegmenter:
 
     def _camera_shift(self, image: WorkImage, lag: int) -> float:
         """Predicted displacement of the image centre by the camera, pixels."""
-        camera = self._predicted(image.time, image.time - self._history.back(lag).time)
+        camera = self._predict_camera(image.time, image.time - self._history.back(lag).time)
         middle = np.asarray([image.shape[::-1]], dtype=np.float32) / np.float32(2)
         return float(np.hypot(*camera.at(middle)[0]))
 
@@ -358,7 +358,8 @@ class MotionSegmenter:
         """Start tracking points over a longer baseline, from where known motions predict them."""
         old = self._history.back(lag)
         span = scene.time - old.time
-        guess = predicted_positions(scene, tracks, self._predicted(scene.time, span), lag, span)
+        camera = self._predict_camera(scene.time, span)
+        guess = predicted_positions(scene, tracks, camera, lag, span)
         noise = self.settings.noise
         look = partial(track_points, nearby=self._foreground.moves)
         return self._executor.submit(look, scene.points, guess, (old, scene.image), lag, noise)
@@ -366,7 +367,7 @@ class MotionSegmenter:
     def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
         """The background motion fitted to the constraints over one baseline."""
         image, lag = scene.image, c.lag
-        camera = self._predicted(image.time, c.span_s)
+        camera = self._predict_camera(image.time, c.span_s)
         # Until some baseline is long enough to tell, what stays still in the image may be background.
         fixed_too = self._camera_fixed_until is None or image.time < self._camera_fixed_until
         clear = background_weights(scene)[c.index]
@@ -381,7 +382,7 @@ class MotionSegmenter:
             self._camera[lag] = affine_rate(bg.models[-1], c, image.time)
         return BaselineMotion(c, bg)
 
-    def _predicted(self, now: float, span: float) -> Affine:
+    def _predict_camera(self, now: float, span: float) -> Affine:
         """The camera's motion over a baseline, from the nearest baseline with a recent estimate."""
         fresh = [r for r in self._camera.values() if now - r.time < 1.0]
         if not fresh:

@@ -16,7 +16,7 @@ from tests.clips import moving_disc, write_clip
 from visup.agent import Frame, Region
 from visup.cli import main
 from visup.commands.debug import video_of
-from visup.percepts.motion.output.trace import SegmentationTrace
+from visup.percepts.motion.output.segmentation_trace import SegmentationTrace
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.report.motion_debug.marks import flow_colours
 from visup.report.motion_debug.panels import (

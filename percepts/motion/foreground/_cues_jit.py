@@ -228,7 +228,7 @@ def neighbour_means(ends: Labels, neighbours: Labels, weights: Floats, values: F
 
 
 @compiled
-def settled(
+def smooth_untextured(
     ends: Labels,
     neighbours: Labels,
     weights: Floats,

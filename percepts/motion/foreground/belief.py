@@ -15,24 +15,24 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.features.tone_histograms import smoothed_histogram
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.foreground._cues_jit import neighbour_means, settled
+from visup.percepts.motion.foreground._cues_jit import neighbour_means, smooth_untextured
 from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.perceptron import ForegroundModel
 
-FADING = 0.92  # weight of the tones of all earlier frames
-FEW = 200.0  # foreground pixels below which tones are uninformative
-RARE = 2e-4  # floor of a tone's share in either histogram
-NEVER = 0.003  # share of the image added before taking a logarithm
-DOUBT = 0.02  # distance that a carried belief keeps from 0 and 1
-FIRST = 0.1  # belief where there is no previous frame
-MOST_OF = 50  # one cell in 50 is above the frame's peak log odds
+HISTOGRAM_DECAY = 0.92  # weight of the tones of all earlier frames
+FEWEST_PIXELS = 200.0  # foreground pixels below which tones are uninformative
+TONE_FLOOR = 2e-4  # floor of a tone's share in either histogram
+SHARE_FLOOR = 0.003  # share of the image added before taking a logarithm
+BELIEF_MARGIN = 0.02  # distance that a carried belief keeps from 0 and 1
+PRIOR_BELIEF = 0.1  # belief where there is no previous frame
+PEAK_RANK = 50  # one cell in 50 is above the frame's peak log odds
 ALONE_NEAR, PAST, TOGETHER = (len(NAMES) + k for k in (1, 4, 10))  # columns of the cues in context
 CUES_IN_CONTEXT = len(NAMES) + 17
 TEXTURE = NAMES.index("texture")
 CALM = 8.0  # texture, grey levels per pixel, at which the flow is half trusted
 TRUST = 1.0  # weight of a fully trusted value, relative to affinities
 SWEEPS = 8
-SURE = 12.0  # log odds are clipped here
+MOST_LOG_ODDS = 12.0  # log odds are clipped here
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,14 +52,14 @@ class Belief:
     rest: NDArray[np.float64]
 
 
-def unbiased() -> Belief:
+def initial_belief() -> Belief:
     """The belief before the first frame."""
     none = np.zeros(BINS**3)
     nowhere = np.zeros(0, np.float32)
     return Belief(nowhere, nowhere, none, none)
 
 
-def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
+def update_belief(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
     """The belief after a frame.
 
     Args:
@@ -69,18 +69,20 @@ def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
     """
     alone = model.alone.log_odds(cues.values)
     context = context_cues(belief, cues, alone)
-    return believed(belief, cues, alone, model.context.log_odds(context))
+    return belief_from_log_odds(belief, cues, alone, model.context.log_odds(context))
 
 
-def believed(belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats) -> Belief:
+def belief_from_log_odds(
+    belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats
+) -> Belief:
     """The belief given each superpixel's log odds alone and in context, (count,) each."""
-    share = _share(log_odds)
+    share = _probability(log_odds)
     pixels = cues.area.astype(np.float64)
     return Belief(
         share.astype(np.float32),
-        _share(alone).astype(np.float32),
-        FADING * belief.moving + np.bincount(cues.tone, share * pixels, BINS**3),
-        FADING * belief.rest + np.bincount(cues.tone, (1 - share) * pixels, BINS**3),
+        _probability(alone).astype(np.float32),
+        HISTOGRAM_DECAY * belief.moving + np.bincount(cues.tone, share * pixels, BINS**3),
+        HISTOGRAM_DECAY * belief.rest + np.bincount(cues.tone, (1 - share) * pixels, BINS**3),
     )
 
 
@@ -94,13 +96,16 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
     """
     before, seen = _carried(belief, cues)
     tones = _tone_odds(belief, cues.tone)
-    past = np.log((before + DOUBT) / (np.maximum(seen - before, 0) + DOUBT + 0.3 * (seen < 0.5)))
-    near = _near(cues, np.column_stack([alone, past, tones]))
-    even = _settled(cues, np.column_stack([alone, past]))
-    next_ = _near(cues, near[:, :1])
-    far = _near(cues, _near(cues, next_))
-    share = _share(alone)
-    most = np.partition(alone, -max(len(alone) // MOST_OF, 1))[-max(len(alone) // MOST_OF, 1)]
+    past = np.log(
+        (before + BELIEF_MARGIN)
+        / (np.maximum(seen - before, 0) + BELIEF_MARGIN + 0.3 * (seen < 0.5))
+    )
+    near = _neighbour_means(cues, np.column_stack([alone, past, tones]))
+    even = _smoothed_values(cues, np.column_stack([alone, past]))
+    next_ = _neighbour_means(cues, near[:, :1])
+    far = _neighbour_means(cues, _neighbour_means(cues, next_))
+    share = _probability(alone)
+    most = np.partition(alone, -max(len(alone) // PEAK_RANK, 1))[-max(len(alone) // PEAK_RANK, 1)]
     frame_values = _extent(before, cues.area), _extent(share, cues.area), most
     whole = [np.full(len(alone), value) for value in frame_values]
     columns = [
@@ -110,22 +115,22 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
         *(past, near[:, 1]),
         *(tones, near[:, 2]),
         *even.T,
-        *_together(cues, np.column_stack([alone, past])).T,
+        *_same_motion_means(cues, np.column_stack([alone, past])).T,
         *whole,
         seen,
     ]
     return np.column_stack(columns).astype(np.float32)
 
 
-def _share(log_odds: Floats) -> NDArray[Any]:
-    return 1 / (1 + np.exp(-np.clip(log_odds, -SURE, SURE)))
+def _probability(log_odds: Floats) -> NDArray[Any]:
+    return 1 / (1 + np.exp(-np.clip(log_odds, -MOST_LOG_ODDS, MOST_LOG_ODDS)))
 
 
 def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:
     """Belief carried along the flow to each cell, and the share of it that was in view, (count,) each."""
     count = len(cues.area)
     if not len(cues.here):
-        return np.full(count, FIRST, np.float32), np.zeros(count, np.float32)
+        return np.full(count, PRIOR_BELIEF, np.float32), np.zeros(count, np.float32)
     known = np.column_stack([belief.share, np.ones_like(belief.share)])
     before, seen = cues.carried(known).T
     return before, seen
@@ -134,18 +139,18 @@ def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:
 def _tone_odds(belief: Belief, tone: NDArray[np.int64]) -> Floats:
     """Log odds that each cell's tone is foreground, (count,) float32; 0 while there is little data."""
     moving, rest = belief.moving.sum(), belief.rest.sum()
-    if moving < FEW or rest < FEW:
+    if moving < FEWEST_PIXELS or rest < FEWEST_PIXELS:
         return np.zeros(len(tone), np.float32)
-    ours = smoothed_histogram(belief.moving)[tone] / moving + RARE
-    other = smoothed_histogram(belief.rest)[tone] / rest + RARE
-    return np.asarray(np.log(ours / other), dtype=np.float32)
+    foreground = smoothed_histogram(belief.moving)[tone] / moving + TONE_FLOOR
+    background = smoothed_histogram(belief.rest)[tone] / rest + TONE_FLOOR
+    return np.asarray(np.log(foreground / background), dtype=np.float32)
 
 
-def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
+def _smoothed_values(cues: FrameCues, values: NDArray[Any]) -> Floats:
     """Values (count, K), smoothed over neighbours where a superpixel lacks texture."""
     texture = np.expm1(cues.values[:, TEXTURE : TEXTURE + 1])
     trust = np.broadcast_to(TRUST * texture / (texture + CALM), values.shape)
-    return settled(
+    return smooth_untextured(
         cues.ends,
         cues.neighbours,
         cues.affinity,
@@ -155,19 +160,19 @@ def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
     )
 
 
-def _together(cues: FrameCues, values: NDArray[Any]) -> Floats:
+def _same_motion_means(cues: FrameCues, values: NDArray[Any]) -> Floats:
     """Means of values (count, K) over all cells of the same motion, and its extent, (count, K + 1)."""
     areas = np.bincount(cues.part, cues.area)
     sums = [np.bincount(cues.part, cues.area * v) / np.maximum(areas, 1) for v in values.T]
-    extent = np.log(NEVER + areas / cues.area.sum())
+    extent = np.log(SHARE_FLOOR + areas / cues.area.sum())
     return np.column_stack([*sums, extent])[cues.part].astype(np.float32)
 
 
-def _near(cues: FrameCues, values: Floats) -> Floats:
+def _neighbour_means(cues: FrameCues, values: Floats) -> Floats:
     some = np.ascontiguousarray(values, dtype=np.float32)
     return neighbour_means(cues.ends, cues.neighbours, cues.affinity, some)
 
 
 def _extent(share: NDArray[Any], area: Floats) -> float:
     """Logarithm of the share of the image believed to move."""
-    return float(np.log(NEVER + float(share @ area) / float(area.sum())))
+    return float(np.log(SHARE_FLOOR + float(share @ area) / float(area.sum())))

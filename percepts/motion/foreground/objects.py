@@ -24,19 +24,24 @@ from visup.percepts.motion.foreground.cues import NAMES, FrameCues
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 Keys = NDArray[np.int64]
-MOVES = 0.5  # belief from which a cell is part of an object
-CAME = 0.4  # share of a cell carried from an object from which the cell remains that object's
-OWNED = 0.5  # share of a new track owned by an object from which the track is that object's
-EXISTS = 0.7  # least mean belief to report an object: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
-STAYS = 0.6  # the same for one reported before (hysteresis)
-WHOLE = 0.9  # share of an object's moving cells in a track from which the track is the object
-BORNE = 0.5  # mean belief in the cells of such a track
-EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # without a track: least belief, and least by its own cues alone
+MOVING_BELIEF = 0.5  # belief from which a cell is part of an object
+CARRIED_SHARE = 0.4
+"""Share of a cell carried from an object from which the cell remains that object's."""
+OWNED_SHARE = 0.5  # share of a new track owned by an object from which the track is that object's
+REPORT_BELIEF = 0.7
+"""Least mean belief to report an object: ghosts had 0.57 to 0.71, objects 0.74 to 0.93."""
+KEEP_BELIEF = 0.6  # the same for one reported before (hysteresis)
+WHOLE_SHARE = 0.9  # share of an object's moving cells in a track from which the track is the object
+TRACK_BELIEF = 0.5  # mean belief in the cells of such a track
+TRACKLESS_BELIEF, TRACKLESS_OWN_BELIEF = (
+    0.9,
+    0.5,
+)  # without a track: least belief, and least by its own cues alone
 LEAST_PX = 0.25  # least residual motion, pixels per frame: twice the sampling error
 RESIDUAL = NAMES.index("residual")
-FOLLOW = 0.4  # weight of the newest frame in a running mean
-LASTS = 3  # frames before a candidate becomes an object
-NEAR = 12  # steps from cell to cell over which cells connect to an object
+NEWEST_WEIGHT = 0.4  # weight of the newest frame in a running mean
+CONFIRM_FRAMES = 3  # frames before a candidate becomes an object
+CONNECTED_STEPS = 12  # steps from cell to cell over which cells connect to an object
 MISSED_S = 0.5  # an unobserved object is deleted after this many seconds
 
 
@@ -51,9 +56,9 @@ class MovingObject:
         frames: In how many frames it was observed.
         last_seen: Seconds.
         existence: Running mean of the belief in its superpixels.
-        borne_out: The same from the cues of superpixels alone.
-        followed: Whether it ever had a track.
-        told: Whether it was ever believed enough to be reported.
+        existence_alone: The same from the cues of superpixels alone.
+        had_track: Whether it ever had a track.
+        was_reported: Whether it was ever believed enough to be reported.
     """
 
     key: int
@@ -62,20 +67,20 @@ class MovingObject:
     frames: int
     last_seen: float
     existence: float = 0.0
-    borne_out: float = 0.0
-    followed: bool = False
-    told: bool = False
+    existence_alone: float = 0.0
+    had_track: bool = False
+    was_reported: bool = False
 
     @property
-    def exists(self) -> bool:
+    def is_reportable(self) -> bool:
         """Whether to report it: the bar is higher when no track supports it.
 
         Context may sustain an object but not begin one: otherwise anything that resembles a mover and lies
         where one was believed would confirm itself for ever.
         """
-        if self.followed:
-            return self.existence >= (STAYS if self.told else EXISTS)
-        return self.existence >= EXISTS_ALONE and self.borne_out >= BORNE_OUT
+        if self.had_track:
+            return self.existence >= (KEEP_BELIEF if self.was_reported else REPORT_BELIEF)
+        return self.existence >= TRACKLESS_BELIEF and self.existence_alone >= TRACKLESS_OWN_BELIEF
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +101,7 @@ class ForegroundObjects:
 
     def reported(self, now: float) -> list[MovingObject]:
         """Objects with a public id that exist and were observed at `now`, seconds, sorted by id."""
-        known = [o for o in self.known.values() if o.id and o.exists]
+        known = [o for o in self.known.values() if o.id and o.is_reportable]
         seen = [o for o in known if o.last_seen == now]
         return sorted(seen, key=lambda o: o.id)
 
@@ -106,7 +111,7 @@ class ForegroundObjects:
         return next(owners, track)
 
 
-def no_objects() -> ForegroundObjects:
+def initial_objects() -> ForegroundObjects:
     """The objects before the first frame."""
     return ForegroundObjects(
         np.zeros(0, np.int64), np.zeros(0, np.float32), MappingProxyType({}), 0
@@ -131,30 +136,30 @@ class TrackCells:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Admission:
+class ReportingConditions:
     """Conditions for reporting an object.
 
     Attributes:
         least: Its least area, working pixels.
         ids: Allocator of public ids.
-        stands: Whether cells, (count,) bool, move as an object at rest on the ground there would: without a
-            track those are not reported.
+        is_standing: Whether cells, (count,) bool, move as an object at rest on the ground there would:
+            without a track those are not reported.
         alone: Whether objects without a track may be reported at all.
     """
 
     least: float
     ids: IdAllocator
-    stands: Callable[[NDArray[np.bool_]], bool]
+    is_standing: Callable[[NDArray[np.bool_]], bool]
     alone: bool
 
 
-def follow_objects(
+def update_objects(
     before: ForegroundObjects,
     cues: FrameCues,
     belief: Belief,
     tracks: TrackCells,
     now: float,
-    admission: Admission,
+    conditions: ReportingConditions,
 ) -> ForegroundObjects:
     """The objects of a frame.
 
@@ -164,23 +169,25 @@ def follow_objects(
         belief: The belief in its superpixels.
         tracks: The reported tracks that are observed.
         now: Seconds.
-        admission: Conditions on objects.
+        conditions: Conditions on objects.
     """
-    moves = belief.share > MOVES
-    came = _came_from(before, cues)
-    known, last_key = _with_tracks(before, tracks, came, cues.area)
+    moves = belief.share > MOVING_BELIEF
+    previous = _previous_owner(before, cues)
+    known, last_key = _with_tracks(before, tracks, previous, cues.area)
     key_of = {o.track: o.key for o in known.values() if o.track}
     own = np.array([0, *(key_of[i] for i in tracks.seen)], dtype=np.int64)[tracks.winner]
-    owner = np.where(moves, np.where(own > 0, own, came), 0)
-    owner = _spread(owner, moves, cues)
-    owner, fresh = _candidates(owner, moves, cues, admission.least, last_key)
+    owner = np.where(moves, np.where(own > 0, own, previous), 0)
+    owner = _spread_ownership(owner, moves, cues)
+    owner, fresh = _candidates(owner, moves, cues, conditions.least, last_key)
     last_key += len(fresh)
     known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
     objects = ForegroundObjects(owner, belief.share, known, last_key)
     # Residual motion within the sampling error supports no object.
     moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
     belief = replace(belief, alone=belief.alone * moved)
-    return _drawn_by_tracks(_seen(objects, belief, cues.area, now, admission), tracks, cues.area)
+    return _with_track_cells(
+        _observed(objects, belief, cues.area, now, conditions), tracks, cues.area
+    )
 
 
 def object_share(objects: ForegroundObjects, key: int) -> Floats:
@@ -210,7 +217,7 @@ def object_velocity(
     return float(middle[0]), float(middle[1]), 1.5 * off + 0.1
 
 
-def _drawn_by_tracks(
+def _with_track_cells(
     objects: ForegroundObjects, tracks: TrackCells, area: Floats
 ) -> ForegroundObjects:
     """The objects, with all cells of a track that covers the whole object.
@@ -222,29 +229,29 @@ def _drawn_by_tracks(
     key_of = {o.track: o.key for o in objects.known.values() if o.track}
     for place, track in enumerate(tracks.seen, 1):
         key = key_of[track]
-        mine, followed = owner == key, tracks.winner == place
-        believed = area[mine].sum()
-        if not believed or area[mine & followed].sum() < WHOLE * believed:
+        of_object, of_track = owner == key, tracks.winner == place
+        moving_area = area[of_object].sum()
+        if not moving_area or area[of_object & of_track].sum() < WHOLE_SHARE * moving_area:
             continue
-        if area[followed] @ objects.share[followed] < BORNE * area[followed].sum():
+        if area[of_track] @ objects.share[of_track] < TRACK_BELIEF * area[of_track].sum():
             continue
-        share[followed] = np.maximum(share[followed], tracks.share[followed])
-        owner[followed & (owner == 0)] = key
+        share[of_track] = np.maximum(share[of_track], tracks.share[of_track])
+        owner[of_track & (owner == 0)] = key
     return replace(objects, owner=owner, share=share)
 
 
-def _came_from(before: ForegroundObjects, cues: FrameCues) -> Keys:
+def _previous_owner(before: ForegroundObjects, cues: FrameCues) -> Keys:
     """(count,) the previous object that most of each cell comes from, or 0."""
     keys = np.unique(before.owner[before.owner > 0])
     count = len(cues.area)
     if not len(keys) or not len(cues.here):
         return np.zeros(count, np.int64)
     shares = cues.carried((before.owner[:, None] == keys).astype(np.float32))
-    return np.where(shares.max(axis=1) > CAME, keys[shares.argmax(axis=1)], 0)
+    return np.where(shares.max(axis=1) > CARRIED_SHARE, keys[shares.argmax(axis=1)], 0)
 
 
 def _with_tracks(
-    before: ForegroundObjects, tracks: TrackCells, came: Keys, area: Floats
+    before: ForegroundObjects, tracks: TrackCells, previous: Keys, area: Floats
 ) -> tuple[dict[int, MovingObject], int]:
     """The objects with new tracks assigned: to a trackless object that owned most of the cells, or new."""
     known = {
@@ -256,24 +263,24 @@ def _with_tracks(
         if track in followed:
             continue
         mine = tracks.winner == place
-        o = known.get(_host(came[mine], area[mine]))
+        o = known.get(_main_owner(previous[mine], area[mine]))
         if o is None or o.track:
             last_key += 1
             o = MovingObject(last_key, track, 0, 0, -math.inf)
-        known[o.key] = replace(o, id=o.id or track, track=track, followed=True)
+        known[o.key] = replace(o, id=o.id or track, track=track, had_track=True)
     return known, last_key
 
 
-def _host(came: Keys, area: Floats) -> int:
+def _main_owner(previous: Keys, area: Floats) -> int:
     """The object that owned most of the cells, or 0."""
-    if not len(came):
+    if not len(previous):
         return 0
-    sums = np.bincount(came, area)
+    sums = np.bincount(previous, area)
     most = int(sums[1:].argmax()) + 1 if len(sums) > 1 else 0
-    return most if most and sums[most] > OWNED * area.sum() else 0
+    return most if most and sums[most] > OWNED_SHARE * area.sum() else 0
 
 
-def _spread(owner: Keys, moves: NDArray[np.bool_], cues: FrameCues) -> Keys:
+def _spread_ownership(owner: Keys, moves: NDArray[np.bool_], cues: FrameCues) -> Keys:
     """Owners after moving cells without one took that of the nearest connected object."""
     rows = np.repeat(np.arange(len(owner)), np.diff(cues.ends))
     columns = cues.neighbours
@@ -282,7 +289,7 @@ def _spread(owner: Keys, moves: NDArray[np.bool_], cues: FrameCues) -> Keys:
     # The strongest link is written last, so that it wins.
     order = np.argsort(weight, kind="stable")
     rows, columns = rows[order], columns[order]
-    for _ in range(NEAR):
+    for _ in range(CONNECTED_STEPS):
         gives = (owner[rows] == 0) & (owner[columns] > 0)
         if not gives.any():
             break
@@ -313,12 +320,12 @@ def _candidates(
     return out, [int(k) for k in keys[good]]
 
 
-def _seen(
+def _observed(
     objects: ForegroundObjects,
     belief: Belief,
     area: Floats,
     now: float,
-    admission: Admission,
+    conditions: ReportingConditions,
 ) -> ForegroundObjects:
     """The objects updated from the frame: lasting candidates confirmed, missing ones deleted."""
     pixels = np.bincount(objects.owner, area, objects.last_key + 1)
@@ -328,24 +335,25 @@ def _seen(
     )
     known = {}
     for k, o in objects.known.items():
-        if pixels[k] < admission.least:
+        if pixels[k] < conditions.least:
             if o.track or now - o.last_seen <= (MISSED_S if o.id else 0):
                 known[k] = o
             continue
-        weight = FOLLOW if o.frames else 1.0
+        weight = NEWEST_WEIGHT if o.frames else 1.0
         o = replace(
             o,
             frames=o.frames + 1,
             last_seen=now,
             existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
-            borne_out=o.borne_out + weight * (float(alone[k] / pixels[k]) - o.borne_out),
+            existence_alone=o.existence_alone
+            + weight * (float(alone[k] / pixels[k]) - o.existence_alone),
         )
-        if admission.alone and not o.id and o.frames >= LASTS and o.exists:
-            if admission.stands(objects.owner == k):
+        if conditions.alone and not o.id and o.frames >= CONFIRM_FRAMES and o.is_reportable:
+            if conditions.is_standing(objects.owner == k):
                 o = replace(o, frames=0)
             else:
-                o = replace(o, id=admission.ids.new())
-        known[k] = replace(o, told=o.told or bool(o.id and o.exists))
+                o = replace(o, id=conditions.ids.new())
+        known[k] = replace(o, was_reported=o.was_reported or bool(o.id and o.is_reportable))
     held = np.zeros(objects.last_key + 1, dtype=bool)
     held[list(known)] = True
     owner = np.where(held[objects.owner], objects.owner, 0)

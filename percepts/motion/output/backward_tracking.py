@@ -23,10 +23,10 @@ THINNING = 8.0  # images per e-fold of age
 HORIZON_S = 120.0
 POINTS = 48
 LEAST_POINTS = 4
-REMEMBERED = 256  # ids of regions; the oldest are forgotten first
-FOUND = 0.4  # share of a region's points that must be found for it to be in view
+MOST_REMEMBERED = 256  # ids of regions; the oldest are forgotten first
+FOUND_SHARE = 0.4  # share of a region's points that must be found for it to be in view
 BACK_PX = 1.0  # most forward-backward error of a point
-ALIKE = 0.5  # mean difference of a point's neighbourhood, as a share of its contrast
+MOST_DIFFERENCE = 0.5  # mean difference of a point's neighbourhood, as a share of its contrast
 WINDOW = 9
 
 Grey = NDArray[np.uint8]
@@ -50,23 +50,23 @@ class BackwardTracker:
         Returns:
             The regions with `visible_since`.
         """
-        self._since = dict(list(self._since.items())[-REMEMBERED:])
+        self._since = dict(list(self._since.items())[-MOST_REMEMBERED:])
         due = not self._past or frame.time - self._past[-1][0] >= EVERY_S - 1e-6
         fresh = [r for r in regions if r.id not in self._since]
         if due or fresh:
-            image = _small(frame)
-            self._see(image)
+            image = _small_grey(frame)
+            self._reset_if_resized(image)
             for r in fresh:
-                self._since[r.id] = self._found_since(image, frame.time, r, frame.size)
+                self._since[r.id] = self._visible_since(image, frame.time, r, frame.size)
             if due:
-                self._keep(image, frame.time)
+                self._remember(image, frame.time)
         return tuple(replace(r, visible_since=self._since.get(r.id)) for r in regions)
 
-    def _see(self, image: Grey) -> None:
+    def _reset_if_resized(self, image: Grey) -> None:
         if image.shape != self._shape:
             self._past, self._since, self._shape = [], {}, image.shape
 
-    def _keep(self, image: Grey, now: float) -> None:
+    def _remember(self, image: Grey, now: float) -> None:
         self._past.append((now, image))
         times = [t for t, _ in self._past]
         # For each new image, drop the first that is closer to its neighbours than its age allows.
@@ -77,20 +77,22 @@ class BackwardTracker:
         if now - self._past[0][0] > HORIZON_S:
             del self._past[0]
 
-    def _found_since(self, image: Grey, now: float, region: Region, size: tuple[int, int]) -> float:
+    def _visible_since(
+        self, image: Grey, now: float, region: Region, size: tuple[int, int]
+    ) -> float:
         """The time of the oldest image to which a region can be tracked."""
         points = _points(image, region, size)
         since, newer = now, image
-        needed = max(LEAST_POINTS, FOUND * len(points))
+        needed = max(LEAST_POINTS, FOUND_SHARE * len(points))
         for time, older in reversed(self._past):
-            points, found = _followed(newer, older, points)
+            points, found = _track_back(newer, older, points)
             if found < needed:
                 break
             since, newer = time, older
         return since
 
 
-def _small(frame: Frame) -> Grey:
+def _small_grey(frame: Frame) -> Grey:
     """A frame in grey, SIZE pixels long if it is longer, (h, w)."""
     image = frame.image
     if image.ndim == 3 and image.shape[2] == 3:
@@ -106,7 +108,7 @@ def _points(grey: Grey, region: Region, size: tuple[int, int]) -> Floats:
     return np.zeros((0, 1, 2), np.float32) if found is None else np.asarray(found, np.float32)
 
 
-def _followed(newer: Grey, older: Grey, points: Floats) -> tuple[Floats, int]:
+def _track_back(newer: Grey, older: Grey, points: Floats) -> tuple[Floats, int]:
     """Positions of the points in an older image, and how many were found.
 
     Lost points move with the rest, so that a plain body does not lose them one by one.
@@ -117,7 +119,7 @@ def _followed(newer: Grey, older: Grey, points: Floats) -> tuple[Floats, int]:
     back, back_found, _ = _lucas_kanade(older, newer, there)
     off = np.linalg.norm((back - points)[:, 0], axis=1)
     inside = ((there[:, 0] >= 0) & (there[:, 0] < np.array(older.shape[::-1]))).all(axis=1)
-    similar = misfit < ALIKE * _contrast(newer, points)
+    similar = misfit < MOST_DIFFERENCE * _contrast(newer, points)
     tracked = found & back_found & inside & similar & (off < BACK_PX)
     if not tracked.any():
         return points, 0

@@ -28,21 +28,22 @@ Doubles = NDArray[np.float64]
 SIZE = 384  # longer side of the images that are compared, pixels
 DELAY_S = 0.3  # ground must have been bare for this long to count: outlines lag behind
 HALO = 7  # pixels: a region's outline may be off by half as much
-DIMMED = (0.25, 0.93)  # brightness in a shadow, as a share of that of the ground
+SHADOW_BRIGHTNESS = (0.25, 0.93)  # brightness in a shadow, as a share of that of the ground
 CHANGED = 8.0  # grey levels by which a pixel must differ from the ground to be evidence
 LEAST, LEAST_SHARE = 25, 0.2  # pixels, and share of a region, that must differ
 HUE = 0.06  # most difference of colour, as a share of brightness
-SHADED = 0.8  # share of the differing pixels that must be darker ground
-OPAQUE = 0.5  # share below which it is certainly no shadow
-EVEN = 2.0  # most ratio of the bright parts of a shadow to the dark ones, relative to the ground
-DETAIL = 1.5  # least standard deviation of comparable texture, grey levels
+SHADOW_SHARE = 0.8  # share of the differing pixels that must be darker ground
+OPAQUE_SHARE = 0.5  # share below which it is certainly no shadow
+MOST_UNEVENNESS = 2.0
+"""Most ratio of the bright parts of a shadow to the dark ones, relative to the ground."""
+LEAST_TEXTURE = 1.5  # least standard deviation of comparable texture, grey levels
 SAME_TEXTURE = 0.5  # correlation of textures from which the ground shows through
 OTHER_TEXTURE = 0.2  # correlation below which it does not
-BARE_EVEN, BARE_HUE = 1.25, 0.03  # the same limits where the ground has no texture
-FOR, AGAINST = 1.0, 1.5  # weight of a frame
-BOUNDS = (-6.0, 3.0)
-TURNS = 4  # frames from one look to the next at a region that is certainly none
-SURE = 2.0  # evidence from which a region counts as a shadow
+PLAIN_UNEVENNESS, PLAIN_HUE = 1.25, 0.03  # the same limits where the ground has no texture
+FRAME_FOR, FRAME_AGAINST = 1.0, 1.5  # weight of a frame
+EVIDENCE_BOUNDS = (-6.0, 3.0)
+RECHECK_FRAMES = 4  # frames from one look to the next at a region that is certainly none
+SHADOW_EVIDENCE = 2.0  # evidence from which a region counts as a shadow
 STEP_PX = 0.5  # the ground is warped where it is off by this much: each warp blurs it
 MOST = 256  # most regions with stored evidence
 
@@ -96,36 +97,36 @@ class CastShadowFilter:
         self._frames += 1
         if self._ground is not None and not static:
             self._ground = _aligned(self._ground, scene)
-        asked = [r for r in regions if self._is_asked(r)]
-        if asked or self._ground is None or frame.time - self._ground.since >= DELAY_S:
-            self._look(frame, regions, asked)
-        return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
+        due = [r for r in regions if self._is_due(r)]
+        if due or self._ground is None or frame.time - self._ground.since >= DELAY_S:
+            self._compare(frame, regions, due)
+        return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SHADOW_EVIDENCE)
 
-    def _is_asked(self, region: Region) -> bool:
+    def _is_due(self, region: Region) -> bool:
         """Whether a region is looked at; what has long been no shadow is in turn with others."""
-        settled = self._evidence.get(region.id, 0.0) <= BOUNDS[0]
-        return not settled or (self._frames + region.id) % TURNS == 0
+        certainly_none = self._evidence.get(region.id, 0.0) <= EVIDENCE_BOUNDS[0]
+        return not certainly_none or (self._frames + region.id) % RECHECK_FRAMES == 0
 
-    def _look(self, frame: Frame, regions: Sequence[Region], asked: Sequence[Region]) -> None:
+    def _compare(self, frame: Frame, regions: Sequence[Region], due: Sequence[Region]) -> None:
         """Compare regions with the ground, and renew the ground when it is due."""
         image, ground = comparable_image(frame), self._ground
         if ground is None or ground.bare.shape != image.shape:
             nowhere = np.full_like(image, np.nan)
             self._ground = BareGround(nowhere, nowhere, frame.time - DELAY_S)
             return
-        for r in asked:
-            self._weigh(r, image, ground, frame)
+        for r in due:
+            self._accumulate(r, image, ground, frame)
         if frame.time - ground.since >= DELAY_S:
             covered = _covered(regions, frame, image)
             self._ground = _updated(ground, image, covered, frame.time)
         self._evidence = dict(list(self._evidence.items())[-MOST:])
 
-    def _weigh(self, region: Region, image: Floats, ground: BareGround, frame: Frame) -> None:
+    def _accumulate(self, region: Region, image: Floats, ground: BareGround, frame: Frame) -> None:
         before = self._evidence.pop(
             region.id, 0.0
         )  # reinserted: the oldest entries are dropped first
         now = before + shadow_evidence(*_cut(region, image, ground, frame))
-        self._evidence[region.id] = min(max(now, BOUNDS[0]), BOUNDS[1])
+        self._evidence[region.id] = min(max(now, EVIDENCE_BOUNDS[0]), EVIDENCE_BOUNDS[1])
 
 
 def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
@@ -144,20 +145,24 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     if len(bright) < max(LEAST, LEAST_SHARE * np.count_nonzero(where)):
         return 0.0
     hue = np.sqrt(tint)
-    dim = (bright > DIMMED[0]) & (bright < DIMMED[1]) & (hue < HUE + 6.0 / np.sqrt(power))
+    dim = (
+        (bright > SHADOW_BRIGHTNESS[0])
+        & (bright < SHADOW_BRIGHTNESS[1])
+        & (hue < HUE + 6.0 / np.sqrt(power))
+    )
     shaded = float(dim.mean())
-    if shaded < OPAQUE:
-        return -AGAINST
+    if shaded < OPAQUE_SHARE:
+        return -FRAME_AGAINST
     low, high = np.quantile(bright[dim], [0.1, 0.9]).tolist()
-    if shaded < SHADED or high > EVEN * low:
+    if shaded < SHADOW_SHARE or high > MOST_UNEVENNESS * low:
         return 0.0
     seen_through = _texture_agreement(now, ground, differs)
     if seen_through is None:
-        even = high < BARE_EVEN * low and float(np.quantile(hue, 0.9)) < BARE_HUE
-        return FOR / 2 if even else 0.0
+        even = high < PLAIN_UNEVENNESS * low and float(np.quantile(hue, 0.9)) < PLAIN_HUE
+        return FRAME_FOR / 2 if even else 0.0
     if seen_through > SAME_TEXTURE:
-        return FOR
-    return -AGAINST if seen_through < OTHER_TEXTURE else 0.0
+        return FRAME_FOR
+    return -FRAME_AGAINST if seen_through < OTHER_TEXTURE else 0.0
 
 
 def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None:
@@ -166,7 +171,7 @@ def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None
     if inside.sum() < LEAST:
         return None
     a, b = (_detail(image, where)[inside] for image in (now, ground))
-    if float(b.std()) < DETAIL:
+    if float(b.std()) < LEAST_TEXTURE:
         return None
     return float((a * b).mean() / (a.std() * b.std() + 1e-6))
 
@@ -230,9 +235,9 @@ def _updated(ground: BareGround, image: Floats, covered: Mask, now: float) -> Ba
         size = (image.shape[1], image.shape[0])
         known, latest, off = _moved(known, off, size), _moved(latest, off, size), np.eye(2, 3)
     bare = ~covered[..., None]
-    settled = bare & np.isfinite(latest)
+    confirmed_bare = bare & np.isfinite(latest)
     return BareGround(
-        np.where(settled, latest, known), np.where(bare, image, np.float32(np.nan)), now, off
+        np.where(confirmed_bare, latest, known), np.where(bare, image, np.float32(np.nan)), now, off
     )
 
 

@@ -14,7 +14,7 @@ from visup.agent import Directive, Region
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats, WorkImage
-from visup.percepts.motion.foreground.following import ForegroundState
+from visup.percepts.motion.foreground.foreground_tracking import ForegroundState
 from visup.percepts.motion.foreground.objects import MovingObject, object_share, object_velocity
 from visup.percepts.motion.layers.dense_labelling import CLIP, PointEvidence
 from visup.percepts.motion.outlines.outline_motion import part_motion
@@ -63,7 +63,7 @@ def apply_ignore(
     return replace(evidence, likelihood=out)
 
 
-def looked_at(
+def tracks_to_look_at(
     directives: Sequence[Directive], tracks: Sequence[Track], scene: FrameMeasurements
 ) -> tuple[bool, ...]:
     """Which tracks lie inside 'look_at' boxes.
@@ -174,15 +174,15 @@ def report_objects(
 
 
 def _outlined(
-    things: Sequence[T], drawn: Callable[[T], RegionOutline | None], executor: Executor
+    items: Sequence[T], outline: Callable[[T], RegionOutline | None], executor: Executor
 ) -> list[tuple[T, RegionOutline]]:
     """Items with their outlines, every other one computed in parallel; those without one are dropped."""
-    later = [executor.submit(drawn, thing) for thing in things[1::2]]
-    shapes: list[RegionOutline | None] = [None] * len(things)
-    shapes[::2] = [drawn(thing) for thing in things[::2]]
+    later = [executor.submit(outline, item) for item in items[1::2]]
+    shapes: list[RegionOutline | None] = [None] * len(items)
+    shapes[::2] = [outline(item) for item in items[::2]]
     shapes[1::2] = [shape.result() for shape in later]
-    pairs = zip(things, shapes, strict=True)
-    return [(thing, shape) for thing, shape in pairs if shape is not None]
+    pairs = zip(items, shapes, strict=True)
+    return [(item, shape) for item, shape in pairs if shape is not None]
 
 
 def _object_region(

@@ -220,7 +220,7 @@ def _is_sliver(t: Track, scene: FrameMeasurements) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Clarity:
+class ConfirmContext:
     """How clearly tracks must move to be reported.
 
     Attributes:
@@ -238,7 +238,7 @@ def confirm(
     scene: FrameMeasurements,
     ids: IdAllocator,
     settings: MotionSettings,
-    asked: Clarity,
+    asked: ConfirmContext,
 ) -> Tracks:
     """Give public ids to tracks that have lasted and clearly move.
 

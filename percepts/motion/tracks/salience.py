@@ -25,27 +25,32 @@ from visup.percepts.motion.layers.layer_discovery import median_motion
 from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
 from visup.percepts.motion.tracks.track import Indices, Track
 
-LEAST_GONE = 1.0  # least displacement against the background, pixels: leaves reach less
-FAR_GONE = 4.0  # pixels, the same for a track too young to have swung back
+LEAST_DISPLACEMENT = 1.0  # least displacement against the background, pixels: leaves reach less
+YOUNG_DISPLACEMENT = 4.0  # pixels, the same for a track too young to have swung back
 SWING_S = 0.4
-STRAIGHT = 0.7  # net displacement as a share of path length
-EXPLAINED = 0.35  # most share of points that fit the background, over the most telling baseline
-CLEAR = 0.25  # the same for a track reported at once
-GONE_SHARE = 0.25  # share of its size that a track has gone when its place is another
-FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
-FOLLOW = 0.3  # weight of the newest frame in running means
-RESTS = 0.7  # share of points that fit the background when a track rests
-GROWN = 2.0  # growth since it last moved from which a resting object has absorbed background
-FEWEST = 4
-NEAR_GONE = 3.0  # pixels, least displacement of a track reported at once: further than leaves swing
+STRAIGHT_SHARE = 0.7  # net displacement as a share of path length
+EXPLAINED_SHARE = 0.35
+"""Most share of points that fit the background, over the most telling baseline."""
+EARLY_EXPLAINED_SHARE = 0.25  # the same for a track reported at once
+LEFT_PLACE_SHARE = 0.25  # share of its size that a track has gone when its place is another
+FIT_DISTANCE = 9.0  # squared Mahalanobis distance within which the background explains a point
+NEWEST_WEIGHT = 0.3  # weight of the newest frame in running means
+REST_SHARE = 0.7  # share of points that fit the background when a track rests
+ABSORBED_GROWTH = 2.0
+"""Growth since it last moved from which a resting object has absorbed background."""
+FEWEST_POINTS = 4
+EARLY_DISPLACEMENT = 3.0
+"""Pixels, least displacement of a track reported at once: further than leaves swing."""
 RING_STEPS = 5  # width of the surrounding ring, cells
 FEWEST_AROUND = 8
 MOST_BORDER = 0.2  # most share of the image border that an object may cover when first reported
 LITTLE_BORDER = 0.04  # the same for one reported at once: parallax is greatest at the border
-FOOT = 0.15  # height of a region's foot, as a share of its own
+FOOT_SHARE = 0.15  # height of a region's foot, as a share of its own
 LEAST_OWN = 0.25  # least motion of its own, pixels per frame: twice the sampling error
-SWAYS = 0.15  # share of the ground's motion that counts as none: the foot is not located to a pixel
-AHEAD = 0.4  # how much faster than the background, in its direction, a near object at rest may move
+GROUND_TOLERANCE = 0.15
+"""Share of the ground's motion that counts as none: the foot is not located to a pixel."""
+MOST_AHEAD = 0.4
+"""How much faster than the background, in its direction, a near object at rest may move."""
 
 
 def update_salience(
@@ -83,7 +88,7 @@ def is_stationary(t: Track, scene: FrameMeasurements) -> bool:
     stopped keeps its shape.
     """
     seen = [t.background_fit.get(_octave(m), 0.0) for m in scene.measured]
-    return bool(t.id) and min(seen) > RESTS
+    return bool(t.id) and min(seen) > REST_SHARE
 
 
 def stationary_cells(tracks: Sequence[Track], scene: FrameMeasurements) -> NDArray[np.bool_]:
@@ -101,8 +106,8 @@ def has_absorbed_background(t: Track, scene: FrameMeasurements) -> bool:
     The background also explains an object that stopped, but that has not grown since it moved.
     """
     area = float(scene.cells.area[t.share > 0.5].sum())
-    rests_always = bool(t.id) and min(t.background_fit.values(), default=0.0) > RESTS
-    return rests_always and area > GROWN * max(t.moving_area, 1.0)
+    rests_always = bool(t.id) and min(t.background_fit.values(), default=0.0) > REST_SHARE
+    return rests_always and area > ABSORBED_GROWTH * max(t.moving_area, 1.0)
 
 
 def _shares_explained(
@@ -111,9 +116,11 @@ def _shares_explained(
     """Share of the constraints of each label that the background explains; None where they are few."""
     at = winner[scene.cell_of(m.constraints)]
     number = np.bincount(at, minlength=count + 2)
-    fits = np.bincount(at[m.background.distances(m.constraints) < FITS], minlength=count + 2)
+    fits = np.bincount(
+        at[m.background.distances(m.constraints) < FIT_DISTANCE], minlength=count + 2
+    )
     pairs = zip(fits.tolist(), number.tolist(), strict=True)
-    return [fit / all_ if all_ >= FEWEST else None for fit, all_ in pairs]
+    return [fit / all_ if all_ >= FEWEST_POINTS else None for fit, all_ in pairs]
 
 
 def _confirmed_updated(
@@ -123,9 +130,9 @@ def _confirmed_updated(
     explained = dict(t.background_fit)
     for m, share in zip(scene.measured, shares, strict=True):
         if share is not None:
-            _note(explained, m, share)
+            _update_share(explained, m, share)
     area = t.moving_area
-    if min(explained.values(), default=1.0) < EXPLAINED:
+    if min(explained.values(), default=1.0) < EXPLAINED_SHARE:
         area = float(scene.cells.area[winner == k].sum())
     return replace(t, background_fit=MappingProxyType(explained), moving_area=area)
 
@@ -133,7 +140,7 @@ def _confirmed_updated(
 def _candidate_updated(
     t: Track, k: int, scene: FrameMeasurements, winner: Indices, ring: NDArray[np.bool_]
 ) -> Track:
-    explained, borne = dict(t.background_fit), dict(t.long_baseline_course)
+    explained, courses = dict(t.background_fit), dict(t.long_baseline_course)
     foot = foot_point(winner == k, scene.cells)
     for m in scene.measured:
         at = scene.cell_of(m.constraints)
@@ -143,18 +150,20 @@ def _candidate_updated(
             for model in (surrounding_motion(m, around), upright_motion(m, foot))
             if model is not None
         )
-        if np.count_nonzero(mine) >= FEWEST:
+        if np.count_nonzero(mine) >= FEWEST_POINTS:
             misfit = _misfit(m, local, np.flatnonzero(mine))
-            _note(explained, m, float(np.mean(misfit < FITS)))
+            _update_share(explained, m, float(np.mean(misfit < FIT_DISTANCE)))
         if m is scene.measured[0]:
-            t = _with_step(t, m, local, scene)
-        _note_course(borne, t, m, local, scene)
+            t = _with_displacement(t, m, local, scene)
+        _update_course(courses, t, m, local, scene)
     return replace(
-        t, background_fit=MappingProxyType(explained), long_baseline_course=MappingProxyType(borne)
+        t,
+        background_fit=MappingProxyType(explained),
+        long_baseline_course=MappingProxyType(courses),
     )
 
 
-def _with_step(
+def _with_displacement(
     t: Track, m: BaselineMotion, local: Sequence[Affine], scene: FrameMeasurements
 ) -> Track:
     """Add the displacement of a frame, if it was measured in it."""
@@ -165,8 +174,8 @@ def _with_step(
     return replace(t, displacement=travelled, path_length=t.path_length + float(np.hypot(*step)))
 
 
-def _note_course(
-    borne: dict[int, float],
+def _update_course(
+    courses: dict[int, float],
     t: Track,
     m: BaselineMotion,
     local: Sequence[Affine],
@@ -177,15 +186,15 @@ def _note_course(
     if m.constraints.span_s < SWING_S or rate is None or rate.time != scene.time:
         return
     age = scene.time - t.initiated + scene.seconds
-    way = t.path_length * min(1.0, m.constraints.span_s / age)
+    path = t.path_length * min(1.0, m.constraints.span_s / age)
     net = _displacement_from_background(rate.velocity(t.centre) * rate.span_s, t, m, local)
-    borne[_octave(m)] = float(np.hypot(*net)) / max(way, 1e-6)
+    courses[_octave(m)] = float(np.hypot(*net)) / max(path, 1e-6)
 
 
-def _note(explained: dict[int, float], m: BaselineMotion, share: float) -> None:
+def _update_share(explained: dict[int, float], m: BaselineMotion, share: float) -> None:
     """Update the running share of explained points over a baseline."""
     before = explained.get(_octave(m), share)
-    explained[_octave(m)] = before + FOLLOW * (share - before)
+    explained[_octave(m)] = before + NEWEST_WEIGHT * (share - before)
 
 
 def _octave(m: BaselineMotion) -> int:
@@ -225,7 +234,7 @@ def foot_point(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, floa
     if bottom >= cells.labels.shape[0]:
         return None
     top = int(cells.corners[mine, 1].min())
-    low = mine & (cells.corners[:, 3] > bottom - FOOT * (bottom - top))
+    low = mine & (cells.corners[:, 3] > bottom - FOOT_SHARE * (bottom - top))
     return float(np.average(cells.centre[low, 0], weights=cells.area[low])), float(bottom)
 
 
@@ -242,7 +251,7 @@ def upright_motion(m: BaselineMotion, foot: tuple[float, float] | None) -> Affin
     return Affine(matrix)
 
 
-def stands_there(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
+def moves_like_standing(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
     """Whether cells move, between two frames, as an upright object at rest there would.
 
     Args:
@@ -255,7 +264,7 @@ def stands_there(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bool:
     x, y = scene.cells.centre[mine].astype(np.int64).T
     moved = -np.median(scene.flow[y, x], axis=0)
     ground = rest.matrix[:, 2]
-    return bool(np.hypot(*(moved - ground)) < LEAST_OWN + SWAYS * np.hypot(*ground))
+    return bool(np.hypot(*(moved - ground)) < LEAST_OWN + GROUND_TOLERANCE * np.hypot(*ground))
 
 
 def _misfit(m: BaselineMotion, local: Sequence[Affine], which: Indices) -> NDArray[np.float32]:
@@ -289,28 +298,31 @@ def is_salient(
         return False
     travelled = float(np.hypot(*t.displacement))
     explained = min(t.background_fit.values(), default=0.0)
-    straight, borne = travelled >= STRAIGHT * t.path_length, _is_borne_out(t)
+    straight, straight_over_long = (
+        travelled >= STRAIGHT_SHARE * t.path_length,
+        _is_straight_over_long_baseline(t),
+    )
     if at_once:
         # Steps of slow objects are half noise: a longer baseline shows their course better.
-        course = straight if borne is None else borne
-        clear = explained < CLEAR / need and travelled >= need * NEAR_GONE
-        return clear and course and not _runs_ahead(t, scene)
-    least = LEAST_GONE if scene.time - t.initiated >= need * SWING_S else FAR_GONE
+        course = straight if straight_over_long is None else straight_over_long
+        clear = explained < EARLY_EXPLAINED_SHARE / need and travelled >= need * EARLY_DISPLACEMENT
+        return clear and course and not _outruns_background(t, scene)
+    least = LEAST_DISPLACEMENT if scene.time - t.initiated >= need * SWING_S else YOUNG_DISPLACEMENT
     # A track may be fed by leaf after leaf that happens to swing the same way.
-    course = straight and borne is not False
-    return explained < EXPLAINED / need and travelled >= need * least and course
+    course = straight and straight_over_long is not False
+    return explained < EXPLAINED_SHARE / need and travelled >= need * least and course
 
 
 def has_left_its_place(t: Track, scene: FrameMeasurements) -> bool:
     """Whether a track has gone a good part of its own size: then nothing more is learnt by waiting."""
     area = float(scene.cells.area[t.share > 0.5].sum())
-    return float(np.hypot(*t.displacement)) >= GONE_SHARE * math.sqrt(area)
+    return float(np.hypot(*t.displacement)) >= LEFT_PLACE_SHARE * math.sqrt(area)
 
 
-def _is_borne_out(t: Track) -> bool | None:
+def _is_straight_over_long_baseline(t: Track) -> bool | None:
     """Whether the longest baseline confirms the path length; None if none is long enough."""
     return (
-        t.long_baseline_course[max(t.long_baseline_course)] >= STRAIGHT
+        t.long_baseline_course[max(t.long_baseline_course)] >= STRAIGHT_SHARE
         if t.long_baseline_course
         else None
     )
@@ -323,7 +335,7 @@ def border_share(share: Floats, cells: Superpixels) -> float:
     return float(np.mean(share[border] > 0.5))
 
 
-def _runs_ahead(t: Track, scene: FrameMeasurements) -> bool:
+def _outruns_background(t: Track, scene: FrameMeasurements) -> bool:
     """Whether a track moves like the background, only faster, as near objects at rest do."""
     ground = np.asarray(scene.measured[0].background.models[-1].shift(t.centre))
     speed = float(np.hypot(*ground))
@@ -332,7 +344,7 @@ def _runs_ahead(t: Track, scene: FrameMeasurements) -> bool:
     more = t.instant_velocity() * scene.seconds - ground
     along = float(more @ ground) / speed**2
     across = abs(float(more[0] * ground[1] - more[1] * ground[0])) / speed**2
-    return along > 0 and across < along + AHEAD
+    return along > 0 and across < along + MOST_AHEAD
 
 
 def _displacement_from_background(

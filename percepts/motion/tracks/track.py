@@ -145,14 +145,14 @@ class Track:
         own = self.motions[0].rates.get(lag)
         measured_now = bool(self.path) and own is not None and own.time > self.path[-1][0] - 1e-6
         if len(self.path) > 1 and not measured_now:
-            went = self._went(span_s)
+            went = self._displacement_over(span_s)
             if dist(parts[0].shift(self.centre), went) > 1 + 0.1 * hypot(*went):
                 matrix = np.zeros((2, 3))
                 matrix[:, 2] = went
                 parts[0] = Affine(matrix)
         return tuple(parts)
 
-    def _went(self, span_s: float) -> tuple[float, float]:
+    def _displacement_over(self, span_s: float) -> tuple[float, float]:
         """Displacement over the last `span_s` seconds, (x, y) pixels; extrapolated before initiation."""
         now, sought = self.path[-1], self.path[-1][0] - span_s
         after = bisect_left(self.path, (sought,))
@@ -187,7 +187,7 @@ class Track:
         if len(self.motions) > 1 or rate.span_s > SMOOTH_S or len(self.path) < 2:
             return now
         span = min(SMOOTH_S, self.path[-1][0] - self.path[0][0])
-        return now - self.instant_velocity() + np.asarray(self._went(span)) / span
+        return now - self.instant_velocity() + np.asarray(self._displacement_over(span)) / span
 
     def best_rate(self) -> AffineRate | None:
         """The rate of the whole track, or of its only part."""

@@ -19,7 +19,7 @@ from visup.cli import app
 from visup.evaluation.training.closed_loop import train
 from visup.evaluation.training.examples import Example
 from visup.evaluation.training.fitting import DECAY, Rows, _slope, fit_perceptron
-from visup.percepts.motion.foreground.belief import unbiased, updated
+from visup.percepts.motion.foreground.belief import initial_belief, update_belief
 from visup.percepts.motion.foreground.cues import NAMES, FrameCues
 from visup.percepts.motion.foreground.perceptron import read_model
 
@@ -96,9 +96,9 @@ def sequence(seed: int, frames: int = 6, count: int = 120) -> list[Example]:
 
 def test_context_tells_more_than_cues_alone() -> None:
     model = train({f"{'abcdef'[k]}": sequence(k) for k in range(6)}, 0)
-    belief, alone, together = unbiased(), 0.0, 0.0
+    belief, alone, together = initial_belief(), 0.0, 0.0
     for example in sequence(99):
-        belief = updated(belief, example.cues, model)
+        belief = update_belief(belief, example.cues, model)
         if example.truth is not None:
             moves = example.truth > 0.5
             alone += ((model.alone.log_odds(example.cues.values) > 0) == moves).mean() / 3

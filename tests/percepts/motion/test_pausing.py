@@ -53,15 +53,15 @@ class Watched:
 
 def test_it_rests_and_sees_what_comes_as_soon(monkeypatch: pytest.MonkeyPatch) -> None:
     always = Watched(MotionBehaviour(), monkeypatch)
-    resting = Watched(PausingMotionBehaviour(4.0), monkeypatch)
-    idle = [t for t in resting.looks if t < EMPTY_S]
+    pausing = Watched(PausingMotionBehaviour(4.0), monkeypatch)
+    idle = [t for t in pausing.looks if t < EMPTY_S]
     assert len([t for t in always.looks if t < EMPTY_S]) == EMPTY_S * FPS
     assert len(idle) <= (CALM_S + 1.0) * FPS + (EMPTY_S - CALM_S) / 4.0
     assert always.seen
-    assert resting.seen
+    assert pausing.seen
     assert min(always.seen) >= EMPTY_S
-    assert min(resting.seen) - min(always.seen) <= 2.0 / FPS
-    assert len(resting.seen) >= 0.8 * len(always.seen)
+    assert min(pausing.seen) - min(always.seen) <= 2.0 / FPS
+    assert len(pausing.seen) >= 0.8 * len(always.seen)
 
 
 def test_it_goes_on_as_it_was_saved() -> None:

@@ -19,9 +19,9 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import (
     ALONE_NEAR,
     PAST,
-    believed,
+    belief_from_log_odds,
     context_cues,
-    unbiased,
+    initial_belief,
 )
 from visup.percepts.motion.foreground.perceptron import ForegroundModel, Perceptron
 
@@ -87,11 +87,11 @@ def _contexts(
     examples: Sequence[Example], alone: Perceptron, judge: Callable[[Floats], Floats]
 ) -> Judged:
     """The context cues of a sequence with beliefs by a classifier."""
-    belief, out = unbiased(), []
+    belief, out = initial_belief(), []
     for e in examples:
         odds = alone.log_odds(e.cues.values)
         context = context_cues(belief, e.cues, odds)
-        belief = believed(belief, e.cues, odds, judge(context))
+        belief = belief_from_log_odds(belief, e.cues, odds, judge(context))
         out.append(context)
     return Judged(out, examples)
 

@@ -17,7 +17,7 @@ from visup.percepts.motion.features.motion_constraints import Constraints
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.layers.affine import distances
 from visup.percepts.motion.layers.layer_discovery import layer_slack
-from visup.percepts.motion.output.trace import SegmentationTrace
+from visup.percepts.motion.output.segmentation_trace import SegmentationTrace
 from visup.percepts.motion.tracks.measurements import BaselineMotion
 from visup.percepts.motion.tracks.track import Track
 from visup.report.image_text import ink, shade, write

@@ -7,15 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from visup.percepts.motion.foreground._cues_jit import settled
+from visup.percepts.motion.foreground._cues_jit import smooth_untextured
 from visup.percepts.motion.foreground.belief import (
     ALONE_NEAR,
     CUES_IN_CONTEXT,
     PAST,
     TOGETHER,
-    believed,
+    belief_from_log_odds,
     context_cues,
-    unbiased,
+    initial_belief,
 )
 from visup.percepts.motion.foreground.cues import NAMES, FrameCues, tone_bins
 
@@ -52,9 +52,9 @@ def two_tones() -> np.ndarray:
 def test_the_past_speaks_for_where_something_moved_and_tones_for_what_looks_like_it() -> None:
     odds = np.full(COUNT, -4.0, np.float32)
     odds[20:30] = 4
-    belief = unbiased()
+    belief = initial_belief()
     for n in range(3):
-        belief = believed(belief, frame(two_tones(), first=not n), odds, odds)
+        belief = belief_from_log_odds(belief, frame(two_tones(), first=not n), odds, odds)
     assert belief.share.min() >= 0
     assert belief.share.max() <= 1
     elsewhere = two_tones()
@@ -69,7 +69,7 @@ def test_the_past_speaks_for_where_something_moved_and_tones_for_what_looks_like
 def test_neighbours_are_told_of() -> None:
     alone = np.zeros(COUNT, np.float32)
     alone[30] = 8
-    near = context_cues(unbiased(), frame(two_tones(), first=True), alone)[:, ALONE_NEAR]
+    near = context_cues(initial_belief(), frame(two_tones(), first=True), alone)[:, ALONE_NEAR]
     assert np.flatnonzero(near > 0).tolist() == [29, 31]
 
 
@@ -79,8 +79,10 @@ def test_what_goes_together_speaks_as_one_whatever_its_number(seed: int) -> None
     rng = np.random.default_rng(seed)
     part = rng.integers(0, 4, COUNT).astype(np.int32)
     alone = rng.normal(size=COUNT).astype(np.float32)
-    told = context_cues(unbiased(), frame(two_tones(), True, part), alone)
-    other = context_cues(unbiased(), frame(two_tones(), True, (3 - part).astype(np.int32)), alone)
+    told = context_cues(initial_belief(), frame(two_tones(), True, part), alone)
+    other = context_cues(
+        initial_belief(), frame(two_tones(), True, (3 - part).astype(np.int32)), alone
+    )
     assert np.allclose(told, other, atol=1e-5)
     for k in np.unique(part):
         assert np.allclose(told[part == k, TOGETHER], alone[part == k].mean(), atol=1e-5)
@@ -96,7 +98,7 @@ def test_settling_solves_the_linear_system(seed: int) -> None:
     values = rng.normal(size=(6, 1)).astype(np.float32)
     trust = rng.uniform(0.2, 1, (6, 1)).astype(np.float32)
     link = sparse.csr_matrix(weights)
-    found = settled(link.indptr, link.indices, link.data, values, trust, 60)
+    found = smooth_untextured(link.indptr, link.indices, link.data, values, trust, 60)
     system = np.diag(weights.sum(axis=1) + trust[:, 0]) - weights
     assert np.allclose(found, np.linalg.solve(system, trust * values), atol=1e-3)
     assert found.min() >= values.min() - 1e-4

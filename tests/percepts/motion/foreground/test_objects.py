@@ -9,13 +9,13 @@ from scipy import sparse
 from visup.percepts.motion.foreground.belief import Belief
 from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.objects import (
-    LASTS,
-    Admission,
+    CONFIRM_FRAMES,
     ForegroundObjects,
+    ReportingConditions,
     TrackCells,
-    follow_objects,
-    no_objects,
+    initial_objects,
     object_share,
+    update_objects,
 )
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
@@ -62,7 +62,7 @@ class Row:
     """Frame after frame."""
 
     def __init__(self) -> None:
-        self.objects: ForegroundObjects = no_objects()
+        self.objects: ForegroundObjects = initial_objects()
         self.ids = IdAllocator()
         self.frame = 0
         self.ids.reserve(100)
@@ -83,8 +83,8 @@ class Row:
         cues = row(shift, residual)
         none = np.zeros(BINS**3)
         belief = Belief(believed, believed if alone is None else alone, none, none)
-        admission = Admission(64.0 * 3, self.ids, lambda cells: self.stands, self.alone)
-        self.objects = follow_objects(self.objects, cues, belief, seen or tracks(), now, admission)
+        admission = ReportingConditions(64.0 * 3, self.ids, lambda cells: self.stands, self.alone)
+        self.objects = update_objects(self.objects, cues, belief, seen or tracks(), now, admission)
         return {
             o.id: np.flatnonzero(self.objects.owner == o.key).tolist()
             for o in self.objects.reported(now)
@@ -94,8 +94,8 @@ class Row:
 def test_what_lasts_is_an_object_and_keeps_its_id_as_it_moves() -> None:
     world = Row()
     found = [world.step(share(slice(5 + n, 12 + n)), shift=1) for n in range(8)]
-    assert all(not f for f in found[: LASTS - 1])
-    ids = {i for f in found[LASTS - 1 :] for i in f}
+    assert all(not f for f in found[: CONFIRM_FRAMES - 1])
+    ids = {i for f in found[CONFIRM_FRAMES - 1 :] for i in f}
     assert len(ids) == 1
     assert found[-1] == {ids.pop(): list(range(12, 19))}
 
@@ -124,7 +124,7 @@ def test_what_goes_nowhere_begins_no_object() -> None:
 
 def test_the_id_of_a_track_is_that_of_its_object() -> None:
     world = Row()
-    for _ in range(LASTS):
+    for _ in range(CONFIRM_FRAMES):
         found = world.step(share(slice(5, 15)))
     world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
     assert world.objects.id_of_track(7) == next(iter(found))
@@ -139,7 +139,7 @@ def test_a_track_gives_its_id_at_once_and_its_whole_body_belongs_to_it() -> None
 
 def test_an_object_that_a_track_comes_to_follow_keeps_its_id() -> None:
     world = Row()
-    for _ in range(LASTS + 1):
+    for _ in range(CONFIRM_FRAMES + 1):
         before = world.step(share(slice(5, 15)))
     after = world.step(share(slice(5, 15)), tracks(t7=slice(6, 12)))
     assert after == before
@@ -159,7 +159,7 @@ def test_what_is_not_believed_to_move_is_not_reported_whoever_tracks_it() -> Non
 
 def test_a_track_that_was_not_seen_for_a_moment_comes_back_as_the_same() -> None:
     world = Row()
-    for _ in range(LASTS + 10):
+    for _ in range(CONFIRM_FRAMES + 10):
         first = world.step(share(slice(5, 15)))
     world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
     hidden = TrackCells([], [7], np.zeros(COUNT, np.int64), np.zeros(COUNT, np.float32))

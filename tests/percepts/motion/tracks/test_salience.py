@@ -18,7 +18,7 @@ from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.background_motion import BackgroundMotion, empty_prevalence
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.lifecycle import Clarity, confirm
+from visup.percepts.motion.tracks.lifecycle import ConfirmContext, confirm
 from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
 from visup.percepts.motion.tracks.salience import foot_point, has_left_its_place, is_salient
 from visup.percepts.motion.tracks.track import Track
@@ -119,7 +119,9 @@ def test_what_has_left_its_place_need_not_last_before_a_camera_that_shakes_in_pl
     at = scene(time=0.08)
     young = track(at, gone, gone, {1: 0.3})
     young = replace(young, frames=2, evidence=300.0, last_seen=at.time)
-    (t,) = confirm((young,), at, IdAllocator(), MotionSettings(), Clarity((False,), in_place))
+    (t,) = confirm(
+        (young,), at, IdAllocator(), MotionSettings(), ConfirmContext((False,), in_place)
+    )
     assert bool(t.id) is (in_place and gone > 10)
 
 

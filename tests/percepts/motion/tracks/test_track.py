@@ -71,7 +71,7 @@ def test_the_way_gone_is_that_from_the_nearest_time_known(
 ) -> None:
     times = np.cumsum([dt for dt, _ in steps]).tolist()
     path = tuple((t, x, -x) for t, (_, x) in zip(times, steps, strict=True))
-    went = Track(1, 1, 0.0, 0.0, np.zeros(1, np.float32), path=path)._went(span_s)
+    went = Track(1, 1, 0.0, 0.0, np.zeros(1, np.float32), path=path)._displacement_over(span_s)
     then = min(path, key=lambda p: abs(times[-1] - span_s - p[0]))
     scale = span_s / max(times[-1] - then[0], 1e-6)
     assert went == pytest.approx(((path[-1][1] - then[1]) * scale, (path[-1][2] - then[2]) * scale))

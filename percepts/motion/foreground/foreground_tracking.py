@@ -9,7 +9,7 @@ import numpy as np
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground._cues_jit import nearest_lengths
-from visup.percepts.motion.foreground.belief import Belief, unbiased, updated
+from visup.percepts.motion.foreground.belief import Belief, initial_belief, update_belief
 from visup.percepts.motion.foreground.cues import (
     CueMemory,
     FrameCues,
@@ -18,18 +18,18 @@ from visup.percepts.motion.foreground.cues import (
     with_tracks,
 )
 from visup.percepts.motion.foreground.objects import (
-    Admission,
     ForegroundObjects,
+    ReportingConditions,
     TrackCells,
-    follow_objects,
-    no_objects,
+    initial_objects,
+    update_objects,
 )
 from visup.percepts.motion.foreground.perceptron import ForegroundModel
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 from visup.percepts.motion.tracks.track import Track
 
 CALM_PX = 0.25  # medians: cameras at rest and in orbit 0.00; travelling or panning ones 0.5 to 34
-FOLLOW = 0.2  # weight of the newest frame in the running mean
+NEWEST_WEIGHT = 0.2  # weight of the newest frame in the running mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,7 @@ class ForegroundState:
         return self.ground_px is not None and not self.calm
 
 
-def resting(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
+def without_model(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
     """The state after a frame in which only the background's motion is updated.
 
     Args:
@@ -80,13 +80,15 @@ def _ground_px(state: ForegroundState, scene: FrameMeasurements) -> float:
     ground = np.stack([model.at(scene.cells.centre) for model in models])
     speed = float(np.median(nearest_lengths(ground, scene.flow[y, x])))
     return (
-        speed if state.ground_px is None else state.ground_px + FOLLOW * (speed - state.ground_px)
+        speed
+        if state.ground_px is None
+        else state.ground_px + NEWEST_WEIGHT * (speed - state.ground_px)
     )
 
 
-def no_foreground() -> ForegroundState:
+def initial_foreground() -> ForegroundState:
     """The state before the first frame of a size."""
-    return ForegroundState(None, unbiased(), no_objects())
+    return ForegroundState(None, initial_belief(), initial_objects())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,13 +123,13 @@ class TrackPosterior:
         return track_cues(self.posterior, confirmed)
 
 
-def follow_foreground(
+def update_foreground(
     state: ForegroundState,
     model: ForegroundModel,
     scene: FrameMeasurements,
     shown: tuple[FrameCues, CueMemory],
     tracked: TrackPosterior,
-    admission: Admission,
+    conditions: ReportingConditions,
 ) -> tuple[FrameCues, ForegroundState]:
     """The foreground after a frame.
 
@@ -137,13 +139,13 @@ def follow_foreground(
         scene: The frame as measured.
         shown: Its cues that need no tracks, and their memory (`flow_cues`).
         tracked: Its tracks.
-        admission: Conditions on objects.
+        conditions: Conditions on objects.
 
     Returns:
         The cues of the frame, and the state.
     """
     cues, memory = with_tracks(shown[0], tracked.cues()), shown[1]
-    belief = updated(state.belief, cues, model)
+    belief = update_belief(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
-    objects = follow_objects(state.objects, cues, belief, tracks, scene.time, admission)
+    objects = update_objects(state.objects, cues, belief, tracks, scene.time, conditions)
     return cues, ForegroundState(memory, belief, objects, _ground_px(state, scene))
