@@ -173,8 +173,9 @@ def kill_starters(until: Event) -> None:
 
 
 @pytest.fixture
-def ten(tmp_path: Path) -> list[Clip]:
+def ten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Clip]:
     pytest.importorskip("distributed", reason="needs the extra `cluster`")
+    monkeypatch.setattr("visup.archive.filling.own_workers.LOOK_S", 0.1)
     return clips(tmp_path / "clips", *map(str, range(1, 11)))
 
 
@@ -194,7 +195,7 @@ def test_workers_come_again_when_they_cannot_be_started_at_once(
                 killer.start()
                 # Until Dask has given places up: how long that takes depends on how busy the machine is.
                 while not own.renewals:
-                    time.sleep(0.1)
+                    time.sleep(0.02)
                 over.set()
                 killer.join()
 

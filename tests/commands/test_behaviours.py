@@ -1,16 +1,13 @@
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from tests.cli import caller
 from tests.clips import moving_disc, write_clip
-from tests.paths import ROOT
 from visup.agent.model.errors import VisupError
 from visup.agent.plugins.factory import load_behaviours
 from visup.agent.plugins.isolated import IsolatedBehaviour
@@ -118,7 +115,10 @@ def test_what_cannot_be_set_is_refused_before_the_run(
     assert (code, message in told) == (2, True), told
 
 
-def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(tmp_path: Path) -> None:
+def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     clip = write_clip(tmp_path / "clip.avi", moving_disc(12))
     (tmp_path / "mine.py").write_text(
         "import os\n"
@@ -128,20 +128,10 @@ def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(tmp_path:
         "    def perceive(self, frame, observation, directives):\n"
         "        os._exit(7)\n"
     )
-    command = [sys.executable, "-m", "visup.cli", "watch", str(clip), "--json", "--no-video"]
-    command += ["--behaviour", "mine.py", "--isolate", "mine", "--out", "run"]
-    root = ROOT
-    paths = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run(
-        command,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1, done.stderr
-    assert done.stderr == ""
-    assert "The behaviour 'mine' failed; its output is unavailable." in done.stdout
-    assert "its process ended with exit code 7" in done.stdout
-    assert '"frames": 12' in done.stdout
+    words = ["--behaviour", "mine.py", "--isolate", "mine", "--out", "run"]
+    done = caller(monkeypatch, capfd)("watch", clip, "--json", "--no-video", *words)
+    assert done.code == 1, done.err
+    assert done.err == ""
+    assert "The behaviour 'mine' failed; its output is unavailable." in done.out
+    assert "its process ended with exit code 7" in done.out
+    assert '"frames": 12' in done.out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.oracles.reasoning import relations
 from visup.commands.eval.catalogue import EVALUATIONS, eval_app
 from visup.commands.eval.evaluation import EvaluationCommand
 
@@ -22,7 +24,9 @@ def test_a_function_takes_what_its_command_gives(evaluation: EvaluationCommand) 
     signature(getattr(import_module(module), name)).bind(**dict.fromkeys([*given, "progress"]))
 
 
-def test_figures_are_shown_and_written(tmp_path: Path) -> None:
+def test_figures_are_shown_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # How fast it is has the same form after one round of each size, and only that takes long.
+    monkeypatch.setattr(relations, "speed", partial(relations.speed, frames=62, rounds=1))
     file = tmp_path / "figures.json"
     words = ["relations", "--draws", "5", "--minutes", "0.1", "--json", str(file)]
     done = CliRunner().invoke(eval_app(), words)
