@@ -5,9 +5,12 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections.abc import Callable
+from functools import cache
 from typing import Annotated
 
 import typer
+from typer.main import get_command
 
 from visup.agent.memory_limit import check_memory
 from visup.agent.model.errors import VisupError
@@ -98,6 +101,12 @@ def options(
     """The visual supervisor: watches machines work and reports whether the work goes well."""
 
 
+@cache
+def command() -> Callable[[], object]:
+    """The command with its groups, which take typer longer to put together than most commands take."""
+    return get_command(app)
+
+
 def main() -> None:
     """Run the command; an error that the user can fix is printed as one message, with exit code 2."""
     if gc.get_threshold()[0] < COLLECT_AFTER:
@@ -105,7 +114,7 @@ def main() -> None:
     try:
         if not {"-h", "--help", "--version"} & set(sys.argv):
             check_memory()
-        app()
+        command()()
     except VisupError as error:
         complain(str(error))
         sys.exit(BAD_INPUT)
