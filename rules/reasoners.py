@@ -89,7 +89,7 @@ def default_reasoners(
             PoseReasoner(s.pose),
             DepthReasoner(s.depth),
             RelationReasoner(s.relations),
-            *((TraitReasoner(s.traits),) if traits else ()),
+            *((TraitReasoner(replace(s.traits, relations=s.relations)),) if traits else ()),
             ZoneReasoner(s.zones),
             CouplingReasoner(replace(s.coupling, relations=s.relations)),
             RelationEventReasoner(s.narrative),

@@ -86,14 +86,14 @@ class ActivationReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Reason about one step; see `Reasoner`."""
-        asked = self._reasoner(mind, observation)
-        return Outcome(asked.mind, directives=tuple(_directives(mind, asked.conditions)))
+        outcome = self._reasoner(mind, observation)
+        return Outcome(outcome.mind, directives=tuple(_directives(mind, outcome.conditions)))
 
 
 def _directives(mind: Mind, conditions: Sequence[AlertCondition]) -> Iterator[Directive]:
-    for concern in conditions:
-        (number,) = concern.objects
+    for condition in conditions:
+        (number,) = condition.objects
         region = mind.objects[number].region.id
-        name = concern.kind.removeprefix(_PREFIX)
+        name = condition.kind.removeprefix(_PREFIX)
         data = {"behaviour": name, "object": number, "region": region}
-        yield Directive(WAKE, concern.cause, MappingProxyType(data))
+        yield Directive(WAKE, condition.cause, MappingProxyType(data))

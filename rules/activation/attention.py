@@ -26,15 +26,15 @@ class AttentionSettings:
     """Settings of attention.
 
     Attributes:
-        settled: Likelihood of the identity from which an object may rest.
-        settled_s: How long it must have had it, seconds.
-        turning: Rate of rotation above which it is matched, degrees per second.
+        likelihood: Likelihood of the identity from which an object may rest.
+        identified_s: How long it must have had it, seconds.
+        rotation_deg_s: Rate of rotation above which it is matched, degrees per second.
         every_s: Interval of matches at rest, seconds.
     """
 
-    settled: float = 0.95
-    settled_s: float = 2.0
-    turning: float = 3.0
+    likelihood: float = 0.95
+    identified_s: float = 2.0
+    rotation_deg_s: float = 3.0
     every_s: float = 1.0
 
 
@@ -46,29 +46,37 @@ class AttentionReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Reason about one step; see `Reasoner`."""
-        old = mind.recall(ATTENTION)
-        since = {b.id: self._since(b, old, mind.time) for b in mind.objects.values()}
-        wanted = {i for t in mind.tasks for e in t.expected for i in e.objects}
+        before = mind.recall(ATTENTION)
+        identified_since = {
+            b.id: self._identified_since(b, before, mind.time) for b in mind.objects.values()
+        }
+        expected = {i for t in mind.tasks for e in t.expected for i in e.objects}
         resting = [
-            b for b in mind.present() if b.id not in wanted and self._known(b, since, mind.time)
+            b
+            for b in mind.present()
+            if b.id not in expected and self._may_rest(b, identified_since, mind.time)
         ]
-        mind = mind.remember(ATTENTION, MappingProxyType(since))
-        return Outcome(mind, directives=tuple(self._asked(resting)))
+        mind = mind.remember(ATTENTION, MappingProxyType(identified_since))
+        return Outcome(mind, directives=tuple(self._rest_directives(resting)))
 
-    def _since(
+    def _identified_since(
         self, b: ObjectBelief, old: Mapping[int, tuple[str, float]], now: float
     ) -> tuple[str, float]:
         """The settled name, or an empty one, and since when."""
-        name = b.name if b.confidence >= self.settings.settled and b.candidates else ""
+        name = b.name if b.confidence >= self.settings.likelihood and b.candidates else ""
         before = old.get(b.id)
         return before if before is not None and before[0] == name else (name, now)
 
-    def _known(self, b: ObjectBelief, since: Mapping[int, tuple[str, float]], now: float) -> bool:
+    def _may_rest(
+        self, b: ObjectBelief, since: Mapping[int, tuple[str, float]], now: float
+    ) -> bool:
         s, (name, begun) = self.settings, since[b.id]
-        turns = b.pose is not None and b.pose.spin is not None and b.pose.spin.rate > s.turning
-        return bool(name) and now - begun >= s.settled_s - 1e-6 and not turns
+        turns = (
+            b.pose is not None and b.pose.spin is not None and b.pose.spin.rate > s.rotation_deg_s
+        )
+        return bool(name) and now - begun >= s.identified_s - 1e-6 and not turns
 
-    def _asked(self, resting: list[ObjectBelief]) -> Iterator[Directive]:
+    def _rest_directives(self, resting: list[ObjectBelief]) -> Iterator[Directive]:
         for b in resting:
             data = {"behaviour": "shape", "region": b.region.id, "every_s": self.settings.every_s}
             reason = (

@@ -23,7 +23,7 @@ from visup.agent import (
 )
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
-from visup.rules.wording.sentences import called, spaced
+from visup.rules.wording.sentences import role_or_model, spaced
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ class QuestionReasoner:
 
 def question_text(mind: Mind, object_id: int, names: tuple[str, ...]) -> str:
     """The question in words: 'Is object 2 the arm or the guitar?'."""
-    phrases = [f"the {spaced(called(mind, name))}" for name in names]
+    phrases = [f"the {spaced(role_or_model(mind, name))}" for name in names]
     return f"Is object {object_id} {', '.join(phrases[:-1])} or {phrases[-1]}?"
 
 

@@ -138,7 +138,7 @@ class Program:
             self.places[key] = len(self.steps) - 1
         return self.places[key]
 
-    def looks(self) -> Iterable[tuple[int, Predicate | Measure]]:
+    def lookups(self) -> Iterable[tuple[int, Predicate | Measure]]:
         """All lookups, each with its step."""
         return ((k, s.node) for k, s in enumerate(self.steps) if s.node is not None)
 
@@ -162,7 +162,7 @@ class Compiler:
         """Compile a formula."""
         match node:
             case Predicate():
-                return self._called(node, scope, certain=True)
+                return self._lookup(node, scope, certain=True)
             case Literal(value=value):
                 number = inf if value else -inf
                 return self.constant(number, number, certain=True)
@@ -193,7 +193,7 @@ class Compiler:
                 counting = SlidingCount(least.base, span, node.counts_samples)
                 return self.remembered(counting, self.formula(part, scope))
             case Last(part=part, duration=age):
-                return self._recalled(age, self.formula(part, scope))
+                return self._sample_and_hold(age, self.formula(part, scope))
             case Quantified():
                 return self._quantified(node, scope)
             case Let(part=part):
@@ -205,7 +205,7 @@ class Compiler:
             case Number():
                 return self.constant(node.base, node.base)
             case Measure():
-                return self._called(node, scope, certain=False)
+                return self._lookup(node, scope, certain=False)
             case Negative(part=part):
                 return self.combined("not", self.term(part, scope))
             case Arithmetic(left=left, operator=operator, right=right):
@@ -309,17 +309,17 @@ class Compiler:
         before = self.remembered(EndedWindow(high - low, high), left, delay=high)
         return self.combined("least", found, before)
 
-    def _recalled(self, age: Number, at: ValueRef) -> ValueRef:
+    def _sample_and_hold(self, age: Number, at: ValueRef) -> ValueRef:
         return self.remembered(SampleAndHold(ticks(age.base)), at, certain=at.certain)
 
     def _comparison(self, node: Comparison, scope: Scope) -> ValueRef:
-        entered = self._compared(node.operator, node.left, node.right, scope)
+        entered = self._order(node.operator, node.left, node.right, scope)
         if node.leave is None:
             return entered
-        left = self._compared(node.operator, node.left, node.leave, scope)
+        left = self._order(node.operator, node.left, node.leave, scope)
         return self.remembered(HysteresisLatch(), entered, left)
 
-    def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> ValueRef:
+    def _order(self, operator: str, left: Term, right: Term, scope: Scope) -> ValueRef:
         if operator in ("==", "!="):
             apart = self.combined("abs", self.combined("-", *self._sides(left, right, scope)))
             if operator == "==":
@@ -341,7 +341,7 @@ class Compiler:
         span = ticks(node.duration.base)
         match node.name:
             case "last":
-                return self._recalled(node.duration, at)
+                return self._sample_and_hold(node.duration, at)
             case "before":
                 return self.windowed("always", span, span, 0, at)
             case "lowest" | "highest":
@@ -349,7 +349,7 @@ class Compiler:
         begin = self.windowed("always", span, span, 0, at)
         return self.combined("rate", at, begin, numbers=(1.0 / node.duration.base,))
 
-    def _called(self, node: Predicate | Measure, scope: Scope, certain: bool) -> ValueRef:
+    def _lookup(self, node: Predicate | Measure, scope: Scope, certain: bool) -> ValueRef:
         names = [name for name, _ in scope]
         # An inner variable shadows an outer one of the same name.
         axis = {name: i for i, name in enumerate(names)}

@@ -79,7 +79,7 @@ class LinkedProgram:
         places: Start of each step's intervals.
         axes: Axes of the objects that each step depends on, in order.
         size: Length of the arena, numbers.
-        looked: Length of its first part, the looked-up quantities, in their order.
+        lookup_size: Length of its first part, the lookup_size-up quantities, in their order.
         memory: Layout of the states.
         fresh: The states before the first sample.
     """
@@ -90,20 +90,20 @@ class LinkedProgram:
         self.axes = [tuple(sorted(step.axes)) for step in program.steps]
         self.size = 0
         self._stages: list[_Stage] = []
-        self._ready: list[int] = []  # the stage from which each step's value is available
-        self._wider: dict[tuple[int, frozenset[int]], int] = {}
-        self._moments: list[PointSlot] = []
+        self._available_from: list[int] = []  # the stage from which each step's value is available
+        self._broadcasts: dict[tuple[int, frozenset[int]], int] = {}
+        self._point_slots: list[PointSlot] = []
         self._windows: list[WindowSlot] = []
-        self._kept = 0
+        self._state_size = 0
         # Quantities come first, so that they are copied in one go.
-        measured = [k for k, node in program.looks() if isinstance(node, Measure)]
-        places = {k: self._room(n ** len(self.axes[k])) for k in measured}
-        self.looked = self.size
+        measured = [k for k, node in program.lookups() if isinstance(node, Measure)]
+        places = {k: self._allocate(n ** len(self.axes[k])) for k in measured}
+        self.lookup_size = self.size
         for number, step in enumerate(program.steps):
             room = places.get(number)
-            self.places.append(self._room(n ** len(step.axes)) if room is None else room)
-            self._lay(number, step)
-        self.memory = StateLayout(n, tuple(self._moments), tuple(self._windows))
+            self.places.append(self._allocate(n ** len(step.axes)) if room is None else room)
+            self._lay_out(number, step)
+        self.memory = StateLayout(n, tuple(self._point_slots), tuple(self._windows))
         self.fresh = self.memory.fresh()
         rows = [row for stage in self._stages for row in stage.rows]
         numbers = [pair for stage in self._stages for pair in stage.numbers]
@@ -117,8 +117,8 @@ class LinkedProgram:
         Args:
             states: States before, for the same number of objects.
             now: Microseconds.
-            facts: Codes of the looked-up facts.
-            arena: (size,) all intervals; those of the looked-up quantities are filled in.
+            facts: Codes of the lookup_size-up facts.
+            arena: (size,) all intervals; those of the lookup_size-up quantities are filled in.
 
         Returns:
             States after; the arena holds the intervals of all steps.
@@ -148,13 +148,13 @@ class LinkedProgram:
         at += self.places[step]
         return arena.item(at), arena.item(at + self.n ** len(axes))
 
-    def _lay(self, number: int, step: Operation) -> None:
+    def _lay_out(self, number: int, step: Operation) -> None:
         """Lay out a step."""
         cells = self.n ** len(step.axes)
-        stage = max((self._ready[r] for r in step.reads), default=0)
+        stage = max((self._available_from[r] for r in step.reads), default=0)
         if isinstance(step.operator, WindowOperator):
             self._stage(stage).windows.append(len(self._windows))
-            reads = tuple(self._wide(r, step.axes) for r in step.reads)
+            reads = tuple(self._broadcast(r, step.axes) for r in step.reads)
             self._windows.append(
                 WindowSlot(
                     step.operator,
@@ -167,8 +167,8 @@ class LinkedProgram:
             )
             stage += 1
         elif step.node is None or isinstance(step.node, Predicate):
-            self._put(stage, *self._row(number, step, cells))
-        self._ready.append(stage)
+            self._append(stage, *self._row(number, step, cells))
+        self._available_from.append(stage)
 
     def _row(
         self, number: int, step: Operation, cells: int
@@ -187,33 +187,35 @@ class LinkedProgram:
             row[vm.AXIS], row[vm.APART] = step.order[0], bits(step.order[1:])
         else:
             for column, read in zip((vm.A, vm.B), step.reads, strict=False):
-                row[column] = self._wide(read, step.axes)
+                row[column] = self._broadcast(read, step.axes)
             if step.operator is None:
                 row[vm.OP] = _KINDS[step.kind]
             else:
                 operator = cast("PointOperator", step.operator)
-                row[vm.OP], span, fills = _moment(operator)
-                row[vm.STATE], numbers = self._kept, (span, 0.0)
-                self._moments.append(PointSlot(operator, len(step.axes), self._kept, fills))
-                self._kept += cells * len(fills)
+                row[vm.OP], span, fills = _opcode(operator)
+                row[vm.STATE], numbers = self._state_size, (span, 0.0)
+                self._point_slots.append(
+                    PointSlot(operator, len(step.axes), self._state_size, fills)
+                )
+                self._state_size += cells * len(fills)
         return row, (numbers[0], numbers[1])
 
-    def _wide(self, read: int, axes: frozenset[int]) -> int:
+    def _broadcast(self, read: int, axes: frozenset[int]) -> int:
         """Position of a step's intervals, broadcast to some axes."""
         own = self.program.steps[read].axes
         if own == axes:
             return self.places[read]
-        if (read, axes) not in self._wider:
+        if (read, axes) not in self._broadcasts:
             cells = self.n ** len(axes)
             row = [0] * vm.WIDTH
             row[vm.OP], row[vm.A] = vm.SPREAD, self.places[read]
-            row[vm.DEST], row[vm.CELLS] = self._room(cells), cells
+            row[vm.DEST], row[vm.CELLS] = self._allocate(cells), cells
             row[vm.MASK_A], row[vm.MASK] = bits(own), bits(axes)
-            self._put(self._ready[read], row, (0.0, 0.0))
-            self._wider[read, axes] = row[vm.DEST]
-        return self._wider[read, axes]
+            self._append(self._available_from[read], row, (0.0, 0.0))
+            self._broadcasts[read, axes] = row[vm.DEST]
+        return self._broadcasts[read, axes]
 
-    def _room(self, cells: int) -> int:
+    def _allocate(self, cells: int) -> int:
         self.size += 2 * cells
         return self.size - 2 * cells
 
@@ -222,13 +224,13 @@ class LinkedProgram:
             self._stages.append(_Stage([], [], []))
         return self._stages[stage]
 
-    def _put(self, stage: int, row: list[int], numbers: tuple[float, float]) -> None:
+    def _append(self, stage: int, row: list[int], numbers: tuple[float, float]) -> None:
         rows, pairs, _ = self._stage(stage)
         rows.append(row)
         pairs.append(numbers)
 
 
-def _moment(operator: PointOperator) -> tuple[int, float, tuple[float, ...]]:
+def _opcode(operator: PointOperator) -> tuple[int, float, tuple[float, ...]]:
     """Opcode of an operator, its span, and its state before the first sample."""
     match operator:
         case BooleanWindow(kind=kind, high=high):

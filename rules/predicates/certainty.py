@@ -22,14 +22,14 @@ from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.presence.settings import PresenceSettings
 from visup.rules.wording.sentences import is_of_kind
 
-PART = FragmentSettings()
+FRAGMENTS = FragmentSettings()
 LEAST_SHARE = 2 * PresenceSettings().least_share
 """Least share of the image of an object of its own, unless it is far away."""
 LEAST_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
-CAME_IN = 0.5
+ENTRY_DISTANCE = 0.5
 """Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
-ADVANCED = 0.25
+ENTRY_ADVANCE = 0.25
 """How far its other side has moved away from that border since, in its sizes."""
 LEAST_VISIBLE = 0.5
 """Least share of its area of what came in, as far as that was seen."""
@@ -47,21 +47,24 @@ def standalone(facts: Snapshot) -> Codes:
     """
     beliefs = facts.beliefs
     if not beliefs:
-        return facts.among(())
+        return facts.codes_of_ids(())
     width, height = facts.mind.frame_size
     area = np.array([b.region.area for b in beliefs], dtype=float)
-    sure = np.array([b.region.confidence for b in beliefs]) >= LEAST_CONFIDENCE
-    sure &= area >= LEAST_SHARE * width * height
-    sure &= (whole(facts) == YES) | (identified(facts) == YES)
-    far = np.maximum(
-        PART.apart * image_diagonal(facts.mind.frame_size), PART.apart_size * np.sqrt(area)
+    certain = np.array([b.region.confidence for b in beliefs]) >= LEAST_CONFIDENCE
+    certain &= area >= LEAST_SHARE * width * height
+    certain &= (whole(facts) == YES) | (identified(facts) == YES)
+    clearance = np.maximum(
+        FRAGMENTS.apart * image_diagonal(facts.mind.frame_size),
+        FRAGMENTS.apart_size * np.sqrt(area),
     )
-    gap = facts.of_pairs(GAP)
-    beside = np.isfinite(gap[1]) & (gap[0] <= far[:, None])
-    larger = area[:, None] <= PART.part * area[None]
-    beside |= facts.related("moving_together") == YES
-    alone = sure & ~(beside & larger).any(axis=1)
-    return facts.among({b.id for b, yes in zip(beliefs, alone.tolist(), strict=True) if yes})
+    gap = facts.pair_intervals(GAP)
+    near_others = np.isfinite(gap[1]) & (gap[0] <= clearance[:, None])
+    larger = area[:, None] <= FRAGMENTS.part * area[None]
+    near_others |= facts.relation_codes("moving_together") == YES
+    alone = certain & ~(near_others & larger).any(axis=1)
+    return facts.codes_of_ids(
+        {b.id for b, standing_alone in zip(beliefs, alone.tolist(), strict=True) if standing_alone}
+    )
 
 
 def whole(facts: Snapshot) -> Codes:
@@ -72,7 +75,7 @@ def whole(facts: Snapshot) -> Codes:
         x, y, w, h = region.bbox
         return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
 
-    return facts.each(lambda b: code(clear(b.region)))
+    return facts.codes_of_objects(lambda b: code(clear(b.region)))
 
 
 def came_in(facts: Snapshot) -> Codes:
@@ -85,14 +88,14 @@ def came_in(facts: Snapshot) -> Codes:
     """
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
 
-    def look(b: ObjectBelief) -> int:
+    def evaluate(b: ObjectBelief) -> int:
         if b.id not in memory.of:
             return MAYBE
         track = memory.of[b.id]
-        mostly = track.visible_share >= LEAST_VISIBLE
-        return code(mostly and _crossed_border(track.coherent_box, b.region.bbox, size))
+        mostly_visible = track.visible_share >= LEAST_VISIBLE
+        return code(mostly_visible and _crossed_border(track.coherent_box, b.region.bbox, size))
 
-    return facts.each(look)
+    return facts.codes_of_objects(evaluate)
 
 
 def _crossed_border(first: Box, now: Box, size: tuple[int, int]) -> bool:
@@ -100,23 +103,23 @@ def _crossed_border(first: Box, now: Box, size: tuple[int, int]) -> bool:
     left, top, width, height = now
     gaps = (x, y, size[0] - x - w, size[1] - y - h)
     advances = (left + width - x - w, top + height - y - h, x - left, y - top)
-    near, least = CAME_IN * max(w, h), ADVANCED * max(width, height)
+    near, least = ENTRY_DISTANCE * max(w, h), ENTRY_ADVANCE * max(width, height)
     return any(g <= near and a >= least for g, a in zip(gaps, advances, strict=True))
 
 
 def identified(facts: Snapshot) -> Codes:
     """Whether an object is likelier one of the models than none of them, or has been named."""
 
-    def look(b: ObjectBelief) -> int:
+    def evaluate(b: ObjectBelief) -> int:
         likely = bool(b.candidates) and b.candidates[0].confidence > b.unknown
         return code(likely or b.id in facts.mind.answers)
 
-    return facts.each(look)
+    return facts.codes_of_objects(evaluate)
 
 
 def of_kind(facts: Snapshot) -> Codes:
     """Whether only the class of an object is known: from a detector, without a role in a task."""
-    return facts.each(lambda b: code(is_of_kind(facts.mind, b.id)))
+    return facts.codes_of_objects(lambda b: code(is_of_kind(facts.mind, b.id)))
 
 
 def at_home(facts: Snapshot) -> Codes:
@@ -124,10 +127,12 @@ def at_home(facts: Snapshot) -> Codes:
     zones = [z.polygon for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
     memory = presence_memory(facts.mind)
     if not zones or memory.start is None:
-        return facts.among(())
+        return facts.codes_of_ids(())
     early = [b for b in facts.beliefs if b.first_seen - memory.start <= START_S]
     boxes = {b.id: memory.of[b.id].first_box for b in early if b.id in memory.of}
-    return facts.among({i for i, box in boxes.items() if any(_begins_in(box, z) for z in zones)})
+    return facts.codes_of_ids(
+        {i for i, box in boxes.items() if any(_begins_in(box, z) for z in zones)}
+    )
 
 
 def _begins_in(box: tuple[int, int, int, int], polygon: Sequence[tuple[float, float]]) -> bool:

@@ -12,18 +12,18 @@ import numpy as np
 
 from visup.rules.predicates.snapshot import Codes, Snapshot
 
-Look = Callable[[Snapshot], Codes]
+PairEvaluator = Callable[[Snapshot], Codes]
 
 
-def _one_of(*names: str) -> Look:
-    return lambda facts: np.max([facts.related(n) for n in names], axis=0)
+def _one_of(*names: str) -> PairEvaluator:
+    return lambda facts: np.max([facts.relation_codes(n) for n in names], axis=0)
 
 
-def _none_of(*names: str) -> Look:
-    return lambda facts: -np.max([facts.related(n) for n in names], axis=0)
+def _none_of(*names: str) -> PairEvaluator:
+    return lambda facts: -np.max([facts.relation_codes(n) for n in names], axis=0)
 
 
-COARSE_RELATIONS: Mapping[str, tuple[Look, str]] = MappingProxyType(
+COARSE_RELATIONS: Mapping[str, tuple[PairEvaluator, str]] = MappingProxyType(
     {
         "connected": (_none_of("disconnected"), "the boxes share a point"),
         "discrete": (

@@ -49,13 +49,13 @@ _SIGNS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
 )
 """Signs of start - start, end - end, end of a - start of b, start of a - end of b."""
 
-Look = Callable[[Snapshot, str], Codes]
+PairEvaluator = Callable[[Snapshot, str], Codes]
 
 
-def along(axis: int) -> Look:
+def along(axis: int) -> PairEvaluator:
     """The evaluation of Allen's relations along an axis: 0 to the right, 1 down."""
 
-    def look(facts: Snapshot, relation: str) -> Codes:
+    def evaluate(facts: Snapshot, relation: str) -> Codes:
         begin, end = _spans(facts, axis)
         level = LEVEL * image_diagonal(facts.mind.frame_size)
         differences = (
@@ -64,12 +64,12 @@ def along(axis: int) -> Look:
             end[:, None] - begin,
             begin[:, None] - end,
         )
-        held = np.ones((len(begin), len(begin)), bool)
+        holds = np.ones((len(begin), len(begin)), bool)
         for difference, wanted in zip(differences, _SIGNS[relation], strict=True):
-            held &= _sign(difference, level) == wanted
-        return _codes(held, np.isnan(differences[0]))
+            holds &= _sign(difference, level) == wanted
+        return _codes(holds, np.isnan(differences[0]))
 
-    return look
+    return evaluate
 
 
 def _spans(facts: Snapshot, axis: int) -> tuple[Floats, Floats]:

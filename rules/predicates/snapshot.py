@@ -60,11 +60,11 @@ class Snapshot:
             self._names[object_id] = short(self.mind, object_id)
         return self._names[object_id]
 
-    def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
+    def codes_of_objects(self, evaluate: Callable[[ObjectBelief], int]) -> Codes:
         """(n,) codes from a function of each object."""
-        return np.array([look(b) for b in self.beliefs], dtype=np.int8)
+        return np.array([evaluate(b) for b in self.beliefs], dtype=np.int8)
 
-    def among(self, ids: Collection[int | None]) -> Codes:
+    def codes_of_ids(self, ids: Collection[int | None]) -> Codes:
         """(n,) `YES` for some objects, `NO` for the others."""
         codes = [YES if i in ids else NO for i in self.ids] if ids else [NO] * len(self.ids)
         return np.array(codes, dtype=np.int8)
@@ -81,7 +81,7 @@ class Snapshot:
         whole[0], whole[1] = -np.inf, np.inf
         return whole
 
-    def related(self, name: str) -> Codes:
+    def relation_codes(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
         if name not in self._codes:
             self._codes[name] = self._coupled() if name == "coupled" else self.relations((name,))[0]
@@ -129,7 +129,7 @@ class Snapshot:
         values[np.ix_(known, known)] = table[inner]
         return values
 
-    def of_pairs(self, quantity: int) -> Floats:
+    def pair_intervals(self, quantity: int) -> Floats:
         """(2, n, n) intervals of one of the quantities of `pair_loops`."""
         whole: Floats = self._pairs[0][quantity]
         return whole

@@ -66,13 +66,13 @@ class PredicateDefinition:
     Attributes:
         takes: Kinds of its arguments: 'object', 'relation', 'kind', 'name', 'zone', 'signal', 'word',
             'allen' or 'tpcc' (relations of these calculi).
-        look: Its evaluation: codes of all objects, one dimension per argument 'object', in order; the
+        evaluate: Its evaluation: codes of all objects, one dimension per argument 'object', in order; the
             other arguments are passed as words.
         meaning: Its meaning in one clause.
     """
 
     takes: tuple[str, ...]
-    look: Callable[..., Codes]
+    evaluate: Callable[..., Codes]
     meaning: str
 
 
@@ -83,14 +83,14 @@ class QuantityDefinition:
     Attributes:
         takes: Kinds of its arguments.
         dimension: Its dimension.
-        look: Its intervals in the base unit, (2, ...), for all objects.
+        evaluate: Its intervals in the base unit, (2, ...), for all objects.
         meaning: Its meaning in one clause.
         plain: Whether it is a plain number instead of a share.
     """
 
     takes: tuple[str, ...]
     dimension: Dimension
-    look: Callable[..., Floats]
+    evaluate: Callable[..., Floats]
     meaning: str
     plain: bool = False
 
@@ -131,27 +131,27 @@ def expected(facts: Snapshot, name: str) -> Codes:
 def engaged(facts: Snapshot) -> Codes:
     """Whether an active task currently expects a relation of an object to another."""
     wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
-    return facts.among(wanted)
+    return facts.codes_of_ids(wanted)
 
 
 def unexpected(facts: Snapshot) -> Codes:
     """Whether no active task explains an object; without a task no object is unexpected."""
     unexplained = [task.unexplained for task in facts.mind.tasks]
     nobody = set(unexplained[0]).intersection(*unexplained[1:]) if unexplained else ()
-    return facts.among(nobody)
+    return facts.codes_of_ids(nobody)
 
 
 def is_actor(facts: Snapshot) -> Codes:
     """Whether an object plays an actor of an active task."""
     bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
-    return facts.among(bound)
+    return facts.codes_of_ids(bound)
 
 
 def is_bystander(facts: Snapshot) -> Codes:
     """Whether a task tolerates an object, and none uses it as an actor."""
     tasks = facts.mind.tasks
     acting = {b.object_id for task in tasks for b in task.bindings}
-    return facts.among({i for task in tasks for i in task.bystanders} - acting)
+    return facts.codes_of_ids({i for task in tasks for i in task.bystanders} - acting)
 
 
 def one_machine(facts: Snapshot) -> Codes:
@@ -166,10 +166,10 @@ def one_machine(facts: Snapshot) -> Codes:
 def is_named(facts: Snapshot, name: str) -> Codes:
     """Whether an object is believed to be that model or actor; unknown while not identified."""
 
-    def look(b: ObjectBelief) -> int:
+    def evaluate(b: ObjectBelief) -> int:
         return code(name in (b.name, believed_name(facts.mind, b.id))) if b.candidates else MAYBE
 
-    return facts.each(look)
+    return facts.codes_of_objects(evaluate)
 
 
 def first_contact(facts: Snapshot) -> Codes:
@@ -180,7 +180,7 @@ def first_contact(facts: Snapshot) -> Codes:
 def lost(facts: Snapshot) -> Codes:
     """Whether an object is out of view for no known reason."""
     known = presence_memory(facts.mind).of
-    return facts.among([i for i in facts.ids if i in known and known[i].lost])
+    return facts.codes_of_ids([i for i in facts.ids if i in known and known[i].lost])
 
 
 def stale(facts: Snapshot, kind: str) -> Codes:
@@ -213,27 +213,27 @@ def _since(moment: str) -> Callable[[Snapshot], Floats]:
 
 
 def _presence(wanted: Presence) -> Callable[[Snapshot], Codes]:
-    return lambda facts: facts.among([b.id for b in facts.beliefs if b.presence is wanted])
+    return lambda facts: facts.codes_of_ids([b.id for b in facts.beliefs if b.presence is wanted])
 
 
 def in_forbidden_zone(facts: Snapshot) -> Codes:
     """Whether some part of an object is in a zone that is forbidden to all."""
     zones = [z.name for z in facts.mind.zones if z.name.startswith(certainty.KEEP_OUT)]
     if not zones:
-        return facts.among(())
+        return facts.codes_of_ids(())
     codes: Codes = np.max([_zone("reaching")(facts, name) for name in zones], axis=0)
     return codes
 
 
 def _zone(question: str) -> Callable[[Snapshot, str], Codes]:
-    return lambda facts, zone: facts.each(
+    return lambda facts, zone: facts.codes_of_objects(
         lambda b: CODE_OF[zone_truth(facts.mind, question, b.id, zone)]
     )
 
 
 def _relation(name: str) -> PredicateDefinition:
     meaning = f"{name.replace('_', ' ')}, a relation"
-    return PredicateDefinition(_TWO, lambda facts: facts.related(name), meaning)
+    return PredicateDefinition(_TWO, lambda facts: facts.relation_codes(name), meaning)
 
 
 _ONE, _TWO = ("object",), ("object", "object")
@@ -328,14 +328,16 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
 QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
     {
         "time_to_contact": QuantityDefinition(
-            _TWO, TIME, lambda f: f.of_pairs(CONTACT), "until the outlines meet"
+            _TWO, TIME, lambda f: f.pair_intervals(CONTACT), "until the outlines meet"
         ),
-        "gap": QuantityDefinition(_TWO, LENGTH, lambda f: f.of_pairs(GAP), "between the outlines"),
+        "gap": QuantityDefinition(
+            _TWO, LENGTH, lambda f: f.pair_intervals(GAP), "between the outlines"
+        ),
         "closing_speed": QuantityDefinition(
-            _TWO, SPEED, lambda f: f.of_pairs(CLOSING), "of the distance"
+            _TWO, SPEED, lambda f: f.pair_intervals(CLOSING), "of the distance"
         ),
         "relative_speed": QuantityDefinition(
-            _TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"
+            _TWO, SPEED, lambda f: f.pair_intervals(RELATIVE), "in the image"
         ),
         "speed": QuantityDefinition(_ONE, SPEED, lambda f: exact(f.one("speed")), "in the image"),
         "depth": QuantityDefinition(

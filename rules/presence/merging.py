@@ -41,11 +41,11 @@ def _stay_merged(context: StepContext, gone: ObjectBelief, track: ObjectTrack) -
     before = context.of[host.id].region
     if host.last_seen == context.now and host.region.area < 0.75 * before.area:
         # The host's region is its own again; the next frames will show where the other one is.
-        context.put(gone, merged_with=None, parted_at=context.now, seen_at=context.now)
+        context.put(gone, merged_with=None, parted_at=context.now, last_seen=context.now)
         return
     dx = host.region.centroid[0] - before.centroid[0]
     dy = host.region.centroid[1] - before.centroid[1]
-    context.put(replace(gone, region=shifted_region(gone.region, dx, dy)), seen_at=context.now)
+    context.put(replace(gone, region=shifted_region(gone.region, dx, dy)), last_seen=context.now)
 
 
 def _has_absorbed(context: StepContext, host: ObjectBelief, gone: ObjectTrack) -> bool:
@@ -53,7 +53,7 @@ def _has_absorbed(context: StepContext, host: ObjectBelief, gone: ObjectTrack) -
     if before is None or not host.confirmed or gone.visible_share < context.settings.whole_share:
         return False
     # The host's track is as of its last sighting: both must have been seen until about the same time.
-    if before.seen_at - gone.seen_at > context.settings.settle_s:
+    if before.last_seen - gone.last_seen > context.settings.settle_s:
         return False
     parts = gone.region.area + before.region.area
     if host.region.area < before.region.area + 0.5 * gone.region.area:

@@ -36,7 +36,7 @@ class ObjectTrack:
 
     Attributes:
         region: Its region as last seen.
-        seen_at: Time of the last sighting, seconds.
+        last_seen: Time of the last sighting, seconds.
         coherent_since: Time since when sightings have followed each other without a jump, seconds.
         coherent_box: Its box at that time.
         sightings: Number of sightings since then.
@@ -59,7 +59,7 @@ class ObjectTrack:
     """
 
     region: Region
-    seen_at: float
+    last_seen: float
     coherent_since: float
     coherent_box: Box = (0, 0, 0, 0)
     sightings: int = 1
@@ -159,7 +159,7 @@ def update_track(
         The updated track. The reference area follows an unobstructed object, decays slowly for one cut by
         the border, and is frozen for one that others may hide.
     """
-    dt = now - track.seen_at
+    dt = now - track.last_seen
     smooth = dt <= allowed_gap_s and _coherent(track.region, region)
     reference = _reference_area(track, region, dt, crowded)
     visible = min(1.0, region.area / max(reference, 1.0))
@@ -170,7 +170,7 @@ def update_track(
     return replace(
         track,
         region=region,
-        seen_at=now,
+        last_seen=now,
         coherent_since=track.coherent_since if smooth else now,
         coherent_box=track.coherent_box if smooth else region.bbox,
         sightings=track.sightings + 1 if smooth else 1,
@@ -192,7 +192,7 @@ def predicted_box(track: ObjectTrack, now: float) -> Box:
 def predicted_share_outside(track: ObjectTrack, now: float, frame_size: tuple[int, int]) -> float:
     """Predicted share of the object's last box outside the image by now, 0 to 1."""
     vx, vy = track.velocity
-    ahead = now - track.seen_at
+    ahead = now - track.last_seen
     box = shifted(track.region.bbox, vx * ahead, vy * ahead)
     inside = box_intersection(box, (0, 0, *frame_size))
     return 1.0 - inside / max(1, box[2] * box[3])

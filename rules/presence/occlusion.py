@@ -137,7 +137,7 @@ def update_missing(context: StepContext) -> None:
 def _missing_conditions(context: StepContext, track: ObjectTrack) -> Iterator[Condition]:
     """Conditions for concluding anything from a missing object."""
     yield Condition("it has not merged with another object", track.merged_with is None)
-    missing = context.now - track.seen_at
+    missing = context.now - track.last_seen
     yield at_least("missing for", missing, context.settings.settle_s, " s", slack=1e-6)
 
 
@@ -172,14 +172,14 @@ def _missing_occlusion_conditions(
         yield less_than("share that would be visible", showing, s.hidden_share)
     else:
         text = "missing, although much of it should be visible, for"
-        yield at_least(text, context.now - track.seen_at, s.missed_s, " s", slack=1e-6)
+        yield at_least(text, context.now - track.last_seen, s.missed_s, " s", slack=1e-6)
 
 
 def _loss_conditions(
     context: StepContext, track: ObjectTrack, explained: bool
 ) -> Iterator[Condition]:
     yield Condition("no known reason", not explained)
-    missing = context.now - track.seen_at
+    missing = context.now - track.last_seen
     yield at_least(
         "missing without a known reason for", missing, context.settings.lost_s, " s", slack=1e-6
     )

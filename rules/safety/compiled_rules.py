@@ -44,15 +44,15 @@ class Lookup:
     Attributes:
         step: The step of the lookup.
         name: Its word.
-        ask: Its values for all objects.
-        turned: Whether its objects are in the opposite order of the axes.
+        evaluate: Its values for all objects.
+        transposed: Whether its objects are in the opposite order of the axes.
         axes: Number of its objects.
     """
 
     step: int
     name: str
-    ask: Callable[[Snapshot], Any]
-    turned: bool
+    evaluate: Callable[[Snapshot], Any]
+    transposed: bool
     axes: int
 
 
@@ -63,23 +63,23 @@ def evaluator(node: Predicate | Measure) -> Callable[[Snapshot], Any]:
         node.name
     ]
     others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
-    return partial(_look, word.look, others) if others else word.look
+    return partial(_evaluate_with, word.evaluate, others) if others else word.evaluate
 
 
-def _look(look: Callable[..., Any], others: list[str], facts: Snapshot) -> Any:
-    return look(facts, *others)
+def _evaluate_with(evaluate: Callable[..., Any], others: list[str], facts: Snapshot) -> Any:
+    return evaluate(facts, *others)
 
 
 class AlarmKeys:
     """Cached alarm keys for a set of objects.
 
     Args:
-        prepared: The rules.
+        compiled: The rules.
         ids: The objects.
     """
 
-    def __init__(self, prepared: CompiledRules, ids: tuple[int, ...]) -> None:
-        self._prepared, self._ids = prepared, ids
+    def __init__(self, compiled: CompiledRules, ids: tuple[int, ...]) -> None:
+        self._compiled, self._ids = compiled, ids
         self._known: dict[int, AlarmKey] = {}
         # The result is nearly always the same as in the previous step.
         self._latest: tuple[list[int], Mapping[AlarmKey, int]] = ([], {})
@@ -97,7 +97,7 @@ class AlarmKeys:
         for hit in hits:
             key = self._known.get(hit)
             if key is None:
-                rule, chosen = self._prepared.choice(hit, self._ids)
+                rule, chosen = self._compiled.decode_hit(hit, self._ids)
                 key = self._known.setdefault(hit, (rule.name, frozenset(chosen)))
             found.setdefault(key, hit)
         return found
@@ -110,17 +110,17 @@ class CompiledRules:
     Attributes:
         rules: The rules.
         compiler: Knows the value reference of every formula.
-        places: Per rule: `when`, and `unless` if present.
-        early: Per rule: reference to its early verdict; None if its verdict is not late, or early
+        condition_refs: Per rule: `when`, and `unless` if present.
+        early_refs: Per rule: reference to its early verdict; None if its verdict is not late, or early
             verdicts are off.
         lines: Cache of `explain` for the texts of evidence, by rule and names of objects.
     """
 
     rules: tuple[Rule, ...]
     compiler: Compiler
-    places: tuple[tuple[ValueRef, ...], ...]
-    early: tuple[ValueRef | None, ...] = ()
-    _placed: dict[Scope, dict[int, ValueRef]] = field(default_factory=dict, repr=False)
+    condition_refs: tuple[tuple[ValueRef, ...], ...]
+    early_refs: tuple[ValueRef | None, ...] = ()
+    _value_refs: dict[Scope, dict[int, ValueRef]] = field(default_factory=dict, repr=False)
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
     _evidence: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
@@ -136,9 +136,9 @@ class CompiledRules:
         """All steps of all rules."""
         return self.compiler.program
 
-    def place(self, node: Formula | Term, scope: Scope) -> ValueRef:
+    def value_ref(self, node: Formula | Term, scope: Scope) -> ValueRef:
         """The value reference of a part of these rules."""
-        known = self._placed.setdefault(scope, {})
+        known = self._value_refs.setdefault(scope, {})
         if id(node) not in known:
             known[id(node)] = (
                 self.compiler.term(node, scope)
@@ -178,21 +178,21 @@ class CompiledRules:
     def relations(self) -> Mapping[str, int]:
         """The relations used by the rules, with their positions."""
         # Couplings have a separate lookup: there are few, but a `coupled` relation for every pair.
-        named = {n.name for _, n in self.program.looks() if n.name in NAMES}
+        named = {n.name for _, n in self.program.lookups() if n.name in NAMES}
         return {name: k for k, name in enumerate(sorted(named))}
 
     @cached_property
     def facts(self) -> tuple[Lookup, ...]:
         """Lookups of facts, without these relations."""
-        return tuple(self._looks(Predicate))
+        return tuple(self._lookups(Predicate))
 
     @cached_property
     def quantities(self) -> tuple[Lookup, ...]:
         """Lookups of quantities."""
-        return tuple(self._looks(Measure))
+        return tuple(self._lookups(Measure))
 
-    def _looks(self, kind: type) -> Iterator[Lookup]:
-        for number, node in self.program.looks():
+    def _lookups(self, kind: type) -> Iterator[Lookup]:
+        for number, node in self.program.lookups():
             if isinstance(node, kind) and node.name not in self.relations:
                 order = self.program.steps[number].order
                 turned = len(order) == 2 and order[0] > order[1]
@@ -201,14 +201,14 @@ class CompiledRules:
     def layout(self, n: int) -> LinkedProgram:
         """The program laid out for a number of objects; relations come before all other facts."""
         if n not in self._layouts:
-            begin, places = len(self.relations) * n * n, {}
-            for look in self.facts:
-                places[look.step] = begin
-                begin += n**look.axes
-            for step, node in self.program.looks():
+            position, positions = len(self.relations) * n * n, {}
+            for lookup in self.facts:
+                positions[lookup.step] = position
+                position += n**lookup.axes
+            for step, node in self.program.lookups():
                 if node.name in self.relations:
-                    places[step] = self.relations[node.name] * n * n
-            self._layouts[n] = LinkedProgram(self.program, n, places, begin)
+                    positions[step] = self.relations[node.name] * n * n
+            self._layouts[n] = LinkedProgram(self.program, n, positions, position)
         return self._layouts[n]
 
     @cached_property
@@ -217,21 +217,23 @@ class CompiledRules:
         return {rule.name: rule for rule in self.rules}
 
     @cached_property
-    def _searched(self) -> tuple[tuple[Rule, tuple[ValueRef, ...]], ...]:
+    def _search_order(self) -> tuple[tuple[Rule, tuple[ValueRef, ...]], ...]:
         """Rules to search for true bindings: first all final verdicts, then the early ones."""
-        early = ((r, (at,)) for r, at in zip(self.rules, self.early, strict=True) if at is not None)
-        return (*zip(self.rules, self.places, strict=True), *early)
+        early = (
+            (r, (at,)) for r, at in zip(self.rules, self.early_refs, strict=True) if at is not None
+        )
+        return (*zip(self.rules, self.condition_refs, strict=True), *early)
 
-    def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
+    def decode_hit(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
         """Decode a result of `vm.find_true`: its rule and objects."""
-        rule, rows = self._searched[hit >> CHOICE_BITS][0], hit & (1 << CHOICE_BITS) - 1
+        rule, rows = self._search_order[hit >> CHOICE_BITS][0], hit & (1 << CHOICE_BITS) - 1
         chosen = []
         for _ in rule.variables:
             rows, row = divmod(rows, len(ids))
             chosen.append(ids[row])
         return rule, tuple(chosen[::-1])
 
-    def keys(self, ids: tuple[int, ...]) -> AlarmKeys:
+    def alarm_keys(self, ids: tuple[int, ...]) -> AlarmKeys:
         """The cached alarm keys for some objects."""
         known = self._keys.get(ids)
         if known is None:
@@ -240,23 +242,23 @@ class CompiledRules:
             known = self._keys.setdefault(ids, AlarmKeys(self, ids))
         return known
 
-    def fresh(self, n: int) -> States:
+    def initial_states(self, n: int) -> States:
         """The states before the first sample."""
         return self.layout(n).fresh
 
-    def verdicts(self, n: int) -> tuple[Ints, int]:
+    def search_table(self, n: int) -> tuple[Ints, int]:
         """The table of `vm.find_true` for a number of objects, and the most results.
 
         See `vm.find_true`.
         """
         if n not in self._verdicts:
             layout, rows = self.layout(n), []
-            for rule, places in self._searched:
+            for rule, places in self._search_order:
                 at = [(layout.places[p.step], bits(p.axes)) for p in places]
                 when, unless = (*at, (-1, 0))[:2]
                 apart = sum(1 << i + j - 1 for i, j in _apart(rule))
                 rows.append((*when, *unless, len(rule.variables), apart))
-            most = sum(n ** len(rule.variables) for rule, _ in self._searched)
+            most = sum(n ** len(rule.variables) for rule, _ in self._search_order)
             self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6), most
         return self._verdicts[n]
 

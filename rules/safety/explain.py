@@ -89,7 +89,7 @@ def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleEx
     )
     found = Truth.FALSE if suspended else parts[0].verdict
     told = RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
-    early = values.prepared.early[values.prepared.rules.index(rule)]
+    early = values.compiled.early_refs[values.compiled.rules.index(rule)]
     return told if early is None else _with_early(told, values.interval(early, reader.rows))
 
 
@@ -143,31 +143,31 @@ class EvidenceLine:
 
 def evidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> tuple[str, ...]:
     """One sentence for each fact and comparison of `when`, for these objects."""
-    facts, prepared = values.facts, values.prepared
+    facts, compiled = values.facts, values.compiled
     names = tuple([facts.short(i) for i in ids])
-    lines = prepared.lines.get((rule.name, names))
+    lines = compiled.lines.get((rule.name, names))
     if lines is None:
-        if len(prepared.lines) >= MAX_LINES:
-            prepared.lines.clear()
-        lines = prepared.lines.setdefault((rule.name, names), _lines(rule, names, prepared))
+        if len(compiled.lines) >= MAX_LINES:
+            compiled.lines.clear()
+        lines = compiled.lines.setdefault((rule.name, names), _lines(rule, names, compiled))
     rows = tuple([facts.row[i] for i in ids])
     return tuple([line.text_for(values, rows) for line in lines])
 
 
-def _lines(rule: Rule, names: tuple[str, ...], prepared: CompiledRules) -> tuple[EvidenceLine, ...]:
+def _lines(rule: Rule, names: tuple[str, ...], compiled: CompiledRules) -> tuple[EvidenceLine, ...]:
     """The evidence templates of a rule, for objects of these names."""
     scope, named = scope_of(rule), dict(zip(rule.variables, names, strict=True))
 
     def side(term: Term) -> tuple[str, ValueRef | None, str]:
         if isinstance(term, Number):
             return str(term), None, ""
-        return _text(term, named, prepared), prepared.place(term, scope), _unit(term)
+        return _text(term, named, compiled), compiled.value_ref(term, scope), _unit(term)
 
     return tuple(
-        EvidenceLine(prepared.place(f, scope), f.operator, (side(f.left), side(f.right)))
+        EvidenceLine(compiled.value_ref(f, scope), f.operator, (side(f.left), side(f.right)))
         if isinstance(f, Comparison)
-        else EvidenceLine(prepared.place(f, scope), _text(f, named, prepared))
-        for f in prepared.evidence_parts(rule)
+        else EvidenceLine(compiled.value_ref(f, scope), _text(f, named, compiled))
+        for f in compiled.evidence_parts(rule)
     )
 
 
@@ -187,7 +187,7 @@ class _ExplanationBuilder:
         term = isinstance(node, Term)
         whole = not isinstance(node, Predicate | Measure | Number | Variable)
         return RuleExplanation(
-            _text(node, self.names, self.values.prepared),
+            _text(node, self.names, self.values.compiled),
             interval,
             None if term else verdict(interval),
             self._parts(node) if whole else (),
@@ -197,7 +197,7 @@ class _ExplanationBuilder:
 
     def _value(self, node: Node) -> tuple[ValueRef, Interval]:
         """The value reference of a node, and its value for these objects."""
-        place = self.values.prepared.place(node, self.scope)
+        place = self.values.compiled.value_ref(node, self.scope)
         return place, self.values.interval(place, self.rows)
 
     def _parts(self, node: Node) -> tuple[RuleExplanation, ...]:
@@ -224,9 +224,9 @@ class _ExplanationBuilder:
         return (pick(found, key=lambda e: e.interval),)
 
 
-def _text(node: Node, names: Mapping[str, str], prepared: CompiledRules) -> str:
+def _text(node: Node, names: Mapping[str, str], compiled: CompiledRules) -> str:
     """The source of a node, with objects by name."""
-    text = prepared.text(node, tuple(names))
+    text = compiled.text(node, tuple(names))
     for variable, name in names.items():
         text = text.replace(placeholder(variable), name)
     return text

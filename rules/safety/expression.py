@@ -31,7 +31,7 @@ from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
 from visup.rules.safety.compiled_rules import compile_rules
 from visup.rules.safety.explain import RuleExplanation, explain_rule
-from visup.rules.safety.verdicts import Evaluation, remapped
+from visup.rules.safety.verdicts import Evaluation, reindexed_states
 
 _CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)(?:\)|$)")
 """A word with its arguments, even if the closing parenthesis is missing."""
@@ -116,15 +116,15 @@ class Expression:
             mind: The mind after a step.
             before: The result of the previous step; without it, windows start here.
         """
-        prepared, now, facts = compile_rules((self.rule,)), ticks(mind.time), Snapshot(mind)
+        compiled, now, facts = compile_rules((self.rule,)), ticks(mind.time), Snapshot(mind)
         if before is not None and not now > before.now:
             before = None
-        states = prepared.fresh(len(facts.ids)) if before is None else before.after
+        states = compiled.initial_states(len(facts.ids)) if before is None else before.after
         if before is not None and now - before.now < MIN_SPACING:
             return before
         if before is not None and before.ids != facts.ids:
-            states = remapped(prepared, states, now, before.ids, facts.ids)
-        values = Evaluation(prepared, facts, now, states)
+            states = reindexed_states(compiled, states, now, before.ids, facts.ids)
+        values = Evaluation(compiled, facts, now, states)
         readings = tuple(self._reading(values, ids) for ids in self._choices(mind, facts.ids))
         return ExpressionResult(now, facts.ids, states, values.after, readings)
 
@@ -139,9 +139,9 @@ class Expression:
     def _reading(self, values: Evaluation, ids: tuple[int, ...]) -> ExpressionValue:
         if self.quantity:
             node = cast("Comparison", self.rule.when).left
-            place, unit = values.prepared.place(node, scope_of(self.rule)), _unit(node)
+            place, unit = values.compiled.value_ref(node, scope_of(self.rule)), _unit(node)
         else:
-            place, unit = values.prepared.places[0][0], ""
+            place, unit = values.compiled.condition_refs[0][0], ""
         low, high = values.interval(place, tuple(values.facts.row[i] for i in ids))
         truth = None if self.quantity else verdict((low, high))
         return ExpressionValue(ids, (low, high), truth, unit)

@@ -33,7 +33,7 @@ def explain(mind: Mind, rule: str, *ids: int) -> RuleExplanation:
         RuleError: No such rule was evaluated, or the objects are not a binding of it.
     """
     values = evaluation_of(mind)
-    return explain_rule(_choice(values, rule, ids), ids, values)
+    return explain_rule(_checked_rule(values, rule, ids), ids, values)
 
 
 def evaluation_of(mind: Mind) -> Evaluation:
@@ -58,7 +58,7 @@ def rule_named(values: Evaluation, name: str) -> Rule:
     Raises:
         RuleError: There is none.
     """
-    rules = {rule.name: rule for rule in values.prepared.rules}
+    rules = {rule.name: rule for rule in values.compiled.rules}
     if name not in rules:
         hint = did_you_mean(name, rules)
         what = f"no rule '{name}' was judged"
@@ -82,8 +82,8 @@ def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     """
     values = evaluation_of(mind)
     rule = rule_named(values, name)
-    number = values.prepared.rules.index(rule)
-    places, early = values.prepared.places[number], values.prepared.early[number]
+    number = values.compiled.rules.index(rule)
+    places, early = values.compiled.condition_refs[number], values.compiled.early_refs[number]
     found = {}
     for ids in object_choices(values, rule):
         rows = tuple(values.facts.row[i] for i in ids)
@@ -94,7 +94,7 @@ def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     return found
 
 
-def _choice(values: Evaluation, name: str, ids: tuple[int, ...]) -> Rule:
+def _checked_rule(values: Evaluation, name: str, ids: tuple[int, ...]) -> Rule:
     """The rule of that name, if the objects are a binding of it."""
     rule = rule_named(values, name)
     if len(ids) != len(rule.variables):

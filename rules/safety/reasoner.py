@@ -15,7 +15,7 @@ from visup.rules.monitoring.states import States
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.alarm_condition import ActiveCondition, update
 from visup.rules.safety.compiled_rules import AlarmKey, CompiledRules, compile_rules
-from visup.rules.safety.verdicts import Evaluation, remapped
+from visup.rules.safety.verdicts import Evaluation, reindexed_states
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +30,7 @@ class RuleMemory:
         before: States of the operators before it, for these objects.
         after: States after it.
         tasks: Tasks as seen by the rules; they are matched later in a step.
-        held: Active conditions, oldest sentences first.
+        active: Active conditions, oldest sentences first.
         cooling: End of cooldown, seconds, by condition.
         early: Whether verdicts about the future were reported as soon as they were decided.
         since: Microseconds of the first sample of each of its objects.
@@ -43,7 +43,7 @@ class RuleMemory:
     before: States | None = None
     after: States | None = None
     tasks: tuple[TaskBelief, ...] = ()
-    held: MappingProxyType[AlarmKey, ActiveCondition] = field(
+    active: MappingProxyType[AlarmKey, ActiveCondition] = field(
         default_factory=lambda: MappingProxyType({})
     )
     cooling: Mapping[AlarmKey, float] = field(default_factory=lambda: MappingProxyType({}))
@@ -70,11 +70,11 @@ class RuleReasoner:
     rules: tuple[Rule, ...]
     memory: MemoryKey[RuleMemory] = SAFETY
     early: bool = False
-    _prepared: CompiledRules = field(init=False, repr=False, compare=False)
+    _compiled: CompiledRules = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # Kept, since hashing the rules' trees for a cache lookup costs as much as a rule.
-        object.__setattr__(self, "_prepared", compile_rules(self.rules, self.early))
+        object.__setattr__(self, "_compiled", compile_rules(self.rules, self.early))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Reason about one step; see `Reasoner`."""
@@ -84,17 +84,17 @@ class RuleReasoner:
         if not same or (old.now is not None and now < old.now):
             old = RuleMemory(self.rules, early=self.early)
         if old.now is not None and now - old.now < MIN_SPACING:
-            conditions = tuple(h.concern for h in old.held.values())
+            conditions = tuple(h.condition for h in old.active.values())
             return Outcome(mind, conditions=once_per_machine(conditions, mind))
-        prepared, facts = self._prepared, Snapshot(mind)
-        before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
+        compiled, facts = self._compiled, Snapshot(mind)
+        before = compiled.initial_states(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
-            before = remapped(prepared, old.after, now, old.ids, facts.ids)
+            before = reindexed_states(compiled, old.after, now, old.ids, facts.ids)
         since = old.since
         if old.ids != facts.ids:
             since = MappingProxyType({i: since.get(i, now) for i in facts.ids})
-        values = Evaluation(prepared, facts, now, before)
-        held, cooling = update(values, old.held, old.cooling, old.time)
+        values = Evaluation(compiled, facts, now, before)
+        held, cooling = update(values, old.active, old.cooling, old.time)
         mind = mind.remember(
             self.memory,
             RuleMemory(
@@ -111,7 +111,7 @@ class RuleReasoner:
                 since,
             ),
         )
-        conditions = tuple(h.concern for h in held.values())
+        conditions = tuple(h.condition for h in held.values())
         return Outcome(mind, conditions=once_per_machine(conditions, mind))
 
 

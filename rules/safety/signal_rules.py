@@ -26,7 +26,7 @@ from visup.rules.predicates.signals import number_of
 
 Values = Mapping[str, Any]
 """Values of signals at a moment, by name: numbers, truth values, words."""
-Look = Callable[[Values], SignalValue]
+SignalEvaluator = Callable[[Values], SignalValue]
 """A plain signal computed from these values."""
 NONE = Number(0.0)
 
@@ -95,7 +95,7 @@ def _plain(
     rule: Rule, formula: Formula, rows: list[tuple[float, Values]], reading: Reading
 ) -> tuple[Formula, list[tuple[float, dict[str, SignalValue]]]]:
     """Convert a formula to plain signals, with their samples."""
-    looks: dict[str, Look] = {}
+    looks: dict[str, SignalEvaluator] = {}
     plain: Any = rebuilt(formula, lambda node: _signal(rule, node, looks, reading))
     return plain, [(t, {key: look(row) for key, look in looks.items()}) for t, row in rows]
 
@@ -106,7 +106,7 @@ def _at(verdicts: list[TimedVerdict], time: float) -> Truth:
     return verdict(next(robustness, (-inf, -inf)))
 
 
-def _signal(rule: Rule, node: Node, looks: dict[str, Look], reading: str) -> Node | None:
+def _signal(rule: Rule, node: Node, looks: dict[str, SignalEvaluator], reading: str) -> Node | None:
     """Convert a signal word to a plain signal, recorded under a name."""
     if not isinstance(node, Predicate | Measure):
         return None

@@ -22,7 +22,7 @@ class Evaluation:
     """The values of all formulas at one step.
 
     Args:
-        prepared: The rules.
+        compiled: The rules.
         facts: The mind.
         now: Microseconds.
         before: States of the operators before the step, for the objects of `facts`.
@@ -31,23 +31,23 @@ class Evaluation:
         after: States after the step.
     """
 
-    def __init__(self, prepared: CompiledRules, facts: Snapshot, now: int, before: States) -> None:
-        self.prepared: CompiledRules = prepared
+    def __init__(self, compiled: CompiledRules, facts: Snapshot, now: int, before: States) -> None:
+        self.compiled: CompiledRules = compiled
         self.facts: Snapshot = facts
-        self._layout: LinkedProgram = prepared.layout(len(facts.ids))
+        self._layout: LinkedProgram = compiled.layout(len(facts.ids))
         self._arena: Floats = np.empty(self._layout.size)
-        if prepared.quantities:
-            np.concatenate(self._measured(), out=self._arena[: self._layout.looked])
+        if compiled.quantities:
+            np.concatenate(self._measured(), out=self._arena[: self._layout.lookup_size])
         self.after: States = self._layout.step(before, now, self._codes(), self._arena)
 
     def _codes(self) -> Codes:
         """All facts: the relations, then the others."""
-        facts, layout, prepared = self.facts, self._layout, self.prepared
-        looked = [look.ask(facts).ravel() for look in prepared.facts]
-        related = facts.relations(tuple(prepared.relations)).ravel()
-        codes: Codes = np.concatenate([related, *looked])
+        facts, layout, compiled = self.facts, self._layout, self.compiled
+        codes_of_facts = [lookup.evaluate(facts).ravel() for lookup in compiled.facts]
+        related = facts.relations(tuple(compiled.relations)).ravel()
+        codes: Codes = np.concatenate([related, *codes_of_facts])
         if facts.mind.unknown:
-            for step, node in prepared.program.looks():
+            for step, node in compiled.program.lookups():
                 if step in layout.facts and inputs_missing(facts.mind, node.name):
                     at = layout.facts[step]
                     codes[at : at + layout.n ** len(layout.axes[step])] = MAYBE
@@ -56,45 +56,45 @@ class Evaluation:
     def _measured(self) -> list[Floats]:
         """The intervals of all quantities, in their order."""
         facts = self.facts
-        looked_up = [look.ask(facts) for look in self.prepared.quantities]
+        intervals = [lookup.evaluate(facts) for lookup in self.compiled.quantities]
         if facts.mind.unknown:
-            looked_up = [
-                facts.unknown(look.axes) if inputs_missing(facts.mind, look.name) else value
-                for look, value in zip(self.prepared.quantities, looked_up, strict=True)
+            intervals = [
+                facts.unknown(lookup.axes) if inputs_missing(facts.mind, lookup.name) else value
+                for lookup, value in zip(self.compiled.quantities, intervals, strict=True)
             ]
         return [
-            (value.swapaxes(1, 2) if look.turned else value).ravel()
-            for look, value in zip(self.prepared.quantities, looked_up, strict=True)
+            (value.swapaxes(1, 2) if lookup.transposed else value).ravel()
+            for lookup, value in zip(self.compiled.quantities, intervals, strict=True)
         ]
 
     def interval(self, place: ValueRef, rows: tuple[int, ...]) -> Interval:
         """The interval of a formula for one binding of objects, given by their rows."""
         return self._layout.interval(place.step, rows, self._arena)
 
-    def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
+    def true_bindings(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every binding of objects for which it is true and not suspended."""
-        return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
+        return (self.compiled.decode_hit(hit, self.facts.ids) for hit in self.hits())
 
-    def true_of(self) -> Mapping[AlarmKey, int]:
+    def true_keys(self) -> Mapping[AlarmKey, int]:
         """For each rule and set of objects for which it is true, the first binding, encoded as in `found`."""
-        return self.prepared.keys(self.facts.ids).of(self.found())
+        return self.compiled.alarm_keys(self.facts.ids).of(self.hits())
 
-    def found(self) -> list[int]:
+    def hits(self) -> list[int]:
         """True bindings as numbers, by rule and binding; `CompiledRules.choice` decodes them."""
-        rules, most = self.prepared.verdicts(self._layout.n)
-        found: Ints = np.empty(most, dtype=np.int64)
+        rules, capacity = self.compiled.search_table(self._layout.n)
+        found: Ints = np.empty(capacity, dtype=np.int64)
         count = find_true(rules, self._layout.n, self._arena, found)
-        looked_up: list[int] = found[:count].tolist()
-        return looked_up
+        hits: list[int] = found[:count].tolist()
+        return hits
 
 
-def remapped(
-    prepared: CompiledRules, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
+def reindexed_states(
+    compiled: CompiledRules, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
 ) -> States:
     """Re-index the states of the operators for other objects.
 
     Args:
-        prepared: The rules.
+        compiled: The rules.
         states: States for the old objects.
         now: Microseconds of the sample at which they change.
         old: Their ids.
@@ -105,5 +105,5 @@ def remapped(
     """
     place = {object_id: i for i, object_id in enumerate(old)}
     rows = np.array([place.get(i, -1) for i in new], dtype=np.intp)
-    known, wanted = prepared.layout(len(old)), prepared.layout(len(new))
+    known, wanted = compiled.layout(len(old)), compiled.layout(len(new))
     return known.memory.rerowed(states, wanted.memory, rows, now)

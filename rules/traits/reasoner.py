@@ -36,6 +36,7 @@ class TraitSettings:
         in_view_s: An object in view for this long before it moved did not enter either.
         moving_s: How long it must move to have moved.
         entries: Most colours stored per object.
+        relations: Settings of the relations, which say how slow an object at rest is.
     """
 
     tau_s: float = 2.0
@@ -45,6 +46,7 @@ class TraitSettings:
     in_view_s: float = 1.0
     moving_s: float = 0.3
     entries: int = 24
+    relations: RelationSettings = field(default_factory=RelationSettings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,22 +57,22 @@ class Traits:
         palette: Its colours; empty until observed.
         extent: Its largest extent, pixels; NaN until seen whole.
         first_box: Its box when first seen, pixels.
-        first_at: (x, y) of its centroid then, pixels.
-        came: Whether it may have entered; an object present before did not.
+        first_centroid: (x, y) of its centroid then, pixels.
+        may_have_entered: Whether it may have entered; an object present before did not.
         side: The side of the image over which it entered, or empty.
         moving_since: Since when it has been moving, seconds; None while it is not.
-        moved: When it first moved, seconds; None until then.
+        first_moved: When it first moved, seconds; None until then.
         resting_since: Since when it has been at rest, seconds; None while it moves.
     """
 
     palette: Palette = ()
     extent: float = math.nan
     first_box: Box = (0, 0, 0, 0)
-    first_at: tuple[float, float] = (0.0, 0.0)
-    came: bool = False
+    first_centroid: tuple[float, float] = (0.0, 0.0)
+    may_have_entered: bool = False
     side: str = ""
     moving_since: float | None = None
-    moved: float | None = None
+    first_moved: float | None = None
     resting_since: float | None = None
 
 
@@ -82,17 +84,17 @@ class TraitMemory:
         start: Seconds of the first step.
         time: Seconds of the last step.
         of: Object id -> its traits.
-        seen_at: Seconds of the newest colours used.
+        colours_at: Seconds of the newest colours used.
     """
 
     start: float = 0.0
     time: float = 0.0
     of: Mapping[int, Traits] = field(default_factory=lambda: MappingProxyType({}))
-    seen_at: float = -math.inf
+    colours_at: float = -math.inf
 
 
 TRAITS: MemoryKey[TraitMemory | None] = MemoryKey("rules.traits", None)
-NOTHING = Traits()
+NO_TRAITS = Traits()
 
 
 def traits_of(mind: Mind, object_id: int) -> Traits | None:
@@ -112,68 +114,74 @@ class TraitReasoner:
         old = mind.recall(TRAITS) or TraitMemory(mind.time, mind.time)
         keep = exp(-max(0.0, mind.time - old.time) / self.settings.tau_s)
         palettes = _palettes(mind, observation)
-        moving = _moving(mind)
+        moving = _moving(mind, self.settings.relations)
         of = {}
         for object_id, belief in sorted(mind.objects.items()):
-            known = old.of.get(object_id) or self._first(belief, old.start)
+            known = old.of.get(object_id) or self._initial_traits(belief, old.start)
             if belief.presence is Presence.SEEN and belief.last_seen == mind.time:
-                known = self._seen(known, belief, mind, keep)
-                known = self._moved(known, moving.get(object_id), mind.time)
+                known = self._with_observation(known, belief, mind, keep)
+                known = self._with_motion(known, moving.get(object_id), mind.time)
             if object_id in palettes:
-                merged = blended(known.palette, palettes[object_id], self._share(old, mind))
+                merged = blend_palettes(
+                    known.palette, palettes[object_id], self._colour_weight(old, mind)
+                )
                 known = replace(known, palette=merged[: self.settings.entries])
             of[object_id] = known
-        seen_at = mind.time if palettes else old.seen_at
+        seen_at = mind.time if palettes else old.colours_at
         memory = TraitMemory(old.start, mind.time, MappingProxyType(of), seen_at)
         return Outcome(mind.remember(TRAITS, memory))
 
-    def _share(self, old: TraitMemory, mind: Mind) -> float:
+    def _colour_weight(self, old: TraitMemory, mind: Mind) -> float:
         """Weight of new colours relative to the stored ones."""
-        return 1.0 - exp(-min(1e3, mind.time - old.seen_at) / self.settings.tau_s)
+        return 1.0 - exp(-min(1e3, mind.time - old.colours_at) / self.settings.tau_s)
 
-    def _first(self, belief: ObjectBelief, start: float) -> Traits:
+    def _initial_traits(self, belief: ObjectBelief, start: float) -> Traits:
         region, s = belief.region, self.settings
         since = region.visible_since
-        there = since is not None and belief.first_seen - since >= s.in_view_s
-        came = belief.first_seen - start > s.start_s and not there
-        return Traits(first_box=region.bbox, first_at=region.centroid, came=came)
+        in_view_before = since is not None and belief.first_seen - since >= s.in_view_s
+        came = belief.first_seen - start > s.start_s and not in_view_before
+        return Traits(first_box=region.bbox, first_centroid=region.centroid, may_have_entered=came)
 
-    def _seen(self, known: Traits, belief: ObjectBelief, mind: Mind, keep: float) -> Traits:
+    def _with_observation(
+        self, known: Traits, belief: ObjectBelief, mind: Mind, keep: float
+    ) -> Traits:
         region = belief.region
         extent = known.extent
         if not region.cut:
             now = largest_extent(region)
             extent = now if extent != extent else keep * extent + (1.0 - keep) * now
         side = known.side
-        if not side and known.came:
-            side = self._side(known, region, mind.frame_size)
+        if not side and known.may_have_entered:
+            side = self._entry_side(known, region, mind.frame_size)
         return replace(known, extent=extent, side=side)
 
-    def _side(self, known: Traits, region: Region, size: tuple[int, int]) -> str:
+    def _entry_side(self, known: Traits, region: Region, size: tuple[int, int]) -> str:
         """The side over which an object entered, once it has moved inwards."""
         (width, height), (x, y, w, h) = size, known.first_box
-        dx, dy = (region.centroid[k] - known.first_at[k] for k in (0, 1))
+        dx, dy = (region.centroid[k] - known.first_centroid[k] for k in (0, 1))
         least = self.settings.inwards * image_diagonal(size)
-        off = (x / width, y / height, 1 - (x + w) / width, 1 - (y + h) / height)
-        come = (dx, dy, -dx, -dy)
-        near = (k for k in range(4) if off[k] <= self.settings.border and come[k] >= least)
-        best = min(near, key=lambda k: (off[k], -come[k]), default=None)
+        margins = (x / width, y / height, 1 - (x + w) / width, 1 - (y + h) / height)
+        advance = (dx, dy, -dx, -dy)
+        candidates = (
+            k for k in range(4) if margins[k] <= self.settings.border and advance[k] >= least
+        )
+        best = min(candidates, key=lambda k: (margins[k], -advance[k]), default=None)
         return "" if best is None else SIDES[best]
 
-    def _moved(self, known: Traits, moving: bool | None, now: float) -> Traits:
+    def _with_motion(self, known: Traits, moving: bool | None, now: float) -> Traits:
         if moving is None:
             return known
         if not moving:
             stopped = now if known.resting_since is None else known.resting_since
             return replace(known, moving_since=None, resting_since=stopped)
         since = now if known.moving_since is None else known.moving_since
-        long = now - since >= self.settings.moving_s
-        moved = since if known.moved is None and long else known.moved
-        rests = None if long else known.resting_since
-        return replace(known, moving_since=since, moved=moved, resting_since=rests)
+        lasting = now - since >= self.settings.moving_s
+        moved = since if known.first_moved is None and lasting else known.first_moved
+        rests = None if lasting else known.resting_since
+        return replace(known, moving_since=since, first_moved=moved, resting_since=rests)
 
 
-def blended(before: Palette, new: Palette, weight: float) -> Palette:
+def blend_palettes(before: Palette, new: Palette, weight: float) -> Palette:
     """Blend two palettes of the same bins with a weight for the new one; an empty one is ignored.
 
     Example:
@@ -195,8 +203,8 @@ def largest_extent(region: Region) -> float:
     if len(points) < 2:
         return math.hypot(region.bbox[2], region.bbox[3])
     most = 0.0
-    for turn in range(0, 180, 15):
-        along = points @ (math.cos(math.radians(turn)), math.sin(math.radians(turn)))
+    for degrees in range(0, 180, 15):
+        along = points @ (math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))
         most = max(most, float(along.max() - along.min()))
     return most + 1.0  # outlines go through the centres of pixels
 
@@ -214,9 +222,9 @@ def _palettes(mind: Mind, observation: Observation) -> dict[int, Palette]:
     return found
 
 
-def _moving(mind: Mind) -> dict[int, bool]:
+def _moving(mind: Mind, relations: RelationSettings) -> dict[int, bool]:
     """Object -> whether it moves in the image, where known."""
-    still = RelationSettings().still_speed * image_diagonal(mind.frame_size)
+    still = relations.still_speed * image_diagonal(mind.frame_size)
     measured = kinematics(mind)
     speeds = zip(measured.ids, measured.speed.tolist(), strict=True)
     return {i: v > still for i, v in speeds if v == v}  # NaN is not equal to itself

@@ -10,7 +10,7 @@ from visup.agent.model.memory import MemoryKey
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
-TOLD = 0.7
+REPORTED_LIKELIHOOD = 0.7
 """Likelihood from which on the identity of an object is reported; see `VoteSettings.settle`."""
 
 REPORTED_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", None)
@@ -35,7 +35,7 @@ _SINGULAR = {
 _PLURAL = {"are": "be"}
 VERBS = frozenset(_SINGULAR) | frozenset(_PLURAL)
 _MENTION = re.compile(r"\{(\w+)\}")
-_DOUBLED = re.compile(r",(?=\s*[,.;:!?])")
+_DOUBLED_COMMA = re.compile(r",(?=\s*[,.;:!?])")
 
 
 def believed_name(mind: Mind, object_id: int) -> str | None:
@@ -55,7 +55,7 @@ def believed_name(mind: Mind, object_id: int) -> str | None:
     belief = mind.objects.get(object_id)
     if belief is None or belief.name == UNKNOWN_OBJECT:
         return None
-    return called(mind, belief.name)
+    return role_or_model(mind, belief.name)
 
 
 def spoken_name(mind: Mind, object_id: int) -> str | None:
@@ -75,7 +75,7 @@ def spoken_name(mind: Mind, object_id: int) -> str | None:
     played = any(b.object_id == object_id for task in mind.tasks for b in task.bindings)
     if name is None or played or reported is None or object_id in mind.answers:
         return name
-    return called(mind, reported[object_id]) if object_id in reported else None
+    return role_or_model(mind, reported[object_id]) if object_id in reported else None
 
 
 def is_of_kind(mind: Mind, object_id: int) -> bool:
@@ -94,7 +94,7 @@ def individual_name(mind: Mind, object_id: int) -> str | None:
     return None if is_of_kind(mind, object_id) else spoken_name(mind, object_id)
 
 
-def called(mind: Mind, model: str) -> str:
+def role_or_model(mind: Mind, model: str) -> str:
     """Name of an object of a model: the actor that is bound to the model, else the model."""
     return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
 
@@ -130,8 +130,8 @@ def _looks_like(mind: Mind, object_id: int, name: str) -> bool:
     if first is None:
         return True  # called by its reported name
     models = first.models if first else ()
-    same = belief.name in models or called(mind, belief.name) == name
-    return same or belief.confidence < TOLD
+    same = belief.name in models or role_or_model(mind, belief.name) == name
+    return same or belief.confidence < REPORTED_LIKELIHOOD
 
 
 def short(mind: Mind, object_id: int) -> str:
@@ -210,7 +210,7 @@ def mentions(template: str) -> tuple[str, ...]:
 
 def tidy(text: str) -> str:
     """Fix the commas around 'believed to be', and start with a capital."""
-    text = _DOUBLED.sub("", text)
+    text = _DOUBLED_COMMA.sub("", text)
     return text[:1].upper() + text[1:]
 
 
@@ -230,7 +230,7 @@ def indefinite(noun: str) -> str:
 
 def with_article(mind: Mind, model: str) -> str:
     """Name of an object of a model, with its article."""
-    name = called(mind, model)
+    name = role_or_model(mind, model)
     of_kind = name == model and model in mind.recall(KIND_NAMES)
     return indefinite(spaced(name)) if of_kind else f"the {spaced(name)}"
 

@@ -227,7 +227,7 @@ def _word(name: str, words: tuple[str, ...] = ()) -> FactEvaluator:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        return TRUTH_OF[int(PREDICATES[name].look(facts, *words)[rows])]
+        return TRUTH_OF[int(PREDICATES[name].evaluate(facts, *words)[rows])]
 
     return look
 
@@ -264,7 +264,7 @@ def _measure(task: Task, fact: Comparison, amount: Number) -> Measured:
         return on_floor
 
     def plain(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
-        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts, *words))
+        low, high = (float(side[rows]) for side in QUANTITIES[name].evaluate(facts, *words))
         return low, high
 
     return plain

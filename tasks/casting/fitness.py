@@ -15,7 +15,7 @@ from visup.agent import Mind, ObjectBelief
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.relations.reasoner import kinematics
 from visup.rules.traits.colours import colour_share
-from visup.rules.traits.reasoner import NOTHING, Traits, traits_of
+from visup.rules.traits.reasoner import NO_TRAITS, Traits, traits_of
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -86,7 +86,7 @@ def fits(role: Role, models: Sequence[str], objects: Sequence[ObjectBelief]) -> 
     looked = [strength(o, models) if models else 1.0 for o in objects]
     if not criteria:
         return _answered(looked, role, objects)
-    known = [traits_of(role.mind, o.id) or NOTHING for o in objects]
+    known = [traits_of(role.mind, o.id) or NO_TRAITS for o in objects]
     plain = [c for c in criteria if not isinstance(c, Ranked)]
     fit = [
         min([looks, *(_meets(c, role, o, t) for c in plain)])
@@ -171,7 +171,7 @@ def _behaves(criterion: Conduct, traits: Traits, mind: Mind) -> bool:
     if criterion.kind == "enters":
         return traits.side == criterion.side if criterion.side else bool(traits.side)
     if criterion.kind == "moves":
-        return traits.moved is not None
+        return traits.first_moved is not None
     since = traits.resting_since
     return since is not None and mind.time - since >= REST_S
 
@@ -179,10 +179,10 @@ def _behaves(criterion: Conduct, traits: Traits, mind: Mind) -> bool:
 _ORDERS: Mapping[str, Callable[[Traits], float]] = {
     "largest": lambda t: -t.extent,
     "smallest": lambda t: t.extent,
-    "leftmost": lambda t: t.first_at[0],
-    "rightmost": lambda t: -t.first_at[0],
-    "highest": lambda t: t.first_at[1],
-    "lowest": lambda t: -t.first_at[1],
+    "leftmost": lambda t: t.first_centroid[0],
+    "rightmost": lambda t: -t.first_centroid[0],
+    "highest": lambda t: t.first_centroid[1],
+    "lowest": lambda t: -t.first_centroid[1],
 }
 
 
@@ -212,9 +212,13 @@ def _ranked(
 
 def _first_to_move(fit: Sequence[float], known: Sequence[Traits]) -> list[float]:
     """The fitness of only the first object to move."""
-    moved = (t.moved for f, t in zip(fit, known, strict=True) if f > 0.0 and t.moved is not None)
+    moved = (
+        t.first_moved
+        for f, t in zip(fit, known, strict=True)
+        if f > 0.0 and t.first_moved is not None
+    )
     first = min(moved, default=None)
-    return [f if t.moved == first else 0.0 for f, t in zip(fit, known, strict=True)]
+    return [f if t.first_moved == first else 0.0 for f, t in zip(fit, known, strict=True)]
 
 
 def _hangs_together(object_id: int, machine: int | None, mind: Mind) -> float:
@@ -231,9 +235,9 @@ def _hangs_together(object_id: int, machine: int | None, mind: Mind) -> float:
 
 def _placed(traits: Traits, at: tuple[float, float], mind: Mind) -> float:
     """The fitness of an object for a position when first seen; of two there, the nearer centre wins."""
-    if traits is NOTHING:
+    if traits is NO_TRAITS:
         return 0.0
-    dx, dy = traits.first_at[0] - at[0], traits.first_at[1] - at[1]
+    dx, dy = traits.first_centroid[0] - at[0], traits.first_centroid[1] - at[1]
     off_centre = math.hypot(dx, dy) / image_diagonal(mind.frame_size)
     return _near(_distance_to_box(traits.first_box, at), *PLACED, mind) * (
         1.0 - min(0.1, off_centre)

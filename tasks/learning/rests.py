@@ -127,7 +127,9 @@ def _speeds(minds: Sequence[Mind], actor: str) -> list[tuple[float, float | None
         facts = Snapshot(mind)
         numbers = {name: facts.row[n] for n, name in names_of(mind).items() if n in facts.row}
         speed = (
-            float(QUANTITIES["speed"].look(facts)[1, numbers[actor]]) if actor in numbers else inf
+            float(QUANTITIES["speed"].evaluate(facts)[1, numbers[actor]])
+            if actor in numbers
+            else inf
         )
         found.append((mind.time, speed if isfinite(speed) else None))
     return found

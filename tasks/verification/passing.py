@@ -202,7 +202,7 @@ def vanished_into(mind: Mind, objects: tuple[int, ...]) -> float | None:
     tracks = presence_memory(mind).of
     for body, other in (objects, objects[::-1]):
         if body in tracks and tracks[body].vanished_into == other:
-            return tracks[body].seen_at
+            return tracks[body].last_seen
     return None
 
 

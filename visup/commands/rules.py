@@ -176,7 +176,7 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
     from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
 
     values = evaluation_of(mind)
-    wanted = [rule_named(values, only)] if only else list(values.prepared.rules)
+    wanted = [rule_named(values, only)] if only else list(values.compiled.rules)
     return [
         str(explain(mind, rule.name, *ids))
         for rule in wanted

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from visup.agent import Alert, Mind, ObjectBelief, Presence, Severity, StageBelief, Status
 from visup.report.image_text import fitted, ink, shade, write
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, Rgb, object_colour
-from visup.rules.wording.sentences import called, spaced
+from visup.rules.wording.sentences import role_or_model, spaced
 from visup.wording import prose
 
 WHITE: Rgb = (255, 255, 255)
@@ -79,7 +79,7 @@ def label_of(belief: ObjectBelief, mind: Mind) -> str:
     """The label of an object in a picture, named as in sentences, such as '2 satellite 87 %'."""
     if not belief.candidates:
         return str(belief.id)
-    name = spaced(called(mind, belief.name))
+    name = spaced(role_or_model(mind, belief.name))
     return f"{belief.id} {name} {belief.strength:.0%}".replace("%", " %")
 
 

@@ -29,7 +29,7 @@ from visup.report.records import (
     RunData,
     Sample,
 )
-from visup.rules.wording.sentences import called
+from visup.rules.wording.sentences import role_or_model
 from visup.story import Narrative
 from visup.tasks.tools.outline import Branch
 from visup.wording import worded_once
@@ -197,7 +197,7 @@ class Collector:
         for b in mind.objects.values():
             if b.confirmed and (b.id in self._subjects or len(self._subjects) < self.limits.spans):
                 self._subjects[b.id] = ReportedObject(
-                    b.id, called(mind, b.name), b.strength, b.first_seen, b.last_seen
+                    b.id, role_or_model(mind, b.name), b.strength, b.first_seen, b.last_seen
                 )
 
     def _remember_alerts(self, alerts: Sequence[Alert]) -> None:

@@ -38,7 +38,7 @@ from visup.rules.language.diagnostics import either
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.monitoring.intervals import AtEnd
 from visup.rules.reasoners import ReasonerSettings, default_reasoners
-from visup.rules.safety.ending import open_rules
+from visup.rules.safety.pending_verdicts import open_rules
 from visup.runs.inputs.plugins import user_behaviours
 from visup.runs.inputs.presets import every_for, preset_named
 from visup.runs.inputs.signals import check_signals, signal_behaviours

@@ -41,9 +41,7 @@ def object_region(
     """
     velocity, sigma = _velocity(track, scene.scale, shape.centroid)
     region = shape.region(track.id, velocity, sigma, confidence(track))
-    return replace(
-        region, motion=_motion(track, scene.scale, last), visible_since=track.first_seen_at
-    )
+    return replace(region, motion=_motion(track, scene.scale, last), visible_since=track.first_seen)
 
 
 def confidence(track: TaughtObjectTrack) -> float:

@@ -30,16 +30,14 @@ LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # least filter peak and explained share of 
 UNSURE_PEAK = 0.4  # filter peak below which colours localise the object
 OWN_COLOURS = 0.25  # least excess of the object's colours over the surroundings
 MOVED_PX = 1.0  # least motion that ends rest, working pixels
-FIRM_MOVE_SHARE = (
-    0.6  # share of an object's pixels that a move must explain if many points agree on it
-)
+FIRM_MOVE_SHARE = 0.6
+"""Share of an object's pixels that a move must explain if many points agree on it."""
 MOVE_MARGIN = 0.04  # otherwise: share of pixels by which the move must explain more than rest does
 COVERED_SHARE = 0.2  # unchanged share below which an object at rest is covered
 UNCOVERED_SHARE = 0.5  # unchanged share above which a hidden object is seen at rest again
 REDETECTION_SCORE = 0.6  # match score above which a hidden object is seen again, not at rest
-STEADY_PEAK_SHARE = (
-    0.8  # share of the last peak from which agreeing points need no scale and rotation search
-)
+STEADY_PEAK_SHARE = 0.8
+"""Share of the last peak from which agreeing points need no scale and rotation search."""
 REFINEMENT_INTERVAL = 4  # frames between two such searches in any case
 _GROWTH, _TURN = 1.035, 0.07  # scale factor and rotation (radians) per frame that are tried
 _BETTER_PEAK = 1.03  # factor by which the filter must respond better to these
@@ -90,7 +88,7 @@ def track_object(track: TaughtObjectTrack, owner: int, motion: FrameMotion) -> T
 def with_observation(track: TaughtObjectTrack, time: float, pose: PatchPose) -> TaughtObjectTrack:
     """The track with an observation at a pose and time (seconds) added to its path."""
     path = tuple(p for p in track.path if time - p[0] <= PATH_S)
-    return replace(track, pose=pose, path=(*path, (time, pose)), seen_at=time)
+    return replace(track, pose=pose, path=(*path, (time, pose)), last_seen=time)
 
 
 def _track_at_rest(
@@ -124,7 +122,7 @@ def _track_at_rest(
     track = replace(track, explained_share=here, peak=peak)
     if unchanged_share >= COVERED_SHARE or here >= 0.3:
         return with_observation(track, scene.time, pose)
-    if scene.time - track.seen_at > LOSE_S:
+    if scene.time - track.last_seen > LOSE_S:
         return replace(track, state=TrackState.HIDDEN, visible=None)
     return track
 
@@ -145,7 +143,7 @@ def _track_moving(
         best = _between(best, middle, 0.4)
     if (peak > LEAST_PEAK and share > LEAST_SHARE) or colours > OWN_COLOURS:
         return replace(_observed_moving(track, best, peak, share, scene), colour_excess=colours)
-    if scene.time - track.seen_at > LOSE_S:
+    if scene.time - track.last_seen > LOSE_S:
         return replace(track, state=TrackState.HIDDEN, visible=None, rest=None, pose=best)
     guess = _pose_from_points(track.pose, points)[0] or base
     return replace(

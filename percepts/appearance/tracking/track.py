@@ -57,8 +57,8 @@ class TaughtObjectTrack:
         peak: Last peak of its filter.
         explained_share: Share of its pixels that looked as expected.
         colour_excess: Excess of its colours over those of the surroundings.
-        seen_at: Time of the last observation, seconds.
-        first_seen_at: Time of the first observation, seconds.
+        last_seen: Time of the last observation, seconds.
+        first_seen: Time of the first observation, seconds.
         confirmed: Whether it has clearly matched a taught view.
         compared_at: Time of the last search of the whole image for it, seconds.
     """
@@ -75,7 +75,7 @@ class TaughtObjectTrack:
     peak: float = 0.0
     explained_share: float = 0.0
     colour_excess: float = 0.0
-    seen_at: float = -np.inf
-    first_seen_at: float = 0.0
+    last_seen: float = -np.inf
+    first_seen: float = 0.0
     confirmed: bool = False
     compared_at: float = -np.inf

@@ -168,7 +168,7 @@ class TaughtObjectTracker:
         motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count, same)
         tracks = [track_object(t, k, motion) for k, t in enumerate(self.tracks)]
         for k, t in enumerate(tracks):
-            if t.state in IN_VIEW and t.seen_at == scene.time:
+            if t.state in IN_VIEW and t.last_seen == scene.time:
                 others = [o.visible for o in tracks if o is not t and o.visible is not None]
                 tracks[k] = correct_drift(t, self.views, scene, others)
         self.tracks = tuple(tracks)
@@ -335,12 +335,12 @@ def _with_id(
 ) -> TaughtObjectTrack:
     if track.id or track.visible is None:
         return track
-    return replace(track, id=new_id(track.visible), first_seen_at=scene.time)
+    return replace(track, id=new_id(track.visible), first_seen=scene.time)
 
 
 def _claim(track: TaughtObjectTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim | None:
     """The claim of an object in view on the image."""
-    if track.state not in IN_VIEW or scene.time - track.seen_at > HOLD_S:
+    if track.state not in IN_VIEW or scene.time - track.last_seen > HOLD_S:
         return None
     if track.state is TrackState.RESTING and track.rest is not None:
         return rest_log_odds(track.rest, same[track.name])
@@ -351,7 +351,7 @@ def _claim(track: TaughtObjectTrack, scene: Scene, same: Mapping[str, Mask]) -> 
 
 def _visible_pixels(tracks: Sequence[TaughtObjectTrack], scene: Scene) -> dict[str, Blob]:
     """The visible pixels of the objects that are seen in a frame, by name."""
-    seen = (t for t in tracks if t.state in IN_VIEW and t.seen_at == scene.time)
+    seen = (t for t in tracks if t.state in IN_VIEW and t.last_seen == scene.time)
     return {t.name: t.visible for t in seen if t.visible is not None}
 
 
@@ -369,7 +369,7 @@ def _occupied_blobs(track: TaughtObjectTrack, scene: Scene) -> Iterator[Blob]:
     """Blobs of an object in view; one just redetected has no pixels of its own yet."""
     if track.visible is not None:
         yield track.visible
-    elif track.seen_at == scene.time and track.pose is not None and track.appearance is not None:
+    elif track.last_seen == scene.time and track.pose is not None and track.appearance is not None:
         covered = footprint(scene, track.pose, track.appearance)
         if covered is not None:
             yield covered

@@ -32,8 +32,8 @@ def track(proven: bool) -> TaughtObjectTrack:
         TrackState.MOVING,
         pose,
         view.appearance,
-        seen_at=0.0,
-        first_seen_at=0.0,
+        last_seen=0.0,
+        first_seen=0.0,
         confirmed=proven,
     )
 

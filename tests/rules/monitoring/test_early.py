@@ -21,7 +21,7 @@ from visup.rules.monitoring.intervals import FALSE, TRUE, AtEnd, Scalars, verdic
 from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.reasoners import default_reasoners
-from visup.rules.safety.ending import open_rules
+from visup.rules.safety.pending_verdicts import open_rules
 from visup.rules.safety.queries import explain
 
 

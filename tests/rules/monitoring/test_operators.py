@@ -30,7 +30,7 @@ from visup.rules.monitoring.samples import max_samples
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.safety.compiled_rules import CompiledRules
-from visup.rules.safety.verdicts import remapped
+from visup.rules.safety.verdicts import reindexed_states
 
 History = list[tuple[float, dict[str, Interval]]]
 
@@ -69,7 +69,7 @@ def sampled(
 ) -> tuple[States, Any]:
     """One sample of the signals of some objects: the states after it, and all intervals."""
     arena = np.full(layout.size, np.nan)
-    for step, node in layout.program.looks():
+    for step, node in layout.program.lookups():
         values = [objects[i][node.name] for i in sorted(objects)]
         at = layout.places[step]
         arena[at : at + 2 * layout.n] = np.array(values, dtype=float).reshape(layout.n, 2).T.ravel()
@@ -84,12 +84,12 @@ def by_arrays(
     place = compiler.formula(formula, (("a", False),))
     prepared = CompiledRules((), compiler, ())
     ids = tuple(sorted(seen[0]))
-    states = prepared.fresh(len(ids))
+    states = prepared.initial_states(len(ids))
     told: list[dict[int, Interval]] = []
     for time, objects in zip(times, seen, strict=True):
         now = tuple(sorted(objects))
         if now != ids:
-            states = remapped(prepared, states, ticks(time), ids, now)
+            states = reindexed_states(prepared, states, ticks(time), ids, now)
         ids, layout = now, prepared.layout(len(now))
         states, arena = sampled(layout, states, ticks(time), objects)
         told.append({i: layout.interval(place.step, (k,), arena) for k, i in enumerate(ids)})

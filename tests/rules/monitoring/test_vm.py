@@ -163,7 +163,7 @@ def laid(prepared: CompiledRules, ids: tuple[int, ...], sample: Sample) -> tuple
     """Codes and intervals as a step looks them up."""
     layout, n = prepared.layout(len(ids)), len(ids)
     codes, arena = np.zeros(layout.codes, np.int8), np.full(layout.size, np.nan)
-    for step, node in layout.program.looks():
+    for step, node in layout.program.lookups():
         count = len(layout.program.steps[step].order)
         values = [sample[node.name, objects] for objects in product(ids, repeat=count)]
         order = layout.program.steps[step].order

@@ -23,14 +23,14 @@ class Facts:
 
     holds: str | None
 
-    def related(self, name: str) -> Any:
+    def relation_codes(self, name: str) -> Any:
         code = MAYBE if self.holds is None else YES if name == self.holds else NO
         return np.array([[NO, code], [code, NO]], dtype=np.int8)
 
 
 def code(word: str, holds: str | None) -> int:
     facts: Any = Facts(holds)
-    return int(PREDICATES[word].look(facts)[0, 1])
+    return int(PREDICATES[word].evaluate(facts)[0, 1])
 
 
 @pytest.mark.parametrize(("name", "sign"), list(zip(RCC8, SIGNS, strict=True)))

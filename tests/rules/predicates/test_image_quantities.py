@@ -17,7 +17,7 @@ from visup.rules.predicates.vocabulary import QUANTITIES
 
 def asked(mind: Mind, name: str, *words: str) -> list[float]:
     """The lower bounds of a quantity of all objects."""
-    table = QUANTITIES[name].look(Snapshot(mind), *words)
+    table = QUANTITIES[name].evaluate(Snapshot(mind), *words)
     return [float(v) for v in table[0].ravel()]
 
 
@@ -82,5 +82,5 @@ def test_objects_are_counted_those_of_a_name_within_bounds() -> None:
     mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
     assert asked(mind, "objects") == [2.0]
     named = replace(mind.objects[1], candidates=(Candidate("mug", 5.0, 0.9),))
-    table = QUANTITIES["objects_named"].look(Snapshot(mind.with_objects(named)), "mug")
+    table = QUANTITIES["objects_named"].evaluate(Snapshot(mind.with_objects(named)), "mug")
     assert table.tolist() == [1.0, 2.0]

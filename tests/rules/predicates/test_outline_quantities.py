@@ -38,7 +38,7 @@ def outlined(*contours: np.ndarray) -> Mind:
 
 
 def asked(mind: Mind, name: str) -> np.ndarray:
-    return QUANTITIES[name].look(Snapshot(mind))
+    return QUANTITIES[name].evaluate(Snapshot(mind))
 
 
 @given(st.floats(0.0, 179.0), st.floats(0.0, 179.0))
@@ -49,7 +49,7 @@ def test_bars_lie_as_they_were_laid_and_are_as_far_apart_in_angle(a: float, b: f
     turn = abs(a - b)
     between = min(turn, 180 - turn)
     assert asked(mind, "axis_angle")[:, 0, 1] == pytest.approx([between] * 2, abs=0.3)
-    truth = PREDICATES["aligned"].look(Snapshot(mind))[0, 1]
+    truth = PREDICATES["aligned"].evaluate(Snapshot(mind))[0, 1]
     if between < 9.5 or between > 15.5:
         assert truth == (1 if between < 12 else -1)
     elif 10.5 < between < 14.5:
@@ -60,7 +60,7 @@ def test_what_is_round_or_out_of_sight_lies_no_way() -> None:
     mind = outlined(bar(30, 40, 40), bar(30))
     assert asked(mind, "orientation")[:, 0].tolist() == [-inf, inf]
     assert asked(mind, "axis_angle")[:, 0, 1].tolist() == [-inf, inf]
-    assert PREDICATES["aligned"].look(Snapshot(mind))[0, 1] == 0
+    assert PREDICATES["aligned"].evaluate(Snapshot(mind))[0, 1] == 0
     hidden = mind.with_objects(replace(mind.objects[2], presence=Presence.HIDDEN))
     assert asked(hidden, "orientation")[:, 1].tolist() == [-inf, inf]
     assert asked(hidden, "openness")[:, 1].tolist() == [-inf, inf]

@@ -56,7 +56,7 @@ def mind(*drawn: tuple[tuple[int, int], tuple[int, int]]) -> Mind:
 
 
 def told(facts: Snapshot, word: str, a: int, b: int) -> list[str]:
-    return [r for r in ALLEN_RELATIONS if PREDICATES[word].look(facts, r)[a, b] == YES]
+    return [r for r in ALLEN_RELATIONS if PREDICATES[word].evaluate(facts, r)[a, b] == YES]
 
 
 @settings(max_examples=60, deadline=None)
@@ -89,7 +89,7 @@ def test_tpcc_is_its_definition_but_near_the_straight_lines(
     assume(len({a, b, c}) == 3)
     points = [(x * GRID + 5.0, y * GRID + 5.0) for x, y in (a, b, c)]
     facts = Snapshot(mind_of(*((int(x) - 5, int(y) - 5, 11, 11) for x, y in points)))
-    look = PREDICATES["tpcc"].look
+    look = PREDICATES["tpcc"].evaluate
     found = [r for r in TPCC_RELATIONS if look(facts, r)[0, 1, 2] == YES]
     assert len(found) == 1
     up = [(x, -y) for x, y in points]
@@ -112,9 +112,9 @@ def turned(
 def test_what_is_out_of_sight_is_in_no_known_relation() -> None:
     seen = mind_of((0, 0, 20, 20), (50, 50, 20, 20), (100, 0, 20, 20))
     facts = Snapshot(seen.with_objects(replace(seen.objects[2], presence=Presence.HIDDEN)))
-    assert PREDICATES["along_x"].look(facts, "before")[0, 1] == MAYBE
-    assert PREDICATES["along_x"].look(facts, "before")[0, 2] == YES
-    assert PREDICATES["tpcc"].look(facts, "csf")[0, 1, 2] == MAYBE
+    assert PREDICATES["along_x"].evaluate(facts, "before")[0, 1] == MAYBE
+    assert PREDICATES["along_x"].evaluate(facts, "before")[0, 2] == YES
+    assert PREDICATES["tpcc"].evaluate(facts, "csf")[0, 1, 2] == MAYBE
 
 
 def test_rules_ask_for_them_by_name() -> None:

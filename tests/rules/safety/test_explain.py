@@ -73,8 +73,8 @@ def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
         outcome = reasoner(mind, NOTHING)
         memory = outcome.mind.recall(SAFETY)
     values = evaluation_of(outcome.mind)
-    raised = {(rule.name, ids) for rule, ids in values.true()}
-    for rule in values.prepared.rules:
+    raised = {(rule.name, ids) for rule, ids in values.true_bindings()}
+    for rule in values.compiled.rules:
         for ids in object_choices(values, rule):
             told = explain(outcome.mind, rule.name, *ids)
             assert (told.verdict == "true") == ((rule.name, ids) in raised)
@@ -141,7 +141,7 @@ def test_objects_are_distinct_unless_they_may_repeat() -> None:
 def values_for(text: str) -> set[tuple[int, ...]]:
     rules = parse_rules(text)
     outcome = RuleReasoner(rules)(MIND, NOTHING)
-    return {ids for _, ids in evaluation_of(outcome.mind).true()}
+    return {ids for _, ids in evaluation_of(outcome.mind).true_bindings()}
 
 
 @pytest.mark.parametrize(
@@ -266,8 +266,8 @@ def test_facts_of_pairs_stand_in_the_order_of_their_objects() -> None:
     mind = watched()[-1].mind
     facts = Snapshot(mind)
     assert facts.ids == (1, 2)
-    assert facts.related("converging").tolist() == [[-1, 1], [1, -1]]
-    soonest, latest = RULES.quantities["time_to_contact"].look(facts)
+    assert facts.relation_codes("converging").tolist() == [[-1, 1], [1, -1]]
+    soonest, latest = RULES.quantities["time_to_contact"].evaluate(facts)
     assert 0 < soonest[0, 1] == soonest[1, 0] <= latest[0, 1] == latest[1, 0]
     assert facts.first_contact.tolist() == [[0, 1], [1, 0]]
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from visup.percepts.colour import ENTRIES, ColourBehaviour, palette
 from visup.rules.traits.colours import SHADES, TERMS, colour_fit, colour_share
-from visup.rules.traits.reasoner import Palette, blended
+from visup.rules.traits.reasoner import Palette, blend_palettes
 from visup.tasks.grammar.parser import grammar
 from visup.testing.clips import region_of
 
@@ -116,6 +116,6 @@ entries = st.lists(
 
 @given(entries, entries, st.floats(0, 1))
 def test_blending_keeps_shares(one: Palette, other: Palette, weight: float) -> None:
-    shares = [sum(e[3] for e in p) for p in (blended(one, other, weight), one, other)]
+    shares = [sum(e[3] for e in p) for p in (blend_palettes(one, other, weight), one, other)]
     assert shares[0] == pytest.approx((1 - weight) * shares[1] + weight * shares[2])
-    assert blended((), other, weight) == other
+    assert blend_palettes((), other, weight) == other

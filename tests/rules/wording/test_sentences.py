@@ -18,7 +18,7 @@ from visup.rules.wording.relation_events import TEMPLATES
 from visup.rules.wording.sentences import LIKELY, SURE, VERBS, graded, mentions, sentence
 
 BANDS = {1.0: 0, 0.95: 0, 0.94: 1, 0.5: 1, 0.49: 2, 0.0: 2}
-TOLD = {
+REPORTED_LIKELIHOOD = {
     "is": ("is", "appears to be", "may be"),
     "are": ("are", "appear to be", "may be"),
     "enters": ("enters", "appears to enter", "may enter"),
@@ -43,7 +43,7 @@ def templates() -> list[str]:
 @pytest.mark.parametrize("verb", sorted(VERBS))
 @pytest.mark.parametrize("confidence", BANDS)
 def test_a_verb_is_as_strong_as_its_confidence(verb: str, confidence: float) -> None:
-    assert graded(verb, confidence) == TOLD[verb][BANDS[confidence]]
+    assert graded(verb, confidence) == REPORTED_LIKELIHOOD[verb][BANDS[confidence]]
 
 
 def test_every_sentence_about_objects_has_a_verb_that_is_graded() -> None:
@@ -60,7 +60,7 @@ def test_all_sentences_keep_their_words_in_every_band(confidence: float) -> None
     for template in templates():
         said = sentence(Mind(0.0, 0, (640, 480)), template, 1, 2, confidence=confidence)
         (verb,) = VERBS & set(mentions(template))
-        assert TOLD[verb][band] in said, template
+        assert REPORTED_LIKELIHOOD[verb][band] in said, template
         assert "{" not in said
         assert said[0].isupper()
 
@@ -88,4 +88,6 @@ def test_what_happens_is_told_with_the_confidence_of_its_event() -> None:
         assert {"entry", "occlusion"} <= {e.kind for e in events}
         for event in events:
             band = 0 if event.confidence >= SURE else 1 if event.confidence >= LIKELY else 2
-            assert any(TOLD[v][band] in event.text for v in verbs[event.kind]), event.text
+            assert any(REPORTED_LIKELIHOOD[v][band] in event.text for v in verbs[event.kind]), (
+                event.text
+            )

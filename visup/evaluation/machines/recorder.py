@@ -143,7 +143,7 @@ def touching(mind: Mind, who: Mapping[str, int]) -> Iterator[tuple[str, str]]:
 def moving(mind: Mind, who: Mapping[str, int]) -> Iterator[str]:
     """Names whose objects are believed to move."""
     facts = Snapshot(mind)
-    codes = PREDICATES["moving"].look(facts)
+    codes = PREDICATES["moving"].evaluate(facts)
     for name, i in sorted(who.items()):
         if i in facts.row and codes[facts.row[i]] == 1:
             yield name

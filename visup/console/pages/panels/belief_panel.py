@@ -23,7 +23,7 @@ from visup.console.pages.panels.remember_part import remember_part
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
 from visup.report.palette import STATUS_COLOURS, css, object_colour
-from visup.rules.wording.sentences import called, spaced
+from visup.rules.wording.sentences import role_or_model, spaced
 
 MOST_OBJECTS = 30
 
@@ -113,7 +113,7 @@ def _objects(mind: Mind, head: Playhead) -> None:
 
 
 def _called(belief: ObjectBelief, mind: Mind) -> str:
-    name = spaced(called(mind, belief.name)) if belief.candidates else "not identified"
+    name = spaced(role_or_model(mind, belief.name)) if belief.candidates else "not identified"
     return shown_text(f"{belief.id}  {name}")
 
 

@@ -18,11 +18,11 @@ from visup.rules.safety.compiled_rules import CompiledRules, compile_rules
 from visup.rules.safety.reasoner import RuleMemory, rule_memory
 from visup.rules.wording.sentences import sentence, with_names
 
-PACE = ticks(0.1)
+MOMENT_SPACING = ticks(0.1)
 """Spacing of the moments at which pending verdicts are evaluated, microseconds."""
 MOST_MOMENTS = 20_000
 """Most such moments: 33 minutes."""
-DOUBTFUL = 0.4
+POSSIBILITY_CONFIDENCE = 0.4
 """Confidence of a sentence about a possibility."""
 
 
@@ -61,63 +61,65 @@ def open_rules(mind: Mind, at_end: AtEnd | str) -> tuple[OpenRule, ...]:
     memory = rule_memory(mind)
     if at_end == "unknown" or memory.now is None or memory.after is None:
         return ()
-    prepared = compile_rules(memory.rules, memory.early)
-    strong = dict.fromkeys(_found(prepared, memory, 0))
-    weak = {} if at_end == "strong" else dict.fromkeys(_found(prepared, memory, 1))
+    compiled = compile_rules(memory.rules, memory.early)
+    strong = dict.fromkeys(_true_while_pending(compiled, memory, 0))
+    weak = {} if at_end == "strong" else dict.fromkeys(_true_while_pending(compiled, memory, 1))
     found = {**strong, **weak}
-    standing = {key for key, held in memory.held.items() if held.until == inf}
+    active = {key for key, held in memory.active.items() if held.until == inf}
     open_now: dict[tuple[str, frozenset[int]], OpenRule] = {}
     for rule, ids in found:
         key = (rule.name, frozenset(ids))
-        if key not in standing and key not in open_now:
+        if key not in active and key not in open_now:
             decided = (rule, ids) in strong
             words = with_names(rule.say, rule.variables)
-            text = sentence(mind, words, *ids, confidence=1.0 if decided else DOUBTFUL)
+            text = sentence(
+                mind, words, *ids, confidence=1.0 if decided else POSSIBILITY_CONFIDENCE
+            )
             open_now[key] = OpenRule(rule, ids, text, decided)
     return tuple(open_now.values())
 
 
-def _found(
-    prepared: CompiledRules, memory: RuleMemory, bound: int
+def _true_while_pending(
+    compiled: CompiledRules, memory: RuleMemory, bound: int
 ) -> Iterator[tuple[Rule, tuple[int, ...]]]:
     """Rules that are true at moments with pending verdicts.
 
     Args:
-        prepared: The rules.
+        compiled: The rules.
         memory: Their memory.
         bound: Whether lower bounds (0) or upper bounds (1) count.
     """
-    n, delays = len(memory.ids), [places[0].delay for places in prepared.places]
-    layout, rows = prepared.layout(n), prepared.verdicts(n)[0]
+    n, delays = len(memory.ids), [places[0].delay for places in compiled.condition_refs]
+    layout, rows = compiled.layout(n), compiled.search_table(n)[0]
     assert memory.now is not None
     assert memory.after is not None
-    states, found = memory.after, np.empty(max(1, prepared.verdicts(n)[1]), dtype=np.int64)
-    for k in range(1, min(max(delays) // PACE, MOST_MOMENTS) + 1):
-        now, arena = memory.now + k * PACE, _unseen(prepared, n, layout.size)
+    states, found = memory.after, np.empty(max(1, compiled.search_table(n)[1]), dtype=np.int64)
+    for k in range(1, min(max(delays) // MOMENT_SPACING, MOST_MOMENTS) + 1):
+        now, arena = memory.now + k * MOMENT_SPACING, _unknown_arena(compiled, n, layout.size)
         states = layout.step(states, now, np.full(layout.codes, MAYBE, dtype=np.int8), arena)
-        for number, (rule, delay) in enumerate(zip(prepared.rules, delays, strict=True)):
+        for number, (rule, delay) in enumerate(zip(compiled.rules, delays, strict=True)):
             if now - delay > memory.now or not delay:
                 continue
-            row = _bounds(rows[number], prepared, number, n, bound)
+            row = _bound_row(rows[number], compiled, number, n, bound)
             for hit in found[: find_true(row, n, arena, found)].tolist():
-                ids = prepared.choice((number << CHOICE_BITS) + hit, memory.ids)[1]
+                ids = compiled.decode_hit((number << CHOICE_BITS) + hit, memory.ids)[1]
                 if all(memory.since.get(i, memory.now) <= now - delay for i in ids):
                     yield rule, ids
 
 
-def _bounds(row: Ints, prepared: CompiledRules, number: int, n: int, bound: int) -> Ints:
+def _bound_row(row: Ints, compiled: CompiledRules, number: int, n: int, bound: int) -> Ints:
     """The position of one bound of `when` and of `unless`."""
     shifted = row.copy().reshape(1, -1)
-    for column, place in zip((0, 2), prepared.places[number], strict=False):
+    for column, place in zip((0, 2), compiled.condition_refs[number], strict=False):
         shifted[0, column] += bound * n ** len(place.axes)
     return shifted
 
 
-def _unseen(prepared: CompiledRules, n: int, size: int) -> Floats:
+def _unknown_arena(compiled: CompiledRules, n: int, size: int) -> Floats:
     """The arena for a sample in which all quantities are unknown."""
     arena, begin = np.empty(size), 0
-    for look in prepared.quantities:
-        cells = n**look.axes
+    for lookup in compiled.quantities:
+        cells = n**lookup.axes
         arena[begin : begin + cells] = -inf
         arena[begin + cells : begin + 2 * cells] = inf
         begin += 2 * cells
