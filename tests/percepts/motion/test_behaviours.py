@@ -1,6 +1,7 @@
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,15 +30,17 @@ def seen_with(status: HealthStatus, frame: Frame) -> Observation:
     return Observation(frame.index, frame.time, frame.size, (report,))
 
 
-def moving() -> list[Frame]:
+@cache
+def moving() -> tuple[Frame, ...]:
     disc = (lambda n: (60 + 2.0 * n, 80.0), 24.0, texture(2, (320, 480), 0, 255))
-    return [s.frame for s in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 40)]
+    return tuple(s.frame for s in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 40))
 
 
-def sky() -> list[Frame]:
+@cache
+def sky() -> tuple[Frame, ...]:
     disc = (lambda n: (100 + 0.06 * n, 80.0), 20.0, texture(2, (320, 480), 60, 255))
     dark = np.full((320, 480), 4, np.uint8)
-    return [s.frame for s in clip(dark, lambda n: (0, 0), [disc], 40)]
+    return tuple(s.frame for s in clip(dark, lambda n: (0, 0), [disc], 40))
 
 
 def test_motion_reports_regions_and_none_when_the_image_is_not_to_be_trusted() -> None:
@@ -77,7 +80,7 @@ def test_slow_regions_keep_their_ids_over_a_fault() -> None:
     assert told[42] == told[29], told
 
 
-def statuses(frames: list[Frame], change: Change, start: int = 15) -> list[HealthStatus]:
+def statuses(frames: Sequence[Frame], change: Change, start: int = 15) -> list[HealthStatus]:
     behaviour = HealthBehaviour()
     rng = np.random.default_rng(3)
     out = []
@@ -143,7 +146,7 @@ def test_each_fault_is_told_within_a_second(change: Change, status: HealthStatus
 
 
 @pytest.mark.parametrize("frames", [moving, sky])
-def test_unharmed_video_is_well(frames: Callable[[], list[Frame]]) -> None:
+def test_unharmed_video_is_well(frames: Callable[[], Sequence[Frame]]) -> None:
     assert set(statuses(frames(), lambda image, n, rng: image)) == {HealthStatus.OK}
 
 

@@ -196,7 +196,8 @@ def test_where_cogitation_asks_to_look_an_object_is_told_sooner() -> None:
     elsewhere = Directive("look_at", "a test", {"bbox": (0, 0, 40, 40)})
 
     def first(directive: Directive) -> int:
-        return next(n for n, regions in enumerate(run(shots, (directive,))) if regions)
+        segmenter = MotionSegmenter()
+        return next(n for n, s in enumerate(shots) if segmenter.step(s.frame, (directive,)))
 
     assert first(there) < first(elsewhere)
 

@@ -171,8 +171,7 @@ def test_what_stands_on_the_ground_is_no_object_however_much_parallax_it_has(
     own: float, told: bool
 ) -> None:
     segmenter = MotionSegmenter()
-    seen = [segmenter.step(travelling(n, own)) for n in range(50)]
-    assert any(seen) is told
+    assert any(segmenter.step(travelling(n, own)) for n in range(50)) is told
 
 
 def test_the_foot_is_the_lowest_part_and_unknown_where_the_image_cuts_it() -> None:
