@@ -190,7 +190,8 @@ def _clip(trial: CameraFaultTrial) -> list[Frame]:
     with open_source(str(trial.source)) as source:
         length = round((trial.sound_s + FAULTY_S) * source.fps) + 1
         spare = max(0, (source.frame_count or length) - length)
-        frames = list(islice(source, round(trial.skip * spare), None))[:length]
+        source.span = (round(trial.skip * spare), None)  # images before it are not even decoded
+        frames = list(islice(source, length))
     return to_and_fro(frames, length)
 
 

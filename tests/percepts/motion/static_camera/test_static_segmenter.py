@@ -320,7 +320,7 @@ def test_what_comes_and_rests_does_not_shrink() -> None:
     skin = texture(3, (320, 480), 60, 255)
     disc = (lambda n: (-20 + 2.5 * (min(n, 75) - 30), 80.0), 18.0, skin)
     segmenter, areas = MotionSegmenter(), []
-    for shot in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 220, noise=3.0):
+    for shot in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 190, noise=3.0):
         seen = [r.full_mask(SIZE[::-1]) for r in segmenter.step(shot.frame)]
         areas.append(int((np.any(seen, axis=0) & shot.masks[0]).sum()) if seen else 0)
     assert min(areas[90:]) > 0.9 * shot.masks[0].sum()

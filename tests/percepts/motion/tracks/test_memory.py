@@ -29,7 +29,7 @@ def kept(camera: float, frames: int) -> MotionSegmenter:
 
 @pytest.mark.parametrize("camera", [0.0, 0.4])
 def test_what_is_kept_is_bounded_by_what_lives(camera: float) -> None:
-    segmenter = kept(camera, 130)
+    segmenter = kept(camera, 90)
     tracks = segmenter._tracks
     keys = {t.key for t in tracks}
     lags = max(segmenter.settings.lags_s) * 1.1 * FPS + 2
