@@ -78,18 +78,32 @@ def told(step: Step | None) -> bytes:
     return flat((whole(step.mind), step.events, step.alerts, step.directives))
 
 
+PLAIN = (str, int, float, bool, type(None))
+
+
 def flat(value: Any) -> bytes:
     """A value as bytes by its content alone: which records are one and which are equal depends on the way."""
+    kind: Any = type(value)
+    if kind in PLAIN:
+        return repr(value).encode()
+    if kind is tuple or kind is list:
+        return b"(" + b",".join([flat(v) for v in value]) + b")"
+    names = names_of(kind)
+    if names is not None:
+        return str(kind.__name__).encode() + flat([getattr(value, n) for n in names])
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{value.shape}".encode() + value.tobytes()
     if isinstance(value, Mapping):
-        return b"{" + b",".join(flat(k) + b":" + flat(v) for k, v in value.items()) + b"}"
+        return b"{" + b",".join([flat(k) + b":" + flat(v) for k, v in value.items()]) + b"}"
     if isinstance(value, tuple | list):
-        return b"(" + b",".join(map(flat, value)) + b")"
-    if is_dataclass(value):
-        held = (getattr(value, f.name) for f in fields(value))
-        return type(value).__name__.encode() + flat(tuple(held))
+        return b"(" + b",".join([flat(v) for v in value]) + b")"
     return repr(value).encode()
+
+
+@cache
+def names_of(kind: type) -> tuple[str, ...] | None:
+    """Names of the fields of a record, or None."""
+    return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else None
 
 
 @cache

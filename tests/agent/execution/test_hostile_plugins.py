@@ -21,6 +21,8 @@ from visup.agent.plugins.isolated import IsolatedBehaviour
 
 HANG_S = 2.0
 LIMITS = Limits(hang_s=HANG_S, start_s=20.0)
+SHORT = Limits(hang_s=0.5, start_s=20.0)
+"""For what never answers: it is waited for until then."""
 PATIENT = Limits(hang_s=60.0, start_s=60.0)
 """For what a plug-in does rather than leaves undone: it has to come to it beside others that work."""
 
@@ -150,7 +152,7 @@ def test_nonsense_on_the_wire_is_its_failure_and_holds_nobody_up(
 ) -> None:
     behaviour = plug(tmp_path, body)
     begin = time.monotonic()
-    told = reports(behaviour, limits=LIMITS if "no answer" in said else PATIENT)
+    told = reports(behaviour, limits=SHORT if "no answer" in said else PATIENT)
     assert time.monotonic() - begin < LIMITS.start_s + 5 * HANG_S
     assert told[0].state in (ReportState.FAILED, ReportState.LATE)
     assert said in told[0].error
