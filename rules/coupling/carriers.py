@@ -36,9 +36,9 @@ class CarrierSettings:
         speed: Least speed of a body that sets out, and least mean speed on its way, image diagonals per
             second; outlines next to a hand, or in front of a swaying camera, drift more slowly.
         rest_share: Greatest speed of a body at rest, as a share of `speed`.
-        along_share: Least path of the carrier in the same time, as a share of the way.
-        past_share: Greatest path of the carrier, as a share of the way; a body that moves much farther only
-            passes by.
+        least_carrier_share: Least path of the carrier in the same time, as a share of the way.
+        most_carrier_share: Greatest path of the carrier, as a share of the way; a body that moves much
+            farther only passes by.
     """
 
     rest_s: float = 0.4
@@ -46,11 +46,11 @@ class CarrierSettings:
     path_share: float = 0.25
     speed: float = 0.0125
     rest_share: float = 0.5
-    along_share: float = 0.3
-    past_share: float = 3.0
+    least_carrier_share: float = 0.3
+    most_carrier_share: float = 3.0
 
 
-Course = tuple[float, tuple[float, float]]
+MotionAtStart = tuple[float, tuple[float, float]]
 """The accumulated motion of a body: path length, and displacement (x, y); pixels."""
 
 
@@ -60,25 +60,26 @@ class BodyMotion:
 
     Attributes:
         path: Length of its path since it was first seen.
-        place: (x, y) displacement since it was first seen.
+        displacement: (x, y) displacement since it was first seen.
         rested_since: Time since when it is at rest; None while it moves.
-        set_out: Time when it set out; None while it rests, or moves without having rested for long enough.
-        way: (x, y) displacement since it set out.
-        touching: The bodies that have touched it ever since it set out: id -> their `path` and `place` at
-            that time.
+        moving_since: Time when it set out; None while it rests, or moves without having rested for long
+            enough.
+        displacement_since: (x, y) displacement since it set out.
+        touching: The bodies that have touched it ever since it set out: id -> their `path` and `displacement`
+            at that time.
         carrier: Id of the body that carries it; None if unknown.
     """
 
     path: float = 0.0
-    place: tuple[float, float] = (0.0, 0.0)
+    displacement: tuple[float, float] = (0.0, 0.0)
     rested_since: float | None = None
-    set_out: float | None = None
-    way: tuple[float, float] = (0.0, 0.0)
-    touching: Mapping[int, Course] = field(default_factory=lambda: MappingProxyType({}))
+    moving_since: float | None = None
+    displacement_since: tuple[float, float] = (0.0, 0.0)
+    touching: Mapping[int, MotionAtStart] = field(default_factory=lambda: MappingProxyType({}))
     carrier: int | None = None
 
 
-AT_START = BodyMotion()
+NO_MOTION = BodyMotion()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,25 +88,25 @@ class CarrierMemory:
 
     Attributes:
         time: Time of the last step, seconds; None before the first.
-        of: Object id -> its motion.
+        motions: Object id -> its motion.
     """
 
     time: float | None = None
-    of: Mapping[int, BodyMotion] = field(default_factory=lambda: MappingProxyType({}))
+    motions: Mapping[int, BodyMotion] = field(default_factory=lambda: MappingProxyType({}))
 
-    def carried(self) -> dict[tuple[int, int], float]:
+    def carried_since(self) -> dict[tuple[int, int], float]:
         """(id, id), ascending, of a carrier and the body it carries -> time when that set out, seconds."""
         return {
-            (min(number, body.carrier), max(number, body.carrier)): body.set_out
-            for number, body in self.of.items()
-            if body.carrier is not None and body.set_out is not None
+            (min(number, body.carrier), max(number, body.carrier)): body.moving_since
+            for number, body in self.motions.items()
+            if body.carrier is not None and body.moving_since is not None
         }
 
 
 CARRIERS: MemoryKey[CarrierMemory] = MemoryKey("rules.carriers", CarrierMemory())
 
 
-def updated_carriers(
+def update_carriers(
     memory: CarrierMemory,
     touching: Mapping[int, Collection[int]],
     mind: Mind,
@@ -120,11 +121,11 @@ def updated_carriers(
         settings: Settings.
     """
     moved = _moved_bodies(memory, touching, mind, settings)
-    of = {
+    motions = {
         number: _with_carrier(body, number, moved, touching.get(number, ()), mind, settings)
         for number, body in moved.items()
     }
-    return CarrierMemory(mind.time, MappingProxyType(of))
+    return CarrierMemory(mind.time, MappingProxyType(motions))
 
 
 def _moved_bodies(
@@ -140,42 +141,49 @@ def _moved_bodies(
     found: dict[int, BodyMotion] = {}
     rows = zip(now.ids, now.speed.tolist(), now.velocity_sigma.tolist(), now.velocity, strict=True)
     for number, speed, sigma, velocity in rows:
-        body = memory.of.get(number, AT_START)
+        body = memory.motions.get(number, NO_MOTION)
         if speed != speed or mind.objects[number].last_seen < mind.time:  # NaN is not itself
             found[number] = body
         elif speed <= settings.rest_share * least:
             since = mind.time if body.rested_since is None else body.rested_since
-            found[number] = BodyMotion(body.path, body.place, since)
+            found[number] = BodyMotion(body.path, body.displacement, since)
         else:
             step = float(velocity[0]) * dt, float(velocity[1]) * dt
-            place = body.place[0] + step[0], body.place[1] + step[1]
-            body = replace(body, path=body.path + speed * dt, place=place)
+            displacement = body.displacement[0] + step[0], body.displacement[1] + step[1]
+            body = replace(body, path=body.path + speed * dt, displacement=displacement)
             if sigma <= unclear and speed > max(least, MOVING_SIGMAS * sigma):
                 others = touching.get(number, ())
-                body = _moved(body, step, _courses(others, memory), mind.time, settings)
+                body = _after_clear_motion(
+                    body, step, _motions_at_start(others, memory), mind.time, settings
+                )
             found[number] = body
     return found
 
 
-def _courses(bodies: Iterable[int], memory: CarrierMemory) -> Mapping[int, Course]:
-    found = ((i, memory.of.get(i, AT_START)) for i in bodies)
-    return MappingProxyType({i: (body.path, body.place) for i, body in found})
+def _motions_at_start(bodies: Iterable[int], memory: CarrierMemory) -> Mapping[int, MotionAtStart]:
+    found = ((i, memory.motions.get(i, NO_MOTION)) for i in bodies)
+    return MappingProxyType({i: (body.path, body.displacement) for i, body in found})
 
 
-def _moved(
+def _after_clear_motion(
     body: BodyMotion,
     step: tuple[float, float],
-    touching: Mapping[int, Course],
+    touching: Mapping[int, MotionAtStart],
     now: float,
     settings: CarrierSettings,
 ) -> BodyMotion:
     """A body after a step of clear motion: its way goes on, or begins if it has rested for long enough."""
-    if body.set_out is not None:
-        way = body.way[0] + step[0], body.way[1] + step[1]
-        return replace(body, rested_since=None, way=way)
+    if body.moving_since is not None:
+        displacement_since = (
+            body.displacement_since[0] + step[0],
+            body.displacement_since[1] + step[1],
+        )
+        return replace(body, rested_since=None, displacement_since=displacement_since)
     if body.rested_since is None or now - body.rested_since < settings.rest_s:
         return replace(body, rested_since=None)
-    return replace(body, rested_since=None, set_out=now, way=step, touching=touching)
+    return replace(
+        body, rested_since=None, moving_since=now, displacement_since=step, touching=touching
+    )
 
 
 def _with_carrier(
@@ -189,39 +197,45 @@ def _with_carrier(
     """A body with its carrier: found once its way is long enough, dropped once they no longer touch."""
     if body.carrier is not None:
         return body if body.carrier in touching else replace(body, carrier=None)
-    set_out = body.set_out
-    if set_out is None:
+    moving_since = body.moving_since
+    if moving_since is None:
         return body
-    ever = {i: course for i, course in body.touching.items() if i in touching}
-    if len(ever) < len(body.touching):
-        body = replace(body, touching=MappingProxyType(ever))
-    far = hypot(*body.way)
-    if not ever or not _has_come_far(set_out, far, number, mind, settings):
+    touching_all_along = {i: course for i, course in body.touching.items() if i in touching}
+    if len(touching_all_along) < len(body.touching):
+        body = replace(body, touching=MappingProxyType(touching_all_along))
+    distance = hypot(*body.displacement_since)
+    if not touching_all_along or not _has_come_far(moving_since, distance, number, mind, settings):
         return body
     movers = [
         i
         for i in touching
-        if i in motions and _goes_along(motions[i], ever.get(i), body.way, settings)
+        if i in motions
+        and _may_carry(motions[i], touching_all_along.get(i), body.displacement_since, settings)
     ]
-    if len(movers) != 1 or movers[0] not in ever:
+    if len(movers) != 1 or movers[0] not in touching_all_along:
         return body
-    gone = motions[movers[0]].path - ever.pop(movers[0])[0]
-    if gone > settings.past_share * far:
-        return replace(body, touching=MappingProxyType(ever))
+    carrier_path = motions[movers[0]].path - touching_all_along.pop(movers[0])[0]
+    if carrier_path > settings.most_carrier_share * distance:
+        return replace(body, touching=MappingProxyType(touching_all_along))
     return replace(body, carrier=movers[0])
 
 
 def _has_come_far(
-    set_out: float, far: float, number: int, mind: Mind, settings: CarrierSettings
+    moving_since: float, distance: float, number: int, mind: Mind, settings: CarrierSettings
 ) -> bool:
-    """Whether the way of a body is long enough in time, in distance (`far`, pixels) and in mean speed."""
-    lasted, size = mind.time - set_out, mind.objects[number].region.area ** 0.5
-    least = settings.speed * image_diagonal(mind.frame_size) * lasted
-    return lasted >= settings.moving_s - 1e-6 and far >= max(settings.path_share * size, least)
+    """Whether the way of a body is long enough in time, in `distance` (pixels) and in mean speed."""
+    duration, size = mind.time - moving_since, mind.objects[number].region.area ** 0.5
+    least = settings.speed * image_diagonal(mind.frame_size) * duration
+    return duration >= settings.moving_s - 1e-6 and distance >= max(
+        settings.path_share * size, least
+    )
 
 
-def _goes_along(
-    other: BodyMotion, course: Course | None, way: tuple[float, float], settings: CarrierSettings
+def _may_carry(
+    other: BodyMotion,
+    course: MotionAtStart | None,
+    displacement: tuple[float, float],
+    settings: CarrierSettings,
 ) -> bool:
     """Whether a body may have carried another one along its way: it moves, far enough, and not oppositely.
 
@@ -230,12 +244,14 @@ def _goes_along(
     Args:
         other: The possible carrier.
         course: Its accumulated motion when the other body set out; None if it touched that only later.
-        way: (x, y) way of the other body, pixels.
+        displacement: (x, y) way of the other body, pixels.
         settings: Settings.
     """
     if other.rested_since is not None or course is None:
         return other.rested_since is None
     path, (x, y) = course
-    least = settings.along_share * hypot(*way)
-    along = (other.place[0] - x) * way[0] + (other.place[1] - y) * way[1]
-    return other.path - path >= least and along > -least * hypot(*way)
+    least = settings.least_carrier_share * hypot(*displacement)
+    projection = (other.displacement[0] - x) * displacement[0] + (
+        other.displacement[1] - y
+    ) * displacement[1]
+    return other.path - path >= least and projection > -least * hypot(*displacement)

@@ -66,7 +66,7 @@ class CouplingEvidence:
     contact: OutlineContact | None = None
     decoupled_at: float | None = None
 
-    def parted_since(self, moment: float) -> bool:
+    def was_decoupled_since(self, moment: float) -> bool:
         """Whether they were decoupled after a given time, seconds."""
         return self.decoupled_at is not None and self.decoupled_at > moment
 
@@ -105,15 +105,18 @@ def common_speed(mind: Mind, pair: Pair) -> float:
     return min((s for s in speeds if s is not None), default=0.0)
 
 
-def goes_along(mind: Mind, pair: Pair) -> bool:
+def move_alike(mind: Mind, pair: Pair) -> bool:
     """Whether two fast bodies move alike, so that a gap between them does not mean that they have separated.
 
     The visible outline of an arm that leaves the image shrinks towards the border, and so seems to recede
     from the object in its hand. An object that is dropped, or left behind, soon moves differently.
     """
-    common, relative = common_speed(mind, pair), kinematics(mind).pair("relative_speed", *pair)
-    fast = common > ALONG_SPEED * image_diagonal(mind.frame_size)
-    return bool(fast and relative < ALONG_SHARE * common)
+    shared_speed, relative_speed = (
+        common_speed(mind, pair),
+        kinematics(mind).pair("relative_speed", *pair),
+    )
+    fast = shared_speed > ALONG_SPEED * image_diagonal(mind.frame_size)
+    return bool(fast and relative_speed < ALONG_SHARE * shared_speed)
 
 
 def own_speed(mind: Mind, number: int) -> float | None:
@@ -126,10 +129,10 @@ def own_speed(mind: Mind, number: int) -> float | None:
     and must rest relative to another one for longer before the two count as coupled.
     """
     body = mind.objects[number]
-    told = [kinematics(mind).one("speed", number)]
+    speeds = [kinematics(mind).one("speed", number)]
     if body.last_seen == mind.time and body.region.velocity_sigma > 0.0:
-        told.append(float(np.hypot(*body.region.velocity)))
-    return min((s for s in told if s == s), default=None)  # NaN is not equal to itself
+        speeds.append(float(np.hypot(*body.region.velocity)))
+    return min((s for s in speeds if s == s), default=None)  # NaN is not equal to itself
 
 
 def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
@@ -137,13 +140,13 @@ def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
     ids, now = table.ids, kinematics(mind)
     hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
     gaps = now.gap.tolist() if now.ids == ids else None
-    told = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
+    codes = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
     observed = []
     for i, a in enumerate(ids):
         for j in range(i + 1, len(ids)):
             b = ids[j]
             gap = gaps[i][j] if gaps else now.pair("gap", a, b)
-            touching, closing, parting = next(told)
+            touching, closing, parting = next(codes)
             host = hosts.get((a, b))
             observed.append(PairObservation((a, b), touching, closing, parting, gap, host))
     return observed
@@ -182,12 +185,14 @@ def coupling_cells(
     for k, seen in enumerate(observed):
         contact = evidence[seen.pair].contact
         if contact is not None:
-            settled = contact.settled_since
-            unsettled = 0 if contact.in_front else UNKNOWN_CODE
-            state[1, k] = unsettled if settled is None else 1
-            since[1, k] = contact.met_at if settled is None else min(settled, contact.changed_at)
-            far = settings.doubt_share * smaller_size(seen.pair, mind)
-            state[2, k] = _in_front(contact, far)
+            confirmed = contact.confirmed_since
+            unconfirmed = 0 if contact.in_front else UNKNOWN_CODE
+            state[1, k] = unconfirmed if confirmed is None else 1
+            since[1, k] = (
+                contact.met_at if confirmed is None else min(confirmed, contact.changed_at)
+            )
+            least_path = settings.doubt_share * smaller_size(seen.pair, mind)
+            state[2, k] = _in_front(contact, least_path)
             since[2, k] = contact.changed_at
         if seen.pair in coupled:
             doubted = evidence[seen.pair].apart_since is not None
@@ -195,8 +200,8 @@ def coupling_cells(
             since[0, k] = coupled[seen.pair].since
         elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
             state[:, k] = UNKNOWN_CODE
-        elif (parted := evidence[seen.pair].decoupled_at) is not None:
-            since[0, k] = parted
+        elif (decoupled := evidence[seen.pair].decoupled_at) is not None:
+            since[0, k] = decoupled
     return RelationBlock(COLUMNS, state, since, np.full((1, len(observed)), CONFIDENCE))
 
 
@@ -232,8 +237,8 @@ def feet_of(seen: PairObservation, mind: Mind) -> Feet | None:
     None also if either is not seen, or if they share a region.
     """
     others = (c.objects for c in mind.couplings if c.objects != seen.pair)
-    held = {i for objects in others if not mind.one_machine(*objects) for i in objects}
-    carried = held.intersection(seen.pair)
+    coupled = {i for objects in others if not mind.one_machine(*objects) for i in objects}
+    carried = coupled.intersection(seen.pair)
     regions = pair_regions(seen, mind)
     if len(carried) != 1 or regions is None or seen.host is not None:
         return None

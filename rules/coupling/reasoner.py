@@ -33,8 +33,8 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.rules.coupling.carriers import CARRIERS, CarrierSettings, updated_carriers
-from visup.rules.coupling.contact import ContactSettings, OutlineContact, updated_contact
+from visup.rules.coupling.carriers import CARRIERS, CarrierSettings, update_carriers
+from visup.rules.coupling.contact import ContactSettings, OutlineContact, update_contact
 from visup.rules.coupling.evidence import (
     CONFIDENCE,
     COUPLING,
@@ -47,7 +47,7 @@ from visup.rules.coupling.evidence import (
     common_speed,
     coupling_cells,
     feet_of,
-    goes_along,
+    move_alike,
     observed_pairs,
     pair_regions,
     regions_apart,
@@ -86,7 +86,7 @@ class CouplingSettings:
         window_s: Window over which relative velocity is measured, seconds; longer after a gap. Velocities
             within one window are correlated, and together count as one measurement.
         path_s: Length of the stored relative path, seconds.
-        moving: Typical relative speed of a pair that is not at rest, image diagonals per second.
+        moving_speed: Typical relative speed of a pair that is not at rest, image diagonals per second.
         still_share: Relative speed that still counts as rest, as a share of the speed at which both move: an
             object that is carried sways and rotates, and errors of velocities grow with speed.
         moving_share: Typical relative speed of bodies that move independently, as a share of the same speed.
@@ -94,10 +94,10 @@ class CouplingSettings:
             moment, too.
         odds: Log odds of rest at which it is believed.
         carried_share: Share of `odds` that suffices while both move.
-        anew_s: Age at which the stored outlines are replaced, seconds.
+        outline_age_s: Age at which the stored outlines are replaced, seconds.
         approach_s: Longest time since the bodies approached each other for their rest to count, seconds.
-        part_s: How long a pair must be apart to be decoupled, seconds; `part_path` suffices as well.
-        part_path: How far a pair must have moved apart to be decoupled, image diagonals.
+        apart_s: How long a pair must be apart to be decoupled, seconds; `apart_path_limit` suffices as well.
+        apart_path_limit: How far a pair must have moved apart to be decoupled, image diagonals.
         contact: When outlines that meet are in contact.
         carriers: When a body that starts to move counts as carried.
     """
@@ -106,16 +106,16 @@ class CouplingSettings:
     near: float = 0.012
     window_s: float = 0.3
     path_s: float = 1.2
-    moving: float = 0.0125
+    moving_speed: float = 0.0125
     still_share: float = 0.2
     moving_share: float = 1.0
     rest_s: float = 0.8
     odds: float = 5.0
     carried_share: float = 0.7
-    anew_s: float = 2.5
+    outline_age_s: float = 2.5
     approach_s: float = 6.0
-    part_s: float = 0.35
-    part_path: float = 0.012
+    apart_s: float = 0.35
+    apart_path_limit: float = 0.012
     contact: ContactSettings = field(default_factory=ContactSettings)
     carriers: CarrierSettings = field(default_factory=CarrierSettings)
 
@@ -134,74 +134,73 @@ class CouplingReasoner(ExplainableReasoner):
     ) -> Iterator[tuple[Subject, tuple[Condition, ...]]]:
         coupled = {c.objects for c in mind.couplings}
         for pair in combinations(sorted(mind.objects), 2):
-            there = Condition("both are believed to be present", _both_present(pair, mind))
-            yield ("coupled", pair), (there, _coupling_is(pair in coupled, False))
-            yield ("decoupled", pair), (there, _coupling_is(pair in coupled, True))
+            present = Condition("both are believed to be present", _both_present(pair, mind))
+            yield ("coupled", pair), (present, _coupling_is(pair in coupled, False))
+            yield ("decoupled", pair), (present, _coupling_is(pair in coupled, True))
 
     def _reason(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
         old = mind.recall(COUPLING)
         coupled = {c.objects: c for c in mind.couplings}
         table = relation_table(mind)
         observed = observed_pairs(table, mind)
-        carriers = updated_carriers(
-            mind.recall(CARRIERS), touching_bodies(observed), mind, self.settings.carriers
-        )
-        carried = carriers.carried()
-        kept: dict[Pair, CouplingEvidence] = {}
+        touching, s = touching_bodies(observed), self.settings
+        carriers = update_carriers(mind.recall(CARRIERS), touching, mind, s.carriers)
+        carried = carriers.carried_since()
+        new_evidence: dict[Pair, CouplingEvidence] = {}
         events: list[Event] = []
         for seen in observed:
             pair = seen.pair
-            evidence = self._look(old.get(pair, NO_EVIDENCE), seen, mind)
-            set_out = carried.get(pair)
-            if set_out is not None and evidence.parted_since(set_out):
-                set_out = None
+            evidence = self._update_evidence(old.get(pair, NO_EVIDENCE), seen, mind)
+            start = carried.get(pair)
+            if start is not None and evidence.was_decoupled_since(start):
+                start = None
             if pair in coupled:
-                if decide(self._decoupling(evidence, mind), log, "decoupled", pair):
+                if decide(self._may_decouple(evidence, mind), log, "decoupled", pair):
                     del coupled[pair]
                     text = "{0} and {1} {are} no longer coupled."
                     events.append(_event("decoupled", text, pair, mind, observation))
                     evidence = replace(NO_EVIDENCE, decoupled_at=mind.time)
-            elif log is None and evidence.relative_track is None and set_out is None:
+            elif log is None and evidence.relative_track is None and start is None:
                 pass  # fast path: far apart, as most pairs are, so that the first condition fails
-            elif decide(self._coupling(evidence, seen, mind, set_out), log, "coupled", pair):
-                since = evidence.rest_since if set_out is None else set_out
+            elif decide(self._may_couple(evidence, seen, mind, start), log, "coupled", pair):
+                since = evidence.rest_since if start is None else start
                 since = mind.time if since is None else since
                 coupled[pair] = Coupling(pair, since)
                 text = "{0} and {1} {are} coupled."
                 events.append(_event("coupled", text, pair, mind, observation))
                 evidence = replace(evidence, apart_since=None, decoupled_at=None)
-            kept[pair] = evidence
-        alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        cells = coupling_cells(observed, coupled, kept, mind, self.settings.contact)
-        memory, table = MappingProxyType(kept), table.with_block(cells)
-        mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
+            new_evidence[pair] = evidence
+        remaining = tuple(c for pair, c in sorted(coupled.items()) if pair in new_evidence)
+        cells = coupling_cells(observed, coupled, new_evidence, mind, s.contact)
+        memory, table = MappingProxyType(new_evidence), table.with_block(cells)
+        mind = mind.remember(COUPLING, memory, couplings=remaining, relations=table)
         mind = mind.remember(CARRIERS, carriers)
         # Parts of one machine are always connected, which is not worth an event.
         return Outcome(mind, tuple(e for e in events if not mind.one_machine(*e.objects)))
 
-    def _look(
+    def _update_evidence(
         self, before: CouplingEvidence, seen: PairObservation, mind: Mind
     ) -> CouplingEvidence:
         """The evidence on a pair updated with one observation; `before` itself if nothing changes."""
         converging = seen.converging == YES and seen.touching != YES
-        track = self._follow(before.relative_track, seen, mind)
+        track = self._update_track(before.relative_track, seen, mind)
         odds, contact, found = before.rest_odds, before.contact, None
         if track is not None and track is not before.relative_track:
             found = relative_velocity(track, mind.time, self.settings.window_s)
         if track is None or seen.touching != YES:
             odds = 0.0
         elif found is not None:
-            odds = self._rest(odds, before.relative_track, found, seen, mind)
+            odds = self._rest_odds(odds, before.relative_track, found, seen, mind)
         if seen.touching == YES:
-            contact = self._contact(before, found, seen, mind)
+            contact = self._update_contact(before, found, seen, mind)
         elif seen.touching == NO:
             contact = None
-        far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
-        apart = (seen.touching == NO and far) or self._leaves(contact, found, seen, mind)
-        apart = apart and not goes_along(mind, seen.pair)
-        same = track is before.relative_track and odds == before.rest_odds and not converging
-        same = same and contact is before.contact
-        if same and apart == (before.apart_since is not None):
+        far_apart = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
+        apart = (seen.touching == NO and far_apart) or self._departs(contact, found, seen, mind)
+        apart = apart and not move_alike(mind, seen.pair)
+        unchanged = track is before.relative_track and odds == before.rest_odds and not converging
+        unchanged = unchanged and contact is before.contact
+        if unchanged and apart == (before.apart_since is not None):
             return before  # fast path, as most pairs are far apart
         converged = mind.time if converging else before.converged_at
         return CouplingEvidence(
@@ -209,24 +208,24 @@ class CouplingReasoner(ExplainableReasoner):
             odds,
             _since(before.rest_since, odds > 0.0, mind.time),
             _since(before.apart_since, apart, mind.time),
-            self._parted(before, seen.pair, mind) if apart else 0.0,
+            self._path_apart(before, seen.pair, mind) if apart else 0.0,
             track,
             contact,
             before.decoupled_at,
         )
 
-    def _parted(self, before: CouplingEvidence, pair: Pair, mind: Mind) -> float:
+    def _path_apart(self, before: CouplingEvidence, pair: Pair, mind: Mind) -> float:
         """The relative path length of a pair since it came apart, pixels.
 
         It is no longer updated once the pair is too far apart to be tracked: so wide a gap may be a jump of
         an outline. Then only the time apart counts (`part_s`).
         """
         times = sample_window(mind).times
-        lasted = float(times[-1] - times[-2]) if len(times) > 1 else 0.0
+        dt = float(times[-1] - times[-2]) if len(times) > 1 else 0.0
         speed = float(np.nan_to_num(kinematics(mind).pair("relative_speed", *pair)))
-        return before.apart_path + speed * lasted
+        return before.apart_path + speed * dt
 
-    def _follow(
+    def _update_track(
         self, before: RelativeTrack | None, seen: PairObservation, mind: Mind
     ) -> RelativeTrack | None:
         """The updated relative track of a pair; None if it is not near, or has not been seen for long.
@@ -243,23 +242,22 @@ class CouplingReasoner(ExplainableReasoner):
             return None
         regions = pair_regions(seen, mind)
         if regions is None:
-            old = before is None or mind.time - before.path_end > s.path_s / 2
-            return None if old else before
+            outdated = before is None or mind.time - before.path_end > s.path_s / 2
+            return None if outdated else before
         if not merged and not seen.gap <= s.near * image_diagonal(mind.frame_size):
             return None
         if before is None and merged:
             # Never seen side by side: the track starts from the last region of the hidden body and from the
             # merged region.
             return begin_relative_track(regions_apart(seen.pair, mind), mind.time, mind.frame_size)
-        return update_relative_track(
-            before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
-        )
+        ages = {"lasts_s": s.path_s, "outline_age_s": s.outline_age_s}
+        return update_relative_track(before, regions, mind.time, mind.frame_size, **ages)
 
-    def _rest(
+    def _rest_odds(
         self,
         odds: float,
         before: RelativeTrack | None,
-        found: RelativeVelocity,
+        relative: RelativeVelocity,
         seen: PairObservation,
         mind: Mind,
     ) -> float:
@@ -268,20 +266,21 @@ class CouplingReasoner(ExplainableReasoner):
         Args:
             odds: Log odds before.
             before: The relative track before this observation, if any.
-            found: The relative velocity measured now.
+            relative: The relative velocity measured now.
             seen: The observation of the pair.
             mind: The mind.
         """
-        s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
+        s, elapsed = self.settings, mind.time - (before.path_end if before else mind.time)
         diagonal = image_diagonal(mind.frame_size)
-        both = common_speed(mind, seen.pair)
-        still = max(s.relations.still_speed * diagonal, s.still_share * both)
-        told = found.rest_odds(still, max(s.moving * diagonal, s.moving_share * both))
-        told *= min(1.0, waited / found.span)
+        shared_speed = common_speed(mind, seen.pair)
+        still = max(s.relations.still_speed * diagonal, s.still_share * shared_speed)
+        moving = max(s.moving_speed * diagonal, s.moving_share * shared_speed)
+        log_odds = relative.rest_odds(still, moving)
+        log_odds *= min(1.0, elapsed / relative.span)
         # Capped, since higher odds would only delay a change to the opposite belief.
-        return min(max(0.0, odds + told), 2 * s.odds)
+        return min(max(0.0, odds + log_odds), 2 * s.odds)
 
-    def _contact(
+    def _update_contact(
         self,
         before: CouplingEvidence,
         found: RelativeVelocity | None,
@@ -296,14 +295,14 @@ class CouplingReasoner(ExplainableReasoner):
         dt = mind.time - track.path_end if track is not None else 0.0
         moment, crossed = (mind.time, dt), before.contact.path if before.contact else 0.0
         least = s.doubt_share * smaller_size(seen.pair, mind)
-        back = seen.diverging == YES and crossed < least
+        thrown_back = seen.diverging == YES and crossed < least
         sigma = math.inf if found is None else found.speed_sigma
         feet = feet_of(seen, mind)
-        return updated_contact(
-            before.contact, speed, limit, moment, s, sigma=sigma, thrown_back=back, feet=feet
+        return update_contact(
+            before.contact, speed, limit, moment, s, sigma=sigma, thrown_back=thrown_back, feet=feet
         )
 
-    def _leaves(
+    def _departs(
         self,
         contact: OutlineContact | None,
         found: RelativeVelocity | None,
@@ -322,12 +321,12 @@ class CouplingReasoner(ExplainableReasoner):
         least = max(s.relations.still_speed * diagonal, s.still_share * speed)
         return any(now.one("speed", i) < least for i in seen.pair)
 
-    def _coupling(
+    def _may_couple(
         self,
         evidence: CouplingEvidence,
         seen: PairObservation,
         mind: Mind,
-        set_out: float | None,
+        carried_since: float | None,
     ) -> Iterator[Condition]:
         """Conditions of a pair becoming coupled.
 
@@ -335,16 +334,17 @@ class CouplingReasoner(ExplainableReasoner):
             evidence: Evidence on the pair.
             seen: The observation of the pair.
             mind: The mind.
-            set_out: Time when one of them started to move, carried by the other, seconds; None if not so.
+            carried_since: Time when one of them started to move, carried by the other, seconds; None if not
+                so.
         """
-        if set_out is not None:
+        if carried_since is not None:
             yield Condition("one rested and set out while the other alone moved it", True)
             return
         s, track = self.settings, evidence.relative_track
-        watched = track is not None and track.path_end == mind.time
-        yield Condition("both are seen near each other", watched)
-        front = evidence.contact is not None and evidence.contact.in_front
-        yield Condition("neither has come down in front of the other", not front)
+        tracked = track is not None and track.path_end == mind.time
+        yield Condition("both are seen near each other", tracked)
+        in_front = evidence.contact is not None and evidence.contact.in_front
+        yield Condition("neither has come down in front of the other", not in_front)
         text = "log odds that they touch and are at rest"
         together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
@@ -367,15 +367,15 @@ class CouplingReasoner(ExplainableReasoner):
             ago = mind.time - at
             yield Condition(text, ago <= s.approach_s, ago, s.approach_s, " s", below=True)
 
-    def _decoupling(self, evidence: CouplingEvidence, mind: Mind) -> Iterator[Condition]:
+    def _may_decouple(self, evidence: CouplingEvidence, mind: Mind) -> Iterator[Condition]:
         """Conditions of a pair being no longer coupled."""
         yield Condition("they are apart", evidence.apart_since is not None)
         if evidence.apart_since is not None:
-            least = self.settings.part_path * image_diagonal(mind.frame_size)
+            least = self.settings.apart_path_limit * image_diagonal(mind.frame_size)
             if evidence.apart_path >= least:
                 return
             lasted = mind.time - evidence.apart_since
-            yield at_least("apart for", lasted, self.settings.part_s, " s", slack=1e-6)
+            yield at_least("apart for", lasted, self.settings.apart_s, " s", slack=1e-6)
 
 
 def _both_present(pair: Pair, mind: Mind) -> bool:

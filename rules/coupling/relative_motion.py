@@ -126,14 +126,14 @@ def outline_template(
         return None
     if beside is not None and region.area > beside.area:
         reach = max(NEAR_REACH * float(np.hypot(*beside.bbox[2:])), 0.05 * float(np.hypot(*size)))
-        close = free & (_from_box(points, beside.bbox) <= reach)
+        close = free & (_distance_to_box(points, beside.bbox) <= reach)
         # If too little remains, or hardly anything is excluded, the whole body is tracked.
         if 2 * LEAST_POINTS <= close.sum() < 0.8 * free.sum():
             return OutlineTemplate(points[close], normals[close], local=True)
     return OutlineTemplate(points[free], normals[free])
 
 
-def _from_box(points: Floats, box: tuple[int, int, int, int]) -> Floats:
+def _distance_to_box(points: Floats, box: tuple[int, int, int, int]) -> Floats:
     """(N,) distances of points from a box, pixels; 0 inside."""
     low, high = np.array(box[:2]), np.array(box[:2]) + np.array(box[2:])
     away = np.maximum(np.maximum(low - points, points - high), 0.0)
@@ -164,8 +164,8 @@ def target_of(region: Region) -> TargetOutline:
     return TargetOutline(made.even, made.even_boxes)
 
 
-def registered(
-    kept: OutlineTemplate, target: TargetOutline, ahead: Iterable[Vector] = ()
+def register_outline(
+    template: OutlineTemplate, target: TargetOutline, ahead: Iterable[Vector] = ()
 ) -> OutlineTemplate | None:
     """Register a stored outline to a later one.
 
@@ -174,7 +174,7 @@ def registered(
     the target is used.
 
     Args:
-        kept: The outline, with its shift so far.
+        template: The outline, with its shift so far.
         target: The later outline.
         ahead: (x, y) predicted shifts from there to start from as well, pixels; those of a pixel or so are
             skipped.
@@ -183,15 +183,15 @@ def registered(
         The outline with the new shift; None if too few points match, or if all normals have nearly the same
         direction, so that the shift along the outline is undetermined.
     """
-    x, y = kept.shift
-    starts = [kept.shift, *((x + dx, y + dy) for dx, dy in ahead if hypot(dx, dy) > _OUTLIER)]
-    found = [k for start in starts if (k := _registered_from(start, kept, target)) is not None]
+    x, y = template.shift
+    starts = [template.shift, *((x + dx, y + dy) for dx, dy in ahead if hypot(dx, dy) > _OUTLIER)]
+    found = [k for start in starts if (k := _register_from(start, template, target)) is not None]
     if len(found) < 2:
         return found[0] if found else None
-    return max(found, key=lambda k: _on_outline(k, target))
+    return max(found, key=lambda k: _points_on_outline(k, target))
 
 
-def _registered_from(
+def _register_from(
     start: Vector, kept: OutlineTemplate, target: TargetOutline
 ) -> OutlineTemplate | None:
     limits = ICP_REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _OUTLIER
@@ -199,7 +199,7 @@ def _registered_from(
     return replace(kept, shift=(x, y)) if found else None
 
 
-def _on_outline(kept: OutlineTemplate, target: TargetOutline) -> int:
+def _points_on_outline(kept: OutlineTemplate, target: TargetOutline) -> int:
     """Number of points that lie on the other outline."""
     near = near_outline(kept.points + np.array(kept.shift), target.points, target.boxes, _OUTLIER)
     return int(np.count_nonzero(near))
@@ -212,7 +212,7 @@ def update_relative_track(
     size: tuple[int, int],
     *,
     lasts_s: float,
-    anew_s: float,
+    outline_age_s: float,
 ) -> RelativeTrack | None:
     """Update the relative track of two bodies with an observation of both.
 
@@ -222,7 +222,7 @@ def update_relative_track(
         now: Time of the observation, seconds.
         size: (width, height) of the image, pixels.
         lasts_s: Length of the path, seconds.
-        anew_s: Age at which outlines are replaced, since bodies rotate, seconds.
+        outline_age_s: Age at which outlines are replaced, since bodies rotate, seconds.
 
     Returns:
         The track with one more position; None when the two cannot be tracked.
@@ -231,36 +231,36 @@ def update_relative_track(
     if track is None:
         return begin_relative_track(regions, now, size) if apart else None
     dt = now - track.path_end
-    first = _followed(track.first, regions[0], dt)
-    second = _followed(track.second, regions[1], dt)
+    first = _track_outline(track.first, regions[0], dt)
+    second = _track_outline(track.second, regions[1], dt)
     if first is None or second is None:
         return (
-            _begun_again(track, regions, now, size, lasts_s) if apart else replace(track, path=())
+            _restart_track(track, regions, now, size, lasts_s) if apart else replace(track, path=())
         )
     x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
     local = first.local or second.local
     place = (now, x, y, *(UNKNOWN_MOTION if local else _image_motion(regions)))
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
-    if apart and now - track.since > anew_s:
+    if apart and now - track.since > outline_age_s:
         fresh = begin_relative_track(regions, now, size)
         if fresh is not None:
             return replace(fresh, before=(x, y), path=path)
     return replace(track, first=first, second=second, path=path)
 
 
-def _followed(kept: OutlineTemplate, region: Region, dt: float) -> OutlineTemplate | None:
+def _track_outline(kept: OutlineTemplate, region: Region, dt: float) -> OutlineTemplate | None:
     """A stored outline registered to the body's region `dt` seconds later; None if that fails."""
     known = region.velocity_sigma > 0.0
     velocities = (kept.velocity, region.velocity) if known else (kept.velocity,)
     ahead = [(vx * dt, vy * dt) for vx, vy in velocities]
-    found = registered(kept, target_of(region), ahead)
+    found = register_outline(kept, target_of(region), ahead)
     if found is None or dt <= 0.0:
         return found
     (x, y), (x0, y0) = found.shift, kept.shift
     return replace(found, velocity=((x - x0) / dt, (y - y0) / dt))
 
 
-def _begun_again(
+def _restart_track(
     track: RelativeTrack,
     regions: tuple[Region, Region],
     now: float,

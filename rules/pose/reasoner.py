@@ -44,7 +44,7 @@ from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 
 USUAL_FOCAL = 1.2
-"""Focal length of a usual lens, in widths of the picture; the rotation inferred from an object's motion
+"""Focal length of a usual lens, in widths of the image; the rotation inferred from an object's motion
 across the image is wrong in proportion to the error."""
 
 LookSignature = tuple[tuple[str, int, float, float | None], ...]
@@ -62,7 +62,7 @@ class PoseSettings:
     Attributes:
         tree: Costs and bounds of the interpretation trees.
         spin: Spin settings for stored views.
-        fitted_spin: Spin settings for orientations fitted to the picture, which are accurate to two
+        fitted_spin: Spin settings for orientations fitted to the image, which are accurate to two
             degrees and follow the object without steps.
         every_s: Least time between two observations used of one object.
         most_looks: Most objects whose trees grow in one step; those waiting longest come first. This
@@ -74,12 +74,12 @@ class PoseSettings:
         memory_s: Costs of models decay to 37 % in this time.
         free_cost: Extra cost of a model, above the cheapest, without loss of support.
         support_cost: Further extra cost that lowers its support to 37 %.
-        settle_s: Least time between stored orientations for the spin.
+        stored_every_s: Least time between stored orientations for the spin.
         lead: How much a lead of the chosen hypotheses over clearly different ones, in units of their
             cost, adds to the log odds that the pose is right. Errors of similarity last as long as
             the view, so leads do not add up.
-        loosest: Standard deviation of an unknown spin for the tree, radians per second.
-        surest: Least standard deviation of a known spin for the tree, radians per second.
+        unknown_spin_sigma: Standard deviation of an unknown spin for the tree, radians per second.
+        least_spin_sigma: Least standard deviation of a known spin for the tree, radians per second.
         stale_s: Without an observation for this long, confidence falls to 37 %.
         spin_stale_s: Without an observation for this long, the spin is unknown.
     """
@@ -95,10 +95,10 @@ class PoseSettings:
     memory_s: float = 3.0
     free_cost: float = 6.0
     support_cost: float = 6.0
-    settle_s: float = 0.2
+    stored_every_s: float = 0.2
     lead: float = 3.0
-    loosest: float = 0.35
-    surest: float = 0.09
+    unknown_spin_sigma: float = 0.35
+    least_spin_sigma: float = 0.09
     stale_s: float = 10.0
     spin_stale_s: float = 8.0
 
@@ -109,36 +109,36 @@ class PoseTrack:
 
     Attributes:
         time: Seconds of the last observation, or minus infinity.
-        said: Its hypotheses; the same again means no new observation.
+        signature: Its hypotheses; the same again means no new observation.
         trees: Model name -> its tree.
         levels: Model name -> its level, for each of the last observations.
         sights: For each of them, (3, 3): from a camera looking at the object to the actual camera.
-        strain: Model name -> decayed cost of its cheapest path.
-        untold: The same for a model that was never hypothesised.
+        path_costs: Model name -> decayed cost of its cheapest path.
+        other_cost: The same for a model that was never hypothesised.
         support: Model name -> compatibility of its strain with being the object, 0 to 1.
-        unsaid: The same for a model that was never hypothesised.
-        name: The model whose orientations are in `settled`.
+        other_support: The same for a model that was never hypothesised.
+        name: The model whose orientations are in `orientations`.
         lead: Cost lead of its chosen hypotheses over clearly different ones, averaged over time.
-        settled: (seconds, orientation) along its cheapest path, older than the trees' levels.
+        orientations: (seconds, orientation) along its cheapest path, older than the trees' levels.
         rate: Its angular velocity, or None when unknown.
-        rated: Seconds when the rate was measured.
+        rate_measured_at: Seconds when the rate was measured.
         pose: The belief since the last observation, or None.
     """
 
     time: float = -np.inf
-    said: LookSignature = ()
+    signature: LookSignature = ()
     trees: Mapping[str, InterpretationTree] = field(default_factory=lambda: MappingProxyType({}))
     levels: tuple[Mapping[str, TreeLevel], ...] = ()
     sights: tuple[Floats, ...] = ()
-    strain: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    untold: float = 0.0
+    path_costs: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    other_cost: float = 0.0
     support: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    unsaid: float = 1.0
+    other_support: float = 1.0
     name: str = ""
     lead: float = 0.0
-    settled: tuple[tuple[float, Floats], ...] = ()
+    orientations: tuple[tuple[float, Floats], ...] = ()
     rate: AngularVelocity | None = None
-    rated: float = -np.inf
+    rate_measured_at: float = -np.inf
     pose: Pose | None = None
 
 
@@ -148,12 +148,12 @@ class Look:
 
     Attributes:
         time: Seconds.
-        said: Hypotheses of views.
+        hypotheses: Hypotheses of views.
         sight: (3, 3) from a camera looking at the object to the actual camera.
     """
 
     time: float
-    said: Sequence[Hypothesis]
+    hypotheses: Sequence[Hypothesis]
     sight: Floats
 
 
@@ -181,7 +181,7 @@ def pose_support(mind: Mind, object_id: int, name: str) -> float:
         nothing is known of the object's views.
     """
     track = pose_tracks(mind).get(object_id)
-    return 1.0 if track is None else track.support.get(name, track.unsaid)
+    return 1.0 if track is None else track.support.get(name, track.other_support)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,17 +192,17 @@ class PoseReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Update from one step's view hypotheses; see `Reasoner`."""
-        said = hypotheses_by_object(mind, observation)
+        hypotheses = hypotheses_by_object(mind, observation)
         known, tracks, beliefs = pose_tracks(mind), {}, []
-        due = self._due(mind, said, known)
+        due = self._due(mind, hypotheses, known)
         for object_id, belief in mind.objects.items():
             track = known.get(object_id, NO_TRACK)
             if object_id in due:
-                look = Look(mind.time, said[object_id], _sight(mind, belief))
-                track = self._observed(track, look, belief.name)
+                look = Look(mind.time, hypotheses[object_id], _sight(mind, belief))
+                track = self._with_look(track, look, belief.name)
             if track.trees:
                 tracks[object_id] = track
-            pose = self._now(track, belief.name, mind.time)
+            pose = self._current_pose(track, belief.name, mind.time)
             if pose != belief.pose:
                 beliefs.append(replace(belief, pose=pose))
         mind = mind.with_objects(*beliefs) if beliefs else mind
@@ -211,15 +211,15 @@ class PoseReasoner:
     def _due(
         self,
         mind: Mind,
-        said: Mapping[int, tuple[Hypothesis, ...]],
-        known: Mapping[int, PoseTrack],
+        matches: Mapping[int, tuple[Hypothesis, ...]],
+        tracks: Mapping[int, PoseTrack],
     ) -> frozenset[int]:
         """Objects whose trees grow now: newly matched, not too soon, and within the budget."""
         s = self.settings
         waiting = [
             (track.time, object_id)
-            for object_id, hypotheses in said.items()
-            if (track := known.get(object_id, NO_TRACK)).said != _look_signature(hypotheses)
+            for object_id, hypotheses in matches.items()
+            if (track := tracks.get(object_id, NO_TRACK)).signature != _look_signature(hypotheses)
             and mind.time - track.time >= s.every_s - 1e-9
             and (belief := mind.objects.get(object_id)) is not None
             and self._in_sight(mind, belief)
@@ -230,79 +230,78 @@ class PoseReasoner:
         seen = belief.presence is Presence.SEEN
         return seen and visible_share(mind, belief.id) >= self.settings.least_visible
 
-    def _observed(self, track: PoseTrack, look: Look, name: str) -> PoseTrack:
+    def _with_look(self, track: PoseTrack, look: Look, name: str) -> PoseTrack:
         """The track after an observation."""
-        track = self._settled(track, name)
+        track = self._store_orientation(track, name)
         waited = look.time - track.time
-        grown = self._grown(replace(track, said=_look_signature(look.said)), look)
-        track = self._rated(grown, name, look.time)
-        track = self._led(track, name, waited)
+        grown = self._extend_trees(replace(track, signature=_look_signature(look.hypotheses)), look)
+        track = self._measure_rate(grown, name, look.time)
+        track = self._update_lead(track, name, waited)
         return replace(track, pose=self._pose(track, name))
 
-    def _grown(self, track: PoseTrack, look: Look) -> PoseTrack:
+    def _extend_trees(self, track: PoseTrack, look: Look) -> PoseTrack:
         """Extend the trees by one level, and update the costs of their models."""
         s, now = self.settings, look.time
-        levels = levels_of(look.said, now, s.tree)
-        turning = _spin_prior(track.rate, s)
+        levels = levels_of(look.hypotheses, now, s.tree)
+        spin_prior = _spin_prior(track.rate, s)
         fade = exp(-min(now - track.time, 1e6) / s.memory_s)
-        untold = track.untold * fade + look_weight(now - track.time, s.tree) * s.tree.wrong
-        trees, strain = {}, {}
+        other_cost = track.other_cost * fade + look_weight(now - track.time, s.tree) * s.tree.wrong
+        trees, costs = {}, {}
         for name in track.trees.keys() | levels.keys():
             before = track.trees.get(name) or empty_tree(s.tree)
             new = name not in track.trees
             # A model hypothesised for the first time was wrong at all earlier observations.
             before = replace(before, time=track.time) if new else before
-            tree = extended_tree(before, levels.get(name), now, turning, s.tree)
-            past = track.untold if new else track.strain[name]
-            trees[name], strain[name] = tree, past * fade + tree.total - before.total
-        least = min(strain.values())
-        likeliest = sorted(trees, key=lambda n: (strain[n], n))[: s.most_names]
+            tree = extended_tree(before, levels.get(name), now, spin_prior, s.tree)
+            past = track.other_cost if new else track.path_costs[name]
+            trees[name], costs[name] = tree, past * fade + tree.total - before.total
+        least_cost = min(costs.values())
+        likeliest = sorted(trees, key=lambda n: (costs[n], n))[: s.most_names]
         return replace(
             track,
             time=now,
             trees=MappingProxyType({n: trees[n] for n in likeliest}),
             levels=(*track.levels, MappingProxyType(levels))[-s.tree.lag :],
             sights=(*track.sights, look.sight)[-s.tree.lag :],
-            strain=MappingProxyType({n: strain[n] for n in likeliest}),
-            untold=untold,
-            support=MappingProxyType({n: self._support(strain[n] - least) for n in likeliest}),
-            unsaid=self._support(untold - least),
+            path_costs=MappingProxyType({n: costs[n] for n in likeliest}),
+            other_cost=other_cost,
+            support=MappingProxyType({n: self._support(costs[n] - least_cost) for n in likeliest}),
+            other_support=self._support(other_cost - least_cost),
         )
 
     def _support(self, extra_cost: float) -> float:
         return exp(-max(0.0, extra_cost - self.settings.free_cost) / self.settings.support_cost)
 
-    def _settled(self, track: PoseTrack, name: str) -> PoseTrack:
+    def _store_orientation(self, track: PoseTrack, name: str) -> PoseTrack:
         """Store the observation that the trees are about to drop; another name starts afresh."""
         s = self.settings
         if name != track.name:
-            return replace(track, name=name, lead=0.0, settled=(), rate=None)
+            return replace(track, name=name, lead=0.0, orientations=(), rate=None)
         tree = track.trees.get(name)
         if tree is None or len(track.levels) < s.tree.lag:
             return track
         seen = _orientation(track.levels[0].get(name), int(tree.path[tree.best, 0]))
         if seen is None:
             return track
-        then = track.levels[0][name].time
-        if track.settled and then - track.settled[-1][0] < s.settle_s - 1e-9:
+        time = track.levels[0][name].time
+        if track.orientations and time - track.orientations[-1][0] < s.stored_every_s - 1e-9:
             return track
-        oldest = then - s.spin.window_s
-        settled = (*track.settled, (then, track.sights[0] @ seen))
-        forgotten = settled[0][0] < oldest
-        return replace(track, settled=settled[1:] if forgotten else settled)
+        oldest = time - s.spin.window_s
+        orientations = (*track.orientations, (time, track.sights[0] @ seen))
+        forgotten = orientations[0][0] < oldest
+        return replace(track, orientations=orientations[1:] if forgotten else orientations)
 
-    def _rated(self, track: PoseTrack, name: str, now: float) -> PoseTrack:
-        if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
+    def _measure_rate(self, track: PoseTrack, name: str, now: float) -> PoseTrack:
+        if now - track.rate_measured_at < self.settings.refit_s - 1e-9 or name not in track.trees:
             return track
-        turns = _orientation_series(track, name, self.settings.tree.lag)
+        orientations = _orientation_series(track, name, self.settings.tree.lag)
         level = track.levels[-1].get(name)
         fitted = level is not None and bool(level.fitted.any())
-        how = self.settings.fitted_spin if fitted else self.settings.spin
-        return replace(
-            track, rate=estimate_angular_velocity(turns, now, track.rate, how), rated=now
-        )
+        settings = self.settings.fitted_spin if fitted else self.settings.spin
+        rate = estimate_angular_velocity(orientations, now, track.rate, settings)
+        return replace(track, rate=rate, rate_measured_at=now)
 
-    def _led(self, track: PoseTrack, name: str, waited: float) -> PoseTrack:
+    def _update_lead(self, track: PoseTrack, name: str, waited: float) -> PoseTrack:
         """The track with the lead of the chosen hypotheses updated."""
         level, tree = track.levels[-1].get(name), track.trees.get(name)
         if level is None or tree is None:
@@ -332,21 +331,21 @@ class PoseReasoner:
             spin=spin_of(track.rate, self.settings.spin) if track.rate else None,
         )
 
-    def _now(self, track: PoseTrack, name: str, now: float) -> Pose | None:
+    def _current_pose(self, track: PoseTrack, name: str, now: float) -> Pose | None:
         """The pose of the last observation, as far as it is still valid."""
         pose, age = track.pose, now - track.time
         if pose is None or pose.name != name or age <= 0.0:
             return pose if pose is None or pose.name == name else None
         spin = pose.spin if age < self.settings.spin_stale_s else None
-        return replace(pose, confidence=pose.confidence * self._fading(age), spin=spin)
+        return replace(pose, confidence=pose.confidence * self._decay(age), spin=spin)
 
     def _confidence(self, track: PoseTrack, tree: InterpretationTree) -> float:
         """Confidence against the next best orientation: from path costs (log likelihoods) and the lead."""
         age = track.time - float(tree.chosen[tree.best])
         odds = min(rival_gap(tree, self.settings.tree), self.settings.lead * track.lead)
-        return self._fading(age) / (1.0 + exp(-odds))
+        return self._decay(age) / (1.0 + exp(-odds))
 
-    def _fading(self, age: float) -> float:
+    def _decay(self, age: float) -> float:
         return exp(-max(0.0, age) / self.settings.stale_s)
 
 
@@ -362,10 +361,10 @@ def _look_signature(hypotheses: Sequence[Hypothesis]) -> LookSignature:
 
 
 def _spin_prior(rate: AngularVelocity | None, settings: PoseSettings) -> SpinPrior:
-    if rate is None or rate.sigma > settings.loosest:
-        return SpinPrior(sigma=settings.loosest)
+    if rate is None or rate.sigma > settings.unknown_spin_sigma:
+        return SpinPrior(sigma=settings.unknown_spin_sigma)
     x, y, z = rate.vector.tolist()
-    return SpinPrior((x, y, z), max(rate.sigma, settings.surest))
+    return SpinPrior((x, y, z), max(rate.sigma, settings.least_spin_sigma))
 
 
 def _orientation(level: TreeLevel | None, number: int) -> Floats | None:
@@ -385,7 +384,7 @@ def _orientation_series(track: PoseTrack, name: str, lag: int) -> OrientationSer
         for levels, sight, number in zip(track.levels, track.sights, path.tolist(), strict=True)
         if (seen := _orientation(levels.get(name), number)) is not None
     ]
-    every = [*track.settled, *recent]
+    every = [*track.orientations, *recent]
     times = np.array([t for t, _ in every])
     return OrientationSeries(times, np.array([r for _, r in every]).reshape(-1, 3, 3))
 

@@ -49,7 +49,7 @@ class RelationSettings:
         apart_exit: Relative depth difference below which they are no longer apart in depth.
         together_exit: Factor of the limits of relative motion before moving together ends.
         moving_exit: Share of the speed required for moving together at which it still continues.
-        judge: Thresholds of RCC-8, QTC, direction and distance class.
+        thresholds: Thresholds of RCC-8, QTC, direction and distance class.
     """
 
     window_s: float = 1.5
@@ -76,7 +76,7 @@ class RelationSettings:
     apart_exit: float = 0.2
     together_exit: float = 1.5
     moving_exit: float = 0.7
-    judge: ThresholdSettings = field(
+    thresholds: ThresholdSettings = field(
         default_factory=lambda: ThresholdSettings(speed_enter=0.002, speed_exit=0.001)
     )
 
@@ -215,7 +215,7 @@ class KinematicsEstimator:
             All quantities; NaN where unknown.
         """
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
-        noise, strong = s.judge.noise_px, 2.0 * s.rate_enter * diagonal
+        noise, strong = s.thresholds.noise_px, 2.0 * s.rate_enter * diagonal
         gaps = self._gaps(objects, seen, h, mind, before)
         windows = s.window_s, s.motion_window_s
         slope, sigma, motion, spread = fit_motion(

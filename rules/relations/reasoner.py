@@ -16,9 +16,9 @@ How to query them:
 - `related(mind, name, a, b) -> Truth`: any relation of two objects, those of `NAMES` among them;
 - `relation_of(mind, name, a, b) -> Relation | None`: the same with confidence, value, start;
 - `qtc(mind, a, b) -> str | None`: QTC-C such as '-0+0'; its first two signs are QTC-B;
-- `measured(mind).pair(quantity, a, b) -> float`: 'gap', 'rate', 'relative_speed', 'rate_sigma',
-  'time_to_contact'; NaN unknown; `measured(mind).interval(quantity, a, b) -> (low, high)`;
-- `measured(mind).one(quantity, a) -> float`: 'speed', 'depth';
+- `kinematics(mind).pair(quantity, a, b) -> float`: 'gap', 'rate', 'relative_speed', 'rate_sigma',
+  'time_to_contact'; NaN unknown; `kinematics(mind).interval(quantity, a, b) -> (low, high)`;
+- `kinematics(mind).one(quantity, a) -> float`: 'speed', 'depth';
 - `zones.inside(mind, object_id, zone_name) -> Truth`, and more in `zones.py`.
 """
 
@@ -156,7 +156,7 @@ class SmoothedGeometry:
     outlines: Floats
 
 
-def _no_smooth() -> SmoothedGeometry:
+def _no_geometry() -> SmoothedGeometry:
     return SmoothedGeometry(0.0, np.zeros((0, 4)), np.zeros(0), np.zeros((3, 0)))
 
 
@@ -177,7 +177,7 @@ class RelationMemory:
     measured: Kinematics = field(default_factory=Kinematics)
     states: HysteresisState = field(default_factory=lambda: unknown_states((ROWS, 0), 0.0))
     rcc8: HysteresisState = field(default_factory=lambda: unknown_states((2, 0), 0.0))
-    smooth: SmoothedGeometry = field(default_factory=lambda: _no_smooth())
+    smooth: SmoothedGeometry = field(default_factory=lambda: _no_geometry())
     drift: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
@@ -228,10 +228,10 @@ class RelationReasoner:
     """Reasoner of the cogitate phase: decides all relations of all pairs of present objects."""
 
     settings: RelationSettings = field(default_factory=RelationSettings)
-    _lasts: Floats = field(init=False, repr=False, compare=False)
+    _durations_s: Floats = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_lasts", self._durations())
+        object.__setattr__(self, "_durations_s", self._durations())
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Reason about one step; see `Reasoner`."""
@@ -245,13 +245,13 @@ class RelationReasoner:
         seen = sightings(objects, mind.time)
         now = KinematicsEstimator(s)(history, objects, seen, mind, memory.measured)
         smooth = self._smooth(before.smooth, now, objects, seen, mind)
-        wants = self._wanted(before.states, history, now, smooth, mind)
-        states = advance(before.states, wants, mind.time, self._lasts)
+        candidates = self._candidate_states(before.states, history, now, smooth, mind)
+        states = advance(before.states, candidates, mind.time, self._durations_s)
         rcc8 = before.rcc8
         if states is not before.states:  # otherwise the derived relations are unchanged
             state = states.state
-            held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
-            rcc8 = advance(rcc8, held, mind.time, 0.0)
+            derived = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
+            rcc8 = advance(rcc8, derived, mind.time, 0.0)
         memory = RelationMemory(history, now, states, rcc8, smooth, drift)
         table = RelationTable(now.ids, (self._cells(memory, mind),))
         return Outcome(mind.remember(RELATIONS, memory, relations=table))
@@ -259,11 +259,11 @@ class RelationReasoner:
     def _durations(self) -> Floats:
         s = self.settings
         lasts = np.full((ROWS, 1), s.touch_minimum_s)
-        lasts[:BOX_ROWS] = least_durations(s.judge)
+        lasts[:BOX_ROWS] = least_durations(s.thresholds)
         lasts[[StateRow.TREND, StateRow.TOGETHER, StateRow.DEPTH]] = s.trend_minimum_s
         return lasts
 
-    def _wanted(
+    def _candidate_states(
         self,
         before: HysteresisState,
         h: SampleWindow,
@@ -273,7 +273,7 @@ class RelationReasoner:
     ) -> Codes:
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
         codes = np.empty(before.state.shape, dtype=np.int8)
-        bounds = limits(s.judge, diagonal)
+        bounds = limits(s.thresholds, diagonal)
         classify_boxes(before.state, smooth.boxes, now.velocity, now.velocity_sigma, bounds, codes)
         codes[StateRow.DEPTH] = self._depth_trend(h)
         motion = PairMotion(
@@ -286,7 +286,7 @@ class RelationReasoner:
             self._limits(diagonal),
             codes[MOTION_AND_DEPTH],
         )
-        level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
+        level = s.thresholds.level_enter * diagonal, s.thresholds.level_exit * diagonal
         codes[OUTLINE] = signs_with_hysteresis(smooth.outlines, before.state[OUTLINE], *level)
         return codes
 
@@ -309,16 +309,16 @@ class RelationReasoner:
     ) -> SmoothedGeometry:
         """Smoothed boxes, including those last seen a moment ago; gaps; outlines that may meet."""
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
-        share, jump = new_share(mind.time - before.time), 6.0 * s.judge.noise_px
-        wide, near = jump * sqrt(2.0), 2.0 * s.judge.level_enter * diagonal
-        boxes, gap, asked = smoothed_boxes(
-            before.boxes, before.gap, seen, now.tables, (share, jump, wide, s.hold_s, near)
+        share, jump = new_share(mind.time - before.time), 6.0 * s.thresholds.noise_px
+        pair_jump, near_gap = jump * sqrt(2.0), 2.0 * s.thresholds.level_enter * diagonal
+        boxes, gap, near_pairs = smoothed_boxes(
+            before.boxes, before.gap, seen, now.tables, (share, jump, pair_jump, s.hold_s, near_gap)
         )
-        apart = outline_differences([b.region for b in objects], asked.tolist())
-        level = smoothed_outlines(
-            before.outlines, gap, asked, apart, (share, wide, 0.05 * diagonal)
+        differences = outline_differences([b.region for b in objects], near_pairs.tolist())
+        outlines = smoothed_outlines(
+            before.outlines, gap, near_pairs, differences, (share, pair_jump, 0.05 * diagonal)
         )
-        return SmoothedGeometry(mind.time, boxes, gap, level)
+        return SmoothedGeometry(mind.time, boxes, gap, outlines)
 
     def _depth_trend(self, h: SampleWindow) -> Codes:
         """Trend of the difference in depth: a code per pair, UNKNOWN where depth is unknown."""

@@ -64,7 +64,7 @@ def goes_past(
     if contact is not None and contact.in_front:
         return True
     if held := holds_on(mind, objects):
-        on = contact is not None and (contact.passing or not contact.known)
+        on = contact is not None and (contact.passing or not contact.motion_known)
         if not all(gapes(mind, *other) for other in held):
             return on
         # A released body falls onto the one that it met, unless it has moved across that by more than the
@@ -82,7 +82,7 @@ def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:
     bodies, which have a rule of their own (`goes_past`).
     """
     contact = _contact(mind, objects)
-    unsettled = contact is not None and contact.settled_since is None
+    unsettled = contact is not None and contact.confirmed_since is None
     return unsettled and not holds_on(mind, objects)
 
 

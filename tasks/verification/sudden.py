@@ -89,7 +89,7 @@ def sudden_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | Non
         return None
     speeds = [v for v in (now.one("speed", i) for i in ids) if v == v]  # NaN is not equal to itself
     limits = RiseLimits(
-        sqrt(2.0) * RelationSettings().judge.noise_px,
+        sqrt(2.0) * RelationSettings().thresholds.noise_px,
         HEIGHT * image_diagonal(mind.frame_size),
         SWAY * min(speeds, default=0.0),
     )

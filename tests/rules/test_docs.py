@@ -88,7 +88,7 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
         ("measured over the last {} s", ReasonerSettings().coupling.window_s),
         ("their logarithms are added up until they reach {:g}", ReasonerSettings().coupling.odds),
         ("came together in the {:g} s before", ReasonerSettings().coupling.approach_s),
-        ("apart for {} s", ReasonerSettings().coupling.part_s),
+        ("apart for {} s", ReasonerSettings().coupling.apart_s),
         ("tau is {:g} s", ReasonerSettings().votes.tau_s),
         ("or {:g} s for an object that is hidden", ReasonerSettings().votes.tau_hidden_s),
         ("fewer than {} votes", ReasonerSettings().votes.known_votes),

@@ -180,4 +180,9 @@ def qtc_wrong(draws: int, seed: int) -> int:
 def settings_of_record() -> dict[str, Any]:
     """What the figures were made with."""
     s = BoxSettings()
-    return {"fps": FPS, "noise_px": s.judge.noise_px, "window_s": s.window_s, "objects": OBJECTS}
+    return {
+        "fps": FPS,
+        "noise_px": s.thresholds.noise_px,
+        "window_s": s.window_s,
+        "objects": OBJECTS,
+    }

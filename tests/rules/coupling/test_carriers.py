@@ -41,7 +41,7 @@ def carried(thoughts: list[Thought]) -> dict[tuple[int, int], float]:
     """All pairs that were ever believed to carry each other, with the time of setting out."""
     found: dict[tuple[int, int], float] = {}
     for thought in thoughts:
-        found.update(thought.mind.recall(CARRIERS).carried())
+        found.update(thought.mind.recall(CARRIERS).carried_since())
     return found
 
 
@@ -102,5 +102,5 @@ def test_what_is_let_go_of_is_carried_no_more() -> None:
 
     thoughts = scene(arm, dropped, seconds=7.0)
     assert set(carried(thoughts)) == {(HAND, PART)}
-    assert thoughts[-1].mind.recall(CARRIERS).carried() == {}
+    assert thoughts[-1].mind.recall(CARRIERS).carried_since() == {}
     assert thoughts[-1].mind.couplings == ()

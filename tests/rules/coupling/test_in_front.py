@@ -12,8 +12,8 @@ from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Coupling, Mind, Truth, Verdict
 from visup.agent.model.task_beliefs import TaskBelief
-from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact, updated_contact
-from visup.rules.coupling.evidence import NO, YES, PairObservation, feet_of, goes_along
+from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact, update_contact
+from visup.rules.coupling.evidence import NO, YES, PairObservation, feet_of, move_alike
 
 SPREADER, CONTAINER, TRUCK = 1, 2, 3
 FOOT, HEIGHT = 330.0, 60.0
@@ -67,7 +67,7 @@ def contact(*feet: Feet | None) -> OutlineContact:
     """Two that meet, at rest, after looks at their feet."""
     found = None
     for k, look in enumerate(feet):
-        found = updated_contact(found, 0.0, 10.0, (k * 0.1, 0.1), ContactSettings(), feet=look)
+        found = update_contact(found, 0.0, 10.0, (k * 0.1, 0.1), ContactSettings(), feet=look)
     assert found is not None
     return found
 
@@ -76,7 +76,7 @@ def test_a_foot_that_is_covered_is_where_it_was() -> None:
     """A cup on a saucer covers the saucer's foot; what shows of the saucer ends higher."""
     covered = contact(Feet(80.0, 100.0, 40.0), Feet(98.0, 70.0, 40.0))
     assert not covered.in_front
-    assert covered.ground == 100.0
+    assert covered.lowest_foot == 100.0
 
 
 @pytest.mark.parametrize(("foot", "front"), [(109.0, False), (111.0, True)])
@@ -91,13 +91,13 @@ def test_what_was_below_from_the_start_has_not_come_down() -> None:
 def test_it_stays_in_front_once_it_is_let_go_of() -> None:
     found = contact(Feet(80.0, 100.0, 40.0), Feet(120.0, 100.0, 40.0), None, None)
     assert found.in_front
-    assert found.settled_since is None
+    assert found.confirmed_since is None
 
 
 def test_what_is_lifted_again_is_no_longer_in_front() -> None:
     looks = [Feet(y, 100.0, 40.0) for y in (80.0, 120.0, 90.0, 90.0, 90.0)]
     assert not contact(*looks).in_front
-    assert contact(*looks).settled_since is not None
+    assert contact(*looks).confirmed_since is not None
 
 
 @given(st.lists(st.floats(0, 400), min_size=1, max_size=20), st.floats(0, 400), st.floats(1, 200))
@@ -144,4 +144,4 @@ def test_two_go_along_if_both_are_fast_and_hardly_differ(
 
     seq = (seen(i, [box_region(n, b) for n, b in enumerate(at(i), start=1)]) for i in range(50))
     mind: Mind = reason(seq)[-1].mind
-    assert goes_along(mind, (1, 2)) is along
+    assert move_alike(mind, (1, 2)) is along

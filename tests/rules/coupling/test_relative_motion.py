@@ -17,7 +17,7 @@ from visup.rules.coupling.relative_motion import (
     RelativeVelocity,
     begin_relative_track,
     outline_template,
-    registered,
+    register_outline,
     relative_velocity,
     target_of,
     update_relative_track,
@@ -192,7 +192,9 @@ def test_boxes_that_move_apart_are_followed(speed: float, known: bool) -> None:
     followed = begin_relative_track(both(0.0), 0.0, SIZE)
     for k in range(1, frames):
         now = k / 25
-        followed = update_relative_track(followed, both(now), now, SIZE, lasts_s=1.2, anew_s=2.5)
+        followed = update_relative_track(
+            followed, both(now), now, SIZE, lasts_s=1.2, outline_age_s=2.5
+        )
     assert followed is not None
     assert followed.since == 0.0  # the outlines that were stored first are still found
     found = relative_velocity(followed, (frames - 1) / 25, 0.3)
@@ -208,6 +210,6 @@ def test_an_outline_is_found_where_it_is_expected(dx: float, dy: float) -> None:
     assert moved is not None
     kept = outline_template(region, (), SIZE)
     assert kept is not None
-    found = registered(kept, target_of(moved), [(dx + 4.0, dy - 4.0)])
+    found = register_outline(kept, target_of(moved), [(dx + 4.0, dy - 4.0)])
     assert found is not None
     assert found.shift == pytest.approx((round(dx), round(dy)), abs=1.0)

@@ -259,7 +259,13 @@ def test_memory_does_not_grow() -> None:
 def tracks_of(mind: Mind) -> list[object]:
     track = pose_tracks(mind)[1]
     levels = [dict(level) for level in track.levels]
-    return [dict(track.trees), levels, dict(track.strain), track.settled, track.said]
+    return [
+        dict(track.trees),
+        levels,
+        dict(track.path_costs),
+        track.orientations,
+        track.signature,
+    ]
 
 
 def test_thinking_twice_gives_the_same() -> None:

@@ -49,11 +49,11 @@ def scene(held: bool, gap: float, contact: OutlineContact, passing_by: Truth) ->
     )
 
 
-ON = OutlineContact(0.0, passing=True, known=True)
-FAR = OutlineContact(0.0, passing=True, known=True, path=50.0)
-SLOW = OutlineContact(0.0, passing=False, known=True)
+ON = OutlineContact(0.0, passing=True, motion_known=True)
+FAR = OutlineContact(0.0, passing=True, motion_known=True, path=50.0)
+SLOW = OutlineContact(0.0, passing=False, motion_known=True)
 UNKNOWN = OutlineContact(0.0)
-BEFORE = OutlineContact(0.0, passing=False, known=True, in_front=True)
+BEFORE = OutlineContact(0.0, passing=False, motion_known=True, in_front=True)
 
 
 @pytest.mark.parametrize(
@@ -181,10 +181,10 @@ def test_what_rests_does_not_go_past() -> None:
 @pytest.mark.parametrize(
     ("contact", "on"),
     [
-        (OutlineContact(0.0, passing=True, known=True), True),
+        (OutlineContact(0.0, passing=True, motion_known=True), True),
         (OutlineContact(0.0), True),
-        (OutlineContact(0.0, known=True), True),  # it has slowed down this moment
-        (OutlineContact(0.0, settled_since=1.0, known=True), False),
+        (OutlineContact(0.0, motion_known=True), True),  # it has slowed down this moment
+        (OutlineContact(0.0, confirmed_since=1.0, motion_known=True), False),
     ],
 )
 def test_a_stage_of_contact_waits_until_one_has_slowed_down(
@@ -197,8 +197,8 @@ def test_a_stage_of_contact_waits_until_one_has_slowed_down(
 @pytest.mark.parametrize(
     ("contact", "since"),
     [
-        (OutlineContact(1.0, changed_at=2.5, known=True), 2.5),
-        (OutlineContact(1.0, changed_at=2.5, passing=True, known=True), -math.inf),
+        (OutlineContact(1.0, changed_at=2.5, motion_known=True), 2.5),
+        (OutlineContact(1.0, changed_at=2.5, passing=True, motion_known=True), -math.inf),
     ],
 )
 def test_a_contact_counts_from_when_one_ceased_to_pass(

@@ -47,8 +47,8 @@ class BoxSettings:
     """Settings of `watch_boxes`.
 
     Attributes:
-        judge: Thresholds.
-        diagonal: Image diagonal, pixels, unit of lengths in `judge`.
+        thresholds: Thresholds.
+        diagonal: Image diagonal, pixels, unit of lengths in `thresholds`.
         window_s: Length of the window for line fits, seconds.
         samples: Maximum samples in the window.
         bins: Maximum number of means of neighbouring samples for a line fit.
@@ -58,7 +58,7 @@ class BoxSettings:
             noise and 3 of its own fit.
     """
 
-    judge: ThresholdSettings = field(default_factory=ThresholdSettings)
+    thresholds: ThresholdSettings = field(default_factory=ThresholdSettings)
     diagonal: float = 800.0
     window_s: float = 1.5
     samples: int = 64
@@ -158,16 +158,16 @@ def watch_boxes(
     m, p = len(ids), len(pairs(len(ids))[0])
     boxes = np.ascontiguousarray(boxes, dtype=float)
     gap = box_gaps(boxes)
-    smooth = exponential_mean(kept.smooth, boxes, now - kept.time, 6.0 * s.judge.noise_px)
+    smooth = exponential_mean(kept.smooth, boxes, now - kept.time, 6.0 * s.thresholds.noise_px)
     places = boxes[:, :2] + 0.5 * boxes[:, 2:]
     times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
     seconds = np.array(times)
     slope, sigma = _fit(seconds, np.stack(samples), s)
     # Deviation of a trend due to edge noise, for one coordinate and for a gap between two edges.
-    noise = slope_noise(seconds, s.judge.noise_px)
+    noise = slope_noise(seconds, s.thresholds.noise_px)
     velocity = slope[p:].reshape(2, m).T.copy()
     spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
-    judge, state = s.judge, kept.latch.state
+    judge, state = s.thresholds, kept.latch.state
     bounds = limits(judge, s.diagonal)
     codes = np.empty((BOX_ROWS + 1, p), dtype=np.int8)
     classify_boxes(state, smooth, velocity, spread, bounds, codes)

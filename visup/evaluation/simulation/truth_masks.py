@@ -21,7 +21,7 @@ from visup.agent import Region
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.files import read_json
 from visup.percepts.opencv_names import opencv_name
-from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
+from visup.rules.coupling.relative_motion import TargetOutline, outline_template, register_outline
 from visup.rules.geometry.outlines import prepared_outline
 from visup.testing import region_of
 
@@ -145,7 +145,7 @@ def _velocity(
     if kept is None:
         return None
     target = TargetOutline.of(prepared_outline(new).points)
-    laid = registered(kept, target, _displacements(old, new))
+    laid = register_outline(kept, target, _displacements(old, new))
     return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
 
 
