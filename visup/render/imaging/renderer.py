@@ -121,7 +121,7 @@ class Renderer:
             index,
             image,
             self._labels(bodies, hits),
-            self._amodal(bodies, view),
+            self._amodal(bodies, hits, view),
             {b.name: b.pose for b in bodies if b.label and b.name in self.scene.solids},
         )
 
@@ -157,15 +157,17 @@ class Renderer:
             window[y0:y1, x0:x1] = True
         return window.ravel()
 
-    def _amodal(self, bodies: list[Body], view: CameraView) -> dict[str, int]:
-        """Pixels of each labelled object without occluders."""
+    def _amodal(self, bodies: list[Body], hits: Hits, view: CameraView) -> dict[str, int]:
+        """Pixels of each labelled object without occluders, from the hits with all bodies."""
         counts = {}
-        for body in bodies:
+        for number, body in enumerate(bodies):
             if not body.label:
                 continue
-            window = self._window([body], view)
-            hits = RayCaster([body]).from_pinhole(view.rays[window])
-            counts[body.name] = int(np.count_nonzero(hits.body >= 0))
+            visible = int(np.count_nonzero(hits.body == number))
+            # Only where another body is in front may it be hidden.
+            window = self._window([body], view) & (hits.body >= 0) & (hits.body != number)
+            hidden = RayCaster([body]).from_pinhole(view.rays[window]).body if window.any() else ()
+            counts[body.name] = visible + int(np.count_nonzero(np.asarray(hidden) >= 0))
         return counts
 
     def _background(self, view: CameraView) -> Floats:
