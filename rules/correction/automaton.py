@@ -23,15 +23,15 @@ class LrAutomaton:
 
     Attributes:
         states: Action of each state per terminal, and goto per nonterminal.
-        first: The initial state.
-        last: The accepting state.
-        known: Cache of steps.
+        initial: The initial state.
+        accepting: The accepting state.
+        cache: Cache of steps.
     """
 
     states: Mapping[int, Mapping[str, Any]]
-    first: int
-    last: int
-    known: dict[tuple[Stack, str], Stack | None] = field(default_factory=dict)
+    initial: int
+    accepting: int
+    cache: dict[tuple[Stack, str], Stack | None] = field(default_factory=dict)
 
     @classmethod
     def of(cls, parser: Lark, start: str) -> LrAutomaton:
@@ -39,21 +39,21 @@ class LrAutomaton:
         table = parser.parser.parser._parse_table
         return cls(table.states, table.start_states[start], table.end_states[start])
 
-    def offered(self, stack: Stack) -> list[str]:
+    def acceptable(self, stack: Stack) -> list[str]:
         """Terminals that may come next, and possibly some that may not."""
         return sorted(name for name in self.states[stack[-1]] if name.isupper() or name == END)
 
     def step(self, stack: Stack, terminal: str) -> Stack | None:
         """The stack after a terminal; None if it is not accepted."""
         key = stack, terminal
-        after = self.known.get(key, _NOT_TRIED)
+        after = self.cache.get(key, _NOT_TRIED)
         if after is _NOT_TRIED:
-            after = self.known[key] = self._step(stack, terminal)
+            after = self.cache[key] = self._step(stack, terminal)
         return after
 
     def _step(self, stack: Stack, terminal: str) -> Stack | None:
         while True:
-            if terminal == END and stack[-1] == self.last:
+            if terminal == END and stack[-1] == self.accepting:
                 return stack
             found = self.states[stack[-1]].get(terminal)
             if found is None:

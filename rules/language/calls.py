@@ -9,7 +9,7 @@ from visup.rules.formula.nodes import Comparison, Predicate
 from visup.rules.formula.terms import Measure
 from visup.rules.language.diagnostics import listed, nearest
 from visup.rules.language.dimensions import example_amount
-from visup.rules.language.synonyms import said_otherwise, synonym
+from visup.rules.language.synonyms import negated_synonym, synonym
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits, known_of
 from visup.rules.predicates.vocabulary import Vocabulary
@@ -58,7 +58,7 @@ def _unknown(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Faul
     if fact and call.name in _KNOWN and len(call.words) == 1:
         meant = "identified" if call.words[0] in scope else "signal_known"
         hint = f"write `{meant}({call.words[0]})`"
-    elif fact and (other := said_otherwise(call.name, call.words, words)) is not None:
+    elif fact and (other := negated_synonym(call.name, call.words, words)) is not None:
         hint = f"write `{other}`"
     elif call.name in (quantities if fact else words):
         hint = _compared(call, vocabulary) if fact else "it is true or false"

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from visup.agent.model.errors import SourceLocation
-from visup.rules.correction.culprit import Culprit, culprit
+from visup.rules.correction.error_span import ErrorSpan, error_span
 from visup.rules.language.diagnostics import Diagnostic, Source
 
 
@@ -137,7 +137,7 @@ def pointing(text: str, fault: Diagnostic) -> Diagnostic:
     at = _offset(text, fault.place.line, fault.place.column)
     if fault.code >= "E2" and begin <= at < begin + fix.length and _names_its_caret(fault):
         return fault
-    found = culprit(text, begin, begin + fix.length, fix.new)
+    found = error_span(text, begin, begin + fix.length, fix.new)
     if found is None or _is_at(at, fault.place.length, found):
         return fault
     span = found.shown
@@ -166,7 +166,7 @@ LITTLE_MORE, LONG = 8, 30
 """Characters that a caret may cover beside the culprit; and in all, if something is missing after its end."""
 
 
-def _is_at(begin: int, length: int, found: Culprit) -> bool:
+def _is_at(begin: int, length: int, found: ErrorSpan) -> bool:
     """Whether a caret covers something of the culprit, and little else."""
     first, last = found.shown
     at = any(start < begin + length and begin < end for start, end in found.words)

@@ -13,8 +13,13 @@ from visup.agent.model.errors import RuleError
 from visup.agent.storage.text_file import read_text_file
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.diagnostics import Diagnostic, raise_all
+from visup.rules.language.error_recovery import (
+    RepairBudget,
+    read_repaired,
+    weight,
+    with_tried_edits,
+)
 from visup.rules.language.fixes import pointing
-from visup.rules.language.reading import Patience, read_repaired, weight, with_tried_edits
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
 
@@ -46,12 +51,12 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
 def _parsed(text: str, file: str) -> tuple[Rule, ...]:
     errors: list[Diagnostic] = []
     rules: list[Rule] = []
-    patience = Patience()
+    budget = RepairBudget()
     for block in _blocks(text):
-        found = read_repaired(block, "start", file, RULES, patience)
+        found = read_repaired(block, "start", file, RULES, budget)
         diagnostics = found.diagnostics(text)
         errors += with_tried_edits(
-            block, diagnostics, partial(weight, patience=patience), len(found.syntax)
+            block, diagnostics, partial(weight, budget=budget), len(found.syntax)
         )
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)
@@ -116,7 +121,7 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
 
 
 def _formula(text: str, file: str, vocabulary: Vocabulary) -> Formula:
-    found = read_repaired(text, "formula", file, vocabulary, Patience())
+    found = read_repaired(text, "formula", file, vocabulary, RepairBudget())
     errors = [pointing(text, error) for error in found.diagnostics(text)]
     raise_all(sorted(errors, key=_position), RuleError)
     return cast("Formula", found.tree)

@@ -15,10 +15,10 @@ from math import inf
 from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.model.did_you_mean import closest
-from visup.rules.correction.edits import Repair, edits
-from visup.rules.correction.loss import KNOWN, LITTLE, loss
+from visup.rules.correction.local_edits import Repair, edits
+from visup.rules.correction.meaning_loss import COMMON_FIX_BONUS, SMALL_LOSS, meaning_lost
+from visup.rules.language.common_mistakes import MISTAKE_PATTERNS
 from visup.rules.language.keywords import KEYWORDS
-from visup.rules.language.slips import SLIPS
 
 MOST_REPAIRS = 12
 MOST_COMPARED = 4
@@ -77,19 +77,19 @@ def find_repair(
     """
     at, length = place_of(text, error)
     trial = _RepairTrial(text, at, length, error_of, is_sound)
-    known = trial.best(usual_slips(text, at, length, *_around(text, at)), KNOWN)
-    if trial.lost <= LITTLE:
+    known = trial.best(common_fixes(text, at, length, *_around(text, at)), COMMON_FIX_BONUS)
+    if trial.lost <= SMALL_LOSS:
         return known
     sound = (trial.lost, known)
     usual = trial.best(_candidates(text, at, length))
-    if trial.lost <= LITTLE:
+    if trial.lost <= SMALL_LOSS:
         return usual
     sound = min(sound, (trial.lost, usual), key=lambda found: found[0])
     further, trial.moved = trial.moved, 0.0
     since = max(0, min(at - NEAR, text.rfind("\n", 0, at) + 1))
     least = trial.best(islice(corrected(since), MOST_CORRECTIONS))
     lost, whole = min(sound, (trial.lost, least), key=lambda found: found[0])
-    if lost <= LITTLE or (lost == inf and usual is not None and further > MUCH_FURTHER):
+    if lost <= SMALL_LOSS or (lost == inf and usual is not None and further > MUCH_FURTHER):
         return whole or usual
     places = dict.fromkeys((at, max(0, end_before(text, at) - 1)))
     edited = trial.best(r for place in places for r in _edited(text, place))
@@ -139,8 +139,8 @@ class _RepairTrial:
             if left is None:
                 self.moved = inf
                 if self.is_sound(changed):
-                    whole.append((loss(self.text, changed) - granted, repair))
-                    if whole[-1][0] <= LITTLE or len(whole) == MOST_COMPARED:
+                    whole.append((meaning_lost(self.text, changed) - granted, repair))
+                    if whole[-1][0] <= SMALL_LOSS or len(whole) == MOST_COMPARED:
                         break
                     continue
                 readable = readable or repair
@@ -178,7 +178,7 @@ def end_before(text: str, at: int) -> int:
     return len("\n".join([*lines[:-1], lines[-1].split("#")[0].rstrip()]))
 
 
-def usual_slips(
+def common_fixes(
     text: str, at: int, length: int, low: int = 0, high: int | None = None
 ) -> Iterator[Repair]:
     """Fixes of frequent slips that contain an offset or are adjacent to it.
@@ -191,7 +191,7 @@ def usual_slips(
         high: Offset up to which to search; None for the end of the text.
     """
     end = len(text) if high is None else high
-    for slip in SLIPS:
+    for slip in MISTAKE_PATTERNS:
         for match in slip.pattern.finditer(text, low, end):
             if match.start() - 1 <= at + length and at - 1 <= match.end():
                 new = match.expand(slip.new) if isinstance(slip.new, str) else slip.new(match)
@@ -206,7 +206,7 @@ def _around(text: str, at: int) -> tuple[int, int]:
 
 def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
     low, high = _around(text, at)
-    yield from usual_slips(text, at, length, low, high)
+    yield from common_fixes(text, at, length, low, high)
     found, before = text[at : at + length], end_before(text, at)
     for word in (found, _word_before(text, before)):
         start = at if word == found else before - len(word)

@@ -100,14 +100,14 @@ OF_TASKS: Mapping[str, str] = MappingProxyType(
 _NEGATED = re.compile(r"^(?:un|in|dis|non_?|not_?)(?=[a-z])")
 
 
-def said_otherwise(name: str, objects: Sequence[str], known: Iterable[str]) -> str | None:
+def negated_synonym(name: str, objects: Sequence[str], known: Iterable[str]) -> str | None:
     """What an unknown fact says: an action of tasks, or `is_person(a)`; None if it is neither.
 
-    >>> said_otherwise("outside", ["a", "bay"], ["reaching"])
+    >>> negated_synonym("outside", ["a", "bay"], ["reaching"])
     'not reaching(a, bay)'
-    >>> said_otherwise("is_person", ["a"], ["named"])
+    >>> negated_synonym("is_person", ["a"], ["named"])
     'named(a, person)'
-    >>> said_otherwise("unhealthy", [], ["healthy"])
+    >>> negated_synonym("unhealthy", [], ["healthy"])
     'not healthy()'
 
     Args:

@@ -8,7 +8,7 @@ from itertools import count
 
 from visup.agent.cycle.system_alerts import SYSTEM_ALERTS
 from visup.agent.model.did_you_mean import did_you_mean
-from visup.rules.correction.everyday import NUMBERS
+from visup.rules.correction.everyday_phrases import NUMBERS
 from visup.rules.formula.nodes import (
     And,
     Comparison,

@@ -185,7 +185,7 @@ def blend_palettes(before: Palette, new: Palette, weight: float) -> Palette:
     """Blend two palettes of the same bins with a weight for the new one; an empty one is ignored.
 
     Example:
-        >>> blended(((50.0, 0.0, 0.0, 1.0),), ((50.0, 0.0, 0.0, 0.5), (20.0, 0.0, 0.0, 0.5)), 0.5)
+        >>> blend_palettes(((50.0, 0.0, 0.0, 1.0),), ((50.0, 0.0, 0.0, 0.5), (20.0, 0.0, 0.0, 0.5)), 0.5)
         ((50.0, 0.0, 0.0, 0.75), (20.0, 0.0, 0.0, 0.25))
     """
     if not before:

@@ -9,10 +9,10 @@ from __future__ import annotations
 import re
 from math import degrees
 
-from visup.rules.correction.everyday import AMOUNT_SAID, amount_said
+from visup.rules.correction.everyday_phrases import AMOUNT_SAID, amount_said
 from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.checks.spelling import plain_call
+from visup.tasks.checks.edit_costs import plain_call
 from visup.tasks.checks.usual_meanings import (
     CALL,
     OFTEN,

@@ -13,14 +13,14 @@ from itertools import islice
 from math import inf
 
 from visup.agent.model.did_you_mean import close_matches
-from visup.rules.correction.edits import ALIKE, Repair, edits, hint_of
-from visup.rules.correction.loss import KNOWN, LITTLE, loss
+from visup.rules.correction.local_edits import ALIKE, Repair, edits, hint_of
+from visup.rules.correction.meaning_loss import COMMON_FIX_BONUS, SMALL_LOSS, meaning_lost
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.additions import added, by_names
+from visup.tasks.checks.edit_costs import corrected, said
 from visup.tasks.checks.foreign_forms import FOREIGN_FORMS
-from visup.tasks.checks.spelling import corrected, said
 from visup.tasks.checks.usual_meanings import USUAL, recoveries
 from visup.tasks.diagnostics.recovery import KEYWORDS
 from visup.tasks.grammar.statement import NAME, RESERVED_WORDS
@@ -100,14 +100,14 @@ class _HintTrial:
     def mend(self, fault: Diagnostic) -> str | None:
         """A hint that helps: usual meanings before small edits, partial help before none."""
         found: list[tuple[str | None, int]] = []
-        granted = KNOWN
+        granted = COMMON_FIX_BONUS
         for hints in (_hints(self.text, fault), self.corrected(fault), self.edited(fault)):
             keep = fault.code < "E2" and bool(found) and found[0][1] > ONE_STEP
             # A usual meaning that helps partly is preferred to deleting words.
             hint, helps = self.best(
                 fault, (h for h in hints if not (keep and h.startswith("leave"))), granted
             )
-            if helps == WHOLLY and self.lost(fault, hint) - granted <= LITTLE:
+            if helps == WHOLLY and self.lost(fault, hint) - granted <= SMALL_LOSS:
                 return hint
             found.append((hint, helps))
             granted = 0.0
@@ -118,7 +118,9 @@ class _HintTrial:
             apart = [usual[0]] if fault.code >= "E2" and usual[1] == IN_PART else []
             return min(
                 (*whole, *apart),
-                key=lambda hint: self.lost(fault, hint) - (KNOWN if hint == usual[0] else 0.0),
+                key=lambda hint: (
+                    self.lost(fault, hint) - (COMMON_FIX_BONUS if hint == usual[0] else 0.0)
+                ),
             )
         return edit[0] if usual[1] <= ONE_STEP < edit[1] else usual[0]
 
@@ -156,7 +158,7 @@ class _HintTrial:
             helps = self.helps(replace(fault, hint=hint))
             if helps == WHOLLY:
                 whole.append((self.lost(fault, hint) - granted, hint))
-                if whole[-1][0] <= LITTLE or len(whole) == MOST_COMPARED:
+                if whole[-1][0] <= SMALL_LOSS or len(whole) == MOST_COMPARED:
                     break
             elif helps > most:
                 partly, most = hint, helps
@@ -167,7 +169,7 @@ class _HintTrial:
     def lost(self, fault: Diagnostic, hint: str | None) -> float:
         """What the change of a hint loses of the file."""
         fix = fix_of(self.text, fault.place, hint)
-        return inf if fix is None else loss(self.text, fix.applied(self.text))
+        return inf if fix is None else meaning_lost(self.text, fix.applied(self.text))
 
     def helps(self, fault: Diagnostic) -> int:
         """How much the change of a hint helps."""

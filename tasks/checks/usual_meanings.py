@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from visup.agent.model.did_you_mean import closest
-from visup.rules.correction.everyday import NUMBERS
+from visup.rules.correction.everyday_phrases import NUMBERS
 from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.checks.spelling import plain_call
+from visup.tasks.checks.edit_costs import plain_call
 from visup.tasks.diagnostics.course_error_patterns import JOINING, SIGNS_MEANT, is_in_condition
 from visup.tasks.grammar.statement import NAME, PARAMETERS
 

@@ -13,7 +13,7 @@ from functools import cached_property
 from types import MappingProxyType
 
 from visup.rules.formula.units import Unit
-from visup.rules.language.reading import grammar as rules_grammar
+from visup.rules.language.error_recovery import grammar as rules_grammar
 from visup.rules.traits.colours import TERMS
 from visup.tasks.grammar.parser import grammar as tasks_grammar
 from visup.tasks.grammar.units import UNITS

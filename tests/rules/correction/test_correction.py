@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from lark import Lark
 from lark.exceptions import UnexpectedInput
 
-from visup.rules.correction import everyday, search, sentences
+from visup.rules.correction import everyday_phrases, plain_sentences, repair_search
 from visup.rules.correction.automaton import END, LrAutomaton
-from visup.rules.correction.edits import edits
-from visup.rules.correction.search import Meaning, Speller, corrections
-from visup.rules.correction.words import Word, terminals_of, words_of
+from visup.rules.correction.local_edits import edits
+from visup.rules.correction.repair_search import EditCosts, Replacement, least_cost_repairs
+from visup.rules.correction.tokens import Word, terminals_of, tokens_of
 from visup.rules.predicates import arguments
 
 PARSER = Lark(
@@ -47,17 +47,17 @@ ITEMS = st.recursive(
 TEXTS = st.lists(ITEMS, min_size=1, max_size=4).map(", ".join)
 
 
-def meant(words: object, at: int) -> list[Meaning]:
+def meant(words: object, at: int) -> list[Replacement]:
     said = words[at].text if isinstance(words, list) else ""
-    return [Meaning(1, ("COMMA",), ",", 0.1)] if said == ";" else []
+    return [Replacement(1, ("COMMA",), ",", 0.1)] if said == ";" else []
 
 
-SPELLER = Speller(AUTOMATON, terminals_of(PARSER), PUT, lambda word: 1.0, meant)
+SPELLER = EditCosts(AUTOMATON, terminals_of(PARSER), PUT, lambda word: 1.0, meant)
 
 
 def first_corrections(text: str, since: int = 0, readings: int = 3000) -> list[str]:
     left = iter(range(readings))
-    found = corrections(text, since, SPELLER, lambda: next(left, None) is not None)
+    found = least_cost_repairs(text, since, SPELLER, lambda: next(left, None) is not None)
     return [repair.applied(text) for repair in islice(found, 5)]
 
 
@@ -71,8 +71,8 @@ def is_read(text: str) -> bool:
 
 @given(TEXTS)
 def test_the_automaton_takes_what_the_parser_takes(text: str) -> None:
-    stack: tuple[int, ...] | None = (AUTOMATON.first,)
-    for word in words_of(text, terminals_of(PARSER)):
+    stack: tuple[int, ...] | None = (AUTOMATON.initial,)
+    for word in tokens_of(text, terminals_of(PARSER)):
         assert stack is not None
         stack = AUTOMATON.step(stack, word.terminals[0])
     assert stack is not None
@@ -84,7 +84,7 @@ def test_the_automaton_takes_what_the_parser_takes(text: str) -> None:
 def test_a_text_that_lost_a_word_is_brought_into_the_grammar(
     text: str, data: st.DataObject
 ) -> None:
-    words = list(words_of(text, terminals_of(PARSER)))
+    words = list(tokens_of(text, terminals_of(PARSER)))
     lost: Word = data.draw(st.sampled_from(words))
     broken = text[: lost.begin] + text[lost.end :]
     if not is_read(broken):
@@ -96,7 +96,7 @@ def test_a_text_that_lost_a_word_is_brought_into_the_grammar(
 @settings(max_examples=60)
 @given(TEXTS, st.data())
 def test_a_word_too_many_is_left_out_again(text: str, data: st.DataObject) -> None:
-    word = data.draw(st.sampled_from(list(words_of(text, terminals_of(PARSER)))))
+    word = data.draw(st.sampled_from(list(tokens_of(text, terminals_of(PARSER)))))
     broken = f"{text[: word.begin]} % {text[word.begin :]}"
     assert text.replace(" ", "") in [found.replace(" ", "") for found in first_corrections(broken)]
 
@@ -115,7 +115,7 @@ def test_it_stops_when_it_may_not_go_on() -> None:
 
 
 def test_words_know_their_place_and_what_they_may_be() -> None:
-    found = list(words_of("ab = 1 ?", terminals_of(PARSER)))
+    found = list(tokens_of("ab = 1 ?", terminals_of(PARSER)))
     assert [(w.begin, w.text, w.terminals) for w in found] == [
         (0, "ab", ("NAME",)),
         (3, "=", ("EQUAL",)),
@@ -139,7 +139,7 @@ def test_plain_sentences_say_what_calls_say(said: str, meant: tuple[str, ...]) -
         return word if word in ("holds", "held") and things == 2 else None
 
     words = said.removeprefix("the ").split()
-    assert meant in [call for _, call in sentences.sentences(words, ["arm", "part"], verb)]
+    assert meant in [call for _, call in plain_sentences.sentences(words, ["arm", "part"], verb)]
 
 
 def test_a_call_is_offered_without_one_of_its_arguments_and_without_itself() -> None:
@@ -162,6 +162,6 @@ def test_arguments_go_where_they_fit(call: tuple[str, list[str], list[str]], mea
     assert arguments.arranged(*call, ["a", "b"]) == meant
 
 
-@pytest.mark.parametrize("module", [search, sentences, everyday, arguments])
+@pytest.mark.parametrize("module", [repair_search, plain_sentences, everyday_phrases, arguments])
 def test_examples_in_the_words_of_correction_hold(module: object) -> None:
     assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]

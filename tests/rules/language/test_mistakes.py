@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 
 from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
-from visup.rules.language import diagnostics, reading
+from visup.rules.language import diagnostics, error_recovery
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.vocabulary import RULES as VOCABULARY
@@ -225,14 +225,14 @@ def test_what_is_no_rule_at_all_is_told_in_time() -> None:
 
 def test_what_more_slips_cost_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     looked = []
-    monkeypatch.setattr(reading, "find_repair", lambda *_: looked.append("repair"))
-    monkeypatch.setattr(reading, "fix_of", lambda *_: looked.append("hint"))
+    monkeypatch.setattr(error_recovery, "find_repair", lambda *_: looked.append("repair"))
+    monkeypatch.setattr(error_recovery, "fix_of", lambda *_: looked.append("hint"))
     slip = 'rule r(a, b) info\n when touching(a, b) and and nearr(b)\n say "x"\n'
-    spent = reading.Patience(left=-1)
-    found = reading.read_repaired(slip, "start", "r.rules", VOCABULARY, spent)
+    spent = error_recovery.RepairBudget(left=-1)
+    found = error_recovery.read_repaired(slip, "start", "r.rules", VOCABULARY, spent)
     told = found.diagnostics(slip)
-    weigh = partial(reading.weight, patience=spent)
-    assert told == reading.with_tried_edits(slip, told, weigh)
+    weigh = partial(error_recovery.weight, budget=spent)
+    assert told == error_recovery.with_tried_edits(slip, told, weigh)
     assert not looked
 
 
@@ -246,15 +246,20 @@ def test_once_nothing_may_be_tried_any_more_no_further_hint_is_looked_for(
         looked.append(hint)
         return fix_of(text, where, hint)
 
-    monkeypatch.setattr(reading, "fix_of", counted)
+    monkeypatch.setattr(error_recovery, "fix_of", counted)
     slips = " and ".join(f"standalon{n}(b)" for n in range(60))
     rule = f'rule r(a, b): info\n    when {slips}\n    say "x"\n'
-    told = reading.read_repaired(
-        rule, "start", "r.rules", VOCABULARY, reading.Patience()
+    told = error_recovery.read_repaired(
+        rule, "start", "r.rules", VOCABULARY, error_recovery.RepairBudget()
     ).diagnostics(rule)
     assert len(told) == 60
-    left = reading.Patience(left=4 * len(rule))
-    assert len(reading.with_tried_edits(rule, told, partial(reading.weight, patience=left))) == 60
+    left = error_recovery.RepairBudget(left=4 * len(rule))
+    assert (
+        len(
+            error_recovery.with_tried_edits(rule, told, partial(error_recovery.weight, budget=left))
+        )
+        == 60
+    )
     assert len(looked) <= 10
 
 

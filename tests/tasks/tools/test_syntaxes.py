@@ -11,7 +11,7 @@ import pytest
 from lark import Lark
 
 from tests.paths import ROOT
-from visup.rules.language.reading import grammar as rules_grammar
+from visup.rules.language.error_recovery import grammar as rules_grammar
 from visup.tasks.grammar.parser import tokens
 from visup.tasks.tools.syntaxes import EDITORS, SYNTAXES, Syntax
 

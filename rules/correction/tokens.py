@@ -65,7 +65,7 @@ def terminals_of(parser: Lark) -> Terminals:
     return [Terminal(n, re.compile(p), re.compile(_LOOKAHEAD.sub("", p))) for n, p in patterns]
 
 
-def words_of(text: str, terminals: Terminals, loose: Container[str] = ()) -> Iterator[Word]:
+def tokens_of(text: str, terminals: Terminals, loose: Container[str] = ()) -> Iterator[Word]:
     """The words of a text, without blanks and comments.
 
     Args:

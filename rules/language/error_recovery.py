@@ -16,22 +16,22 @@ from lark import Lark, UnexpectedInput
 from lark.parsers.lalr_parser_state import ParseConf
 
 from visup.agent.model.errors import SourceLocation
-from visup.rules.correction.edits import Repair, edits, hint_of, offset_before
-from visup.rules.correction.loss import KNOWN, LITTLE, loss
-from visup.rules.correction.search import corrections
+from visup.rules.correction.local_edits import Repair, edits, hint_of, offset_before
+from visup.rules.correction.meaning_loss import COMMON_FIX_BONUS, SMALL_LOSS, meaning_lost
+from visup.rules.correction.repair_search import least_cost_repairs
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.rules.language.edit_costs import edit_costs
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.keywords import expected_words, near_word
 from visup.rules.language.repair import (
     MOST_COMPARED,
     MOST_REPAIRS,
     WORDS,
+    common_fixes,
     end_before,
     find_repair,
     place_of,
-    usual_slips,
 )
-from visup.rules.language.spelling import speller
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
@@ -41,7 +41,7 @@ CHARACTERS_TRIED = 200_000
 
 
 @dataclass
-class Patience:
+class RepairBudget:
     """The remaining budget for repairs of a file; counted work, so that messages are reproducible.
 
     Attributes:
@@ -57,7 +57,7 @@ class Patience:
             return _syntax_fault("", "formula")
         return _syntax_fault(text, start)
 
-    def corrections(self, text: str, start: str, since: int) -> Iterator[Repair]:
+    def least_cost_repairs(self, text: str, start: str, since: int) -> Iterator[Repair]:
         """Least-cost corrections of a text from an offset on, while the budget lasts."""
         least = max(0, self.left - MOST_READINGS * READING_COST)
 
@@ -65,7 +65,7 @@ class Patience:
             self.left -= READING_COST
             return self.left > least
 
-        yield from corrections(text, since, speller(_parser(), start, text), may_go_on)
+        yield from least_cost_repairs(text, since, edit_costs(_parser(), start, text), may_go_on)
 
 
 MOST_READINGS = 4000
@@ -130,7 +130,7 @@ class RepairedText:
 
 
 def read_repaired(
-    block: str, start: str, file: str, vocabulary: Vocabulary, patience: Patience
+    block: str, start: str, file: str, vocabulary: Vocabulary, budget: RepairBudget
 ) -> RepairedText:
     """Parse a rule or a formula; errors are reported and repaired, and parsing continues.
 
@@ -139,7 +139,7 @@ def read_repaired(
         start: Start symbol: 'start' for rules, or 'formula'.
         file: Its name, for messages.
         vocabulary: The names it may use.
-        patience: The budget for repairs.
+        budget: The budget for repairs.
     """
     text, repairs, syntax = block, list[Repair](), list[Diagnostic]()
     while True:
@@ -147,13 +147,13 @@ def read_repaired(
         if fault is None:
             break
         repair = None
-        if len(repairs) < MOST_REPAIRS and patience.left >= 0:
+        if len(repairs) < MOST_REPAIRS and budget.left >= 0:
             repair = find_repair(
                 text,
                 fault,
-                lambda t: patience.spend(t, start),
+                lambda t: budget.spend(t, start),
                 lambda t: not _semantic(t, start, file, vocabulary)[1],
-                partial(patience.corrections, text, start),
+                partial(budget.least_cost_repairs, text, start),
             )
         syntax.append(_syntax_error(fault, _Place(block, text, tuple(repairs), file), repair))
         if repair is None:
@@ -207,15 +207,15 @@ def _line_of(text: str, at: int) -> tuple[int, int]:
 
 Weight = tuple[int, int]
 """Badness of a text: 1 and its unparsed length, or 0 and its number of semantic errors."""
-UNTRIED: Weight = (2, 0)
+OUT_OF_BUDGET: Weight = (2, 0)
 SOUND: Weight = (0, 0)
 
 
-def weight(text: str, patience: Patience) -> Weight:
+def weight(text: str, budget: RepairBudget) -> Weight:
     """Badness of a rule's text; the worst once the budget is spent."""
-    patience.left -= len(text)
-    if patience.left < 0:
-        return UNTRIED
+    budget.left -= len(text)
+    if budget.left < 0:
+        return OUT_OF_BUDGET
     try:
         return 0, len(_semantic(text, "start", "", RULES)[1])
     except UnexpectedInput as fault:
@@ -236,15 +236,15 @@ def with_tried_edits(
     """
     diagnostics = list(faults)
     before = weigh(block)
-    if before == UNTRIED:
+    if before == OUT_OF_BUDGET:
         return diagnostics
-    with suppress(_OutOfPatienceError):
+    with suppress(_OutOfBudgetError):
         for n, fault in enumerate(faults[: unread or None]):
             diagnostics[n] = _with_edit(block, fault, before, weigh)
     return diagnostics
 
 
-class _OutOfPatienceError(Exception):
+class _OutOfBudgetError(Exception):
     """The budget is spent: a search for further edits would be slow and in vain."""
 
 
@@ -253,8 +253,8 @@ def _with_edit(
 ) -> Diagnostic:
     def tried(fix: TextFix) -> Weight:
         found = weigh(fix.applied(block))
-        if found == UNTRIED:
-            raise _OutOfPatienceError
+        if found == OUT_OF_BUDGET:
+            raise _OutOfBudgetError
         return found
 
     place = fault.place
@@ -263,7 +263,7 @@ def _with_edit(
     if helps is not None and (helps[0] == 0 or helps <= before):
         return fault
     line, begin, length = place.text, place.column - 1, place.length
-    known = ((repair, KNOWN) for repair in usual_slips(line, begin, length))
+    known = ((repair, COMMON_FIX_BONUS) for repair in common_fixes(line, begin, length))
     others = ((repair, 0.0) for repair in edits(line, begin, length, EDIT_WORDS))
     best, least, fewest = None, (before, inf), MOST_COMPARED
     for repair, granted in (*known, *others):
@@ -272,10 +272,10 @@ def _with_edit(
         found = before if fix is None else tried(fix)
         if fix is None or found >= before:
             continue
-        lost = loss(block, fix.applied(block)) - granted
+        lost = meaning_lost(block, fix.applied(block)) - granted
         best, least = min((best, least), (hint, (found, lost)), key=lambda tried: tried[1])
         fewest -= found == SOUND or before[0] == 0
-        if fewest == 0 or (least[1] <= LITTLE and (found == SOUND or before[0] == 0)):
+        if fewest == 0 or (least[1] <= SMALL_LOSS and (found == SOUND or before[0] == 0)):
             break
     if best is None:
         return fault

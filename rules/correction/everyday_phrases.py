@@ -23,7 +23,7 @@ _SIGNS = {
     "|no less than|not less than|minimum|ge|geq",
     "==": "equals|equal to|same as",
 }
-_JOINTS = {
+_CONNECTIVES = {
     "and": "und|et|y|e|og|och|en|also|plus|but|yet|while|whilst|with|as well as|and also|и",
     "or": "oder|ou|o|of|eller|else|otherwise|alternatively|или",
     "not": "nicht|kein|keine|pas|non|no|nao|não|ikke|isnt|never|не",
@@ -115,13 +115,13 @@ def _by_first_word(
     return MappingProxyType({first: tuple(some) for first, some in found.items()})
 
 
-PHRASES = _by_first_word(_SIGNS, _JOINTS)
+PHRASES = _by_first_word(_SIGNS, _CONNECTIVES)
 
 
-def meant_by(words: Iterable[str]) -> Iterator[tuple[int, str]]:
+def meanings_of(words: Iterable[str]) -> Iterator[tuple[int, str]]:
     """Meanings of the first words: how many of them, and the sign or connective.
 
-    >>> list(meant_by(["at", "least", "20"]))
+    >>> list(meanings_of(["at", "least", "20"]))
     [(2, '>=')]
     """
     said = [w.casefold() for w in words]

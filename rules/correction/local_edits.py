@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from visup.agent.model.did_you_mean import close_matches
-from visup.rules.correction.everyday import NUMBERS
+from visup.rules.correction.everyday_phrases import NUMBERS
 
 TOKEN = re.compile(r"::=|<[^<>\n]*>|\"[^\"\n]*\"|\w+(?:\.\d+)?|[<>=!]=|\S")
 NEAR = 3
@@ -23,7 +23,7 @@ BETWEEN = (")", "(", ",", ">", "<", ":")
 UNITS = ("s", "px", "px/s", "%", "samples")
 ALIKE = 0.7
 _OPERAND = re.compile(r"(?:\w+\([^()]*\)|<[^<>]*>|\b\w+)\s*\Z")
-JOINTS = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
+CONNECTIVES = ("and", "or", "&", "|", "implies", "iff", "xor", ",")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +70,10 @@ def edits(
     tokens = [(m.start(), m.end(), m[0]) for m in TOKEN.finditer(line)]
     # Words are dropped whole.
     end = max([end, *(stop for start, stop, _ in tokens if start < end <= stop)])
-    yield from (Repair(at, at, new) for at, new in _put_in(line, begin, end))
-    tokens.sort(key=lambda t: _away(t, begin, end))
+    yield from (Repair(at, at, new) for at, new in _insertions(line, begin, end))
+    tokens.sort(key=lambda t: _distance(t, begin, end))
     near = tokens[: 2 * NEAR + 1]
-    yield from _moved(line, near, words)
+    yield from _move_words(line, near, words)
     for _, stop, word in tokens:
         if word[:1].isdigit() and begin <= stop <= end:
             yield from (Repair(stop, stop, f" {unit}") for unit in UNITS)
@@ -82,15 +82,15 @@ def edits(
             yield Repair(start, stop, NUMBERS[word])
         if word.isidentifier() and word not in words:
             yield from (Repair(start, stop, meant) for meant in _ranked(word, words))
-    yield from _of_call(line, begin)
+    yield from _call_edits(line, begin)
     for start, _, _ in near if unread else ():
         yield from (Repair(start, start, f"{new} ") for new in BETWEEN)
     yield from (Repair(start, stop, "") for start, stop, _ in near)
-    yield from _fillers(line, near, words)
-    yield from _left_out(line, begin, end, near)
+    yield from _drop_unknown_words(line, near, words)
+    yield from _drop_parts(line, begin, end, near)
 
 
-def _moved(
+def _move_words(
     line: str, near: Iterable[tuple[int, int, str]], words: Sequence[str]
 ) -> Iterator[Repair]:
     """A word of the language before the call or name that it follows."""
@@ -105,7 +105,7 @@ def _ranked(word: str, words: Sequence[str]) -> list[str]:
     return close_matches(word, words, n=5, cutoff=ALIKE) if len(word) > 2 else []
 
 
-def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
+def _insertions(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
     if line[begin:end].endswith(")"):
         yield from ((end - 1, new) for new in WITHIN)
         yield from ((end, new) for new in BEHIND_CALL)
@@ -113,7 +113,7 @@ def _put_in(line: str, begin: int, end: int) -> Iterator[tuple[int, str]]:
         yield from ((end, new) for new in BEHIND_WORD)
 
 
-def _of_call(line: str, begin: int) -> Iterator[Repair]:
+def _call_edits(line: str, begin: int) -> Iterator[Repair]:
     """Drop an argument of a call, or the call around an argument."""
     name = re.compile(r"\w+\s*\(").match(line, begin)
     parts = list(_arguments(line, name.end())) if name else []
@@ -141,11 +141,11 @@ def _arguments(line: str, at: int) -> Iterator[tuple[int, int]]:
             return
 
 
-def _fillers(
+def _drop_unknown_words(
     line: str, near: Iterable[tuple[int, int, str]], words: Sequence[str]
 ) -> Iterator[Repair]:
     """Drop several unknown words in a row, or replace them by a connective."""
-    known, run = {*words, *JOINTS}, r"[A-Za-z_]\w*(?:[ ]+[A-Za-z_]\w*)+(?![\w(])"
+    known, run = {*words, *CONNECTIVES}, r"[A-Za-z_]\w*(?:[ ]+[A-Za-z_]\w*)+(?![\w(])"
     places = {start for start, _, _ in near}
     for found in re.finditer(run, line):
         some = [m for m in re.finditer(r"\w+", found[0]) if m[0] not in known]
@@ -155,11 +155,11 @@ def _fillers(
             yield from (Repair(begin, end, new) for new in (("", "and", "&") if joins else ("",)))
 
 
-def _left_out(
+def _drop_parts(
     line: str, begin: int, end: int, near: Iterable[tuple[int, int, str]]
 ) -> Iterator[Repair]:
     """Drop the error with its connective, then everything from a nearby word to the end of the line."""
-    joints = "|".join(rf"\b{j}\b" if j.isalpha() else re.escape(j) for j in JOINTS)
+    joints = "|".join(rf"\b{j}\b" if j.isalpha() else re.escape(j) for j in CONNECTIVES)
     before = re.search(rf"(?:{joints})\s*$", line[:begin])
     after = re.compile(rf"\s*(?:{joints})\s*").match(line, end)
     if before is not None:
@@ -167,14 +167,14 @@ def _left_out(
     if after is not None:
         yield Repair(begin, after.end(), "")
     yield Repair(begin, end, "")
-    yield from _clause(line, begin, end, joints)
+    yield from _drop_clause(line, begin, end, joints)
     last = len(line.rstrip())
     for start, _, _ in sorted(near, key=lambda t: -t[0]):
         if start < last:
             yield Repair(start, last, "")
 
 
-def _clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
+def _drop_clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
     """Drop the clause between the connectives around an error, with one of them."""
     before = list(re.finditer(joints, line[:begin]))
     after = re.compile(joints).search(line, end)
@@ -185,7 +185,7 @@ def _clause(line: str, begin: int, end: int, joints: str) -> Iterator[Repair]:
         yield Repair(before[-1].end() + 1 if before else begin, after.end() + 1, "")
 
 
-def _away(token: tuple[int, int, str], begin: int, end: int) -> int:
+def _distance(token: tuple[int, int, str], begin: int, end: int) -> int:
     """Distance of a word from the error; 0 inside it."""
     start, stop, _ = token
     return max(0, start - end + 1, begin - stop + 1)

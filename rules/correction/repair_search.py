@@ -14,23 +14,23 @@ from itertools import count, islice, product
 from typing import NamedTuple
 
 from visup.rules.correction.automaton import END, LrAutomaton, Stack
-from visup.rules.correction.edits import Repair
-from visup.rules.correction.words import Terminals, Word, words_of
+from visup.rules.correction.local_edits import Repair
+from visup.rules.correction.tokens import Terminals, Word, tokens_of
 
-MOST_PUT_IN_A_ROW = 4
+MOST_INSERTIONS_IN_A_ROW = 4
 SPELLINGS_TRIED = 8
 """Most spellings tried of one correction, where an inserted unit or name may be one of several."""
-ALIKE = 8
+MOST_EQUIVALENT = 8
 """Most parses followed with the same continuation: a bracket may be missing in several places.
 """
-NEARLY = 0.1
+NEAR_TERMINAL_COST = 0.1
 """Cost of reading a word as the terminal it would be if other words followed."""
 _NO_BLANK_BEFORE = (",", ")", "]", ":", "?", "*", "+", "..")
 _NO_BLANK_AFTER = ("(", "[")
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
+class Replacement:
     """A possible meaning of words that the language does not allow there.
 
     Attributes:
@@ -47,24 +47,24 @@ class Meaning:
 
 
 @dataclass(frozen=True)
-class Speller:
+class EditCosts:
     """Edit costs of a language.
 
     Attributes:
         automaton: Automaton of its grammar.
         terminals: Terminals of its grammar.
-        put: Terminal -> cost of inserting it, and its spellings; no others are inserted.
-        drop: Cost of dropping a word.
-        meant: Possible meanings of the words from an index on.
-        loose: Terminals so general that they do not split words.
+        insertions: Terminal -> cost of inserting it, and its spellings; no others are inserted.
+        drop_cost: Cost of dropping a word.
+        replacements: Possible meanings of the words from an index on.
+        general: Terminals so general that they do not split words.
     """
 
     automaton: LrAutomaton
     terminals: Terminals
-    put: Mapping[str, tuple[float, tuple[str, ...]]]
-    drop: Callable[[Word], float]
-    meant: Callable[[Sequence[Word], int], Sequence[Meaning]]
-    loose: Container[str] = ()
+    insertions: Mapping[str, tuple[float, tuple[str, ...]]]
+    drop_cost: Callable[[Word], float]
+    replacements: Callable[[Sequence[Word], int], Sequence[Replacement]]
+    general: Container[str] = ()
 
 
 class _Change(NamedTuple):
@@ -79,8 +79,8 @@ class _Change(NamedTuple):
     before: _Change | None
 
 
-def corrections(
-    text: str, since: int, speller: Speller, may_go_on: Callable[[], bool]
+def least_cost_repairs(
+    text: str, since: int, speller: EditCosts, may_go_on: Callable[[], bool]
 ) -> Iterator[Repair]:
     """Corrections of a text, cheapest first; none if the search takes too long.
 
@@ -90,7 +90,7 @@ def corrections(
         speller: Edit costs of its language.
         may_go_on: Called before each explored configuration; stops the search when false.
     """
-    words = list(words_of(text, speller.terminals, speller.loose))
+    words = list(tokens_of(text, speller.terminals, speller.general))
     for last in _Search(words, since, speller, may_go_on).found():
         changes = list(_in_order(last))
         choices = product(*(c.texts or ("",) for c in changes))
@@ -102,19 +102,19 @@ class _Search:
     """Best-first search over parses of some words, by the cost of their edits."""
 
     def __init__(
-        self, words: list[Word], since: int, speller: Speller, may_go_on: Callable[[], bool]
+        self, words: list[Word], since: int, speller: EditCosts, may_go_on: Callable[[], bool]
     ) -> None:
         self.words, self.speller, self.may_go_on = words, speller, may_go_on
         self.since = sum(w.begin < since for w in words)
         self.heap: list[tuple[float, int, int, Stack, _Change | None, int]] = []
         self.costs: dict[tuple[int, Stack, int], list[float]] = {}
-        self.meanings: dict[int, Sequence[Meaning]] = {}
-        self.offered: dict[Stack, list[tuple[float, tuple[str, ...], Stack]]] = {}
+        self.meanings: dict[int, Sequence[Replacement]] = {}
+        self.acceptable: dict[Stack, list[tuple[float, tuple[str, ...], Stack]]] = {}
         self.order = count()
 
     def found(self) -> Iterator[_Change | None]:
         """The edits of each complete parse, linked from the last."""
-        self.push(0.0, 0, (self.speller.automaton.first,), None, 0)
+        self.push(0.0, 0, (self.speller.automaton.initial,), None, 0)
         while self.heap and self.may_go_on():
             cost, behind, _, stack, change, put = heappop(self.heap)
             at = -behind
@@ -128,9 +128,9 @@ class _Search:
     def push(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
         """Queue a configuration, unless enough equivalent ones at no higher cost are queued."""
         costs = self.costs.setdefault((at, stack, put), [])
-        if len(costs) < ALIKE or cost < costs[-1]:
+        if len(costs) < MOST_EQUIVALENT or cost < costs[-1]:
             insort(costs, cost)
-            del costs[ALIKE:]
+            del costs[MOST_EQUIVALENT:]
             heappush(self.heap, (cost, -at, next(self.order), stack, change, put))
 
     def read_on(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
@@ -146,17 +146,17 @@ class _Search:
         for terminal in self.words[at].nearly:
             after = step(stack, terminal)
             if after is not None:
-                self.push(cost + NEARLY, at + 1, after, change, 0)
+                self.push(cost + NEAR_TERMINAL_COST, at + 1, after, change, 0)
         for meant in self.meant_at(at) if at >= self.since else ():
             after = self.steps(stack, meant.terminals)
             if after is not None:
                 new = _Change(at, meant.words, (meant.text,), change)
                 self.push(cost + meant.cost, at + meant.words, after, new, 0)
 
-    def meant_at(self, at: int) -> Sequence[Meaning]:
+    def meant_at(self, at: int) -> Sequence[Replacement]:
         """Possible meanings of the words from an index on."""
         if at not in self.meanings:
-            self.meanings[at] = self.speller.meant(self.words, at)
+            self.meanings[at] = self.speller.replacements(self.words, at)
         return self.meanings[at]
 
     def steps(self, stack: Stack, terminals: Iterable[str]) -> Stack | None:
@@ -168,18 +168,18 @@ class _Search:
 
     def put_in(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
         """Insert each word that may precede the next one."""
-        if put >= MOST_PUT_IN_A_ROW:
+        if put >= MOST_INSERTIONS_IN_A_ROW:
             return
-        offered = self.offered.get(stack)
+        offered = self.acceptable.get(stack)
         if offered is None:
-            offered = self.offered[stack] = list(self.offers(stack))
+            offered = self.acceptable[stack] = list(self.offers(stack))
         for price, texts, after in offered:
             self.push(cost + price, at, after, _Change(at, 0, texts, change), put + 1)
 
     def offers(self, stack: Stack) -> Iterator[tuple[float, tuple[str, ...], Stack]]:
         """Possible insertions: cost, spellings, and the resulting stack."""
-        for terminal in self.speller.automaton.offered(stack):
-            price, texts = self.speller.put.get(terminal, (0.0, ()))
+        for terminal in self.speller.automaton.acceptable(stack):
+            price, texts = self.speller.insertions.get(terminal, (0.0, ()))
             after = self.speller.automaton.step(stack, terminal) if texts else None
             if after is not None:
                 yield price, texts, after
@@ -187,7 +187,7 @@ class _Search:
     def leave_out(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
         """Drop the next word; earlier insertions commute with it."""
         if at < len(self.words):
-            price = self.speller.drop(self.words[at])
+            price = self.speller.drop_cost(self.words[at])
             self.push(cost + price, at + 1, stack, _Change(at, 1, (), change), 0)
 
 

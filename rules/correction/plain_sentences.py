@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sequence
 
-from visup.rules.correction.everyday import FILLERS
+from visup.rules.correction.everyday_phrases import FILLERS
 
 LONGEST = 9
 """Most words of a sentence, including fillers."""

@@ -10,11 +10,11 @@ from types import MappingProxyType
 from visup.agent.model.did_you_mean import close_matches, closest
 from visup.agent.model.errors import SourceLocation
 from visup.rules.correction.automaton import LrAutomaton
-from visup.rules.correction.edits import TOKEN, Repair
-from visup.rules.correction.everyday import FILLERS, meant_by
-from visup.rules.correction.search import Meaning, Speller, corrections
-from visup.rules.correction.sentences import LONGEST, called, sentences, terminals_of_call
-from visup.rules.correction.words import Terminals, Word, terminals_of
+from visup.rules.correction.everyday_phrases import FILLERS, meanings_of
+from visup.rules.correction.local_edits import TOKEN, Repair
+from visup.rules.correction.plain_sentences import LONGEST, called, sentences, terminals_of_call
+from visup.rules.correction.repair_search import EditCosts, Replacement, least_cost_repairs
+from visup.rules.correction.tokens import Terminals, Word, terminals_of
 from visup.rules.formula.units import UNITS_MEANT
 from visup.rules.language.diagnostics import Source
 from visup.rules.language.fixes import fix_of
@@ -28,7 +28,7 @@ from visup.tasks.grammar.statement import NAME, PARAMETERS, StatementText
 
 SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
 """Cost of replacing a word: by one that differs in case; by a synonym; by one of similar spelling."""
-NOISE, PLAIN, KNOWN = 0.2, 0.7, 2.5
+NOISE_COST, WORD_COST, KNOWN_COST = 0.2, 0.7, 2.5
 """Cost of deleting a filler word, an unknown word, and a known one."""
 LONGEST_NAME = 4
 """Maximum number of words that may be meant as one name."""
@@ -65,7 +65,7 @@ _LASTING = {"bigger": "larger", "longer": "larger", "taller": "larger", "shorter
 _CALLS = re.compile(rf"({NAME})\s*\(([^()<>]*)\)")
 
 
-def speller(text: str) -> Speller:
+def speller(text: str) -> EditCosts:
     """The speller for a task file.
 
     Args:
@@ -76,7 +76,7 @@ def speller(text: str) -> Speller:
     stages = frozenset(re.findall(rf"<\s*({NAME})\s*>\s*:", text))
     put = {**_put(), "NAME": (2.2, (*actors[:3], "other"))}
     meanings = _Meanings(stages)
-    return Speller(
+    return EditCosts(
         _automaton(), _terminals(), put, _drops({*actors, *stages}), meanings, ("MODEL",)
     )
 
@@ -113,14 +113,14 @@ def _drops(names: set[str]) -> Callable[[Word], float]:
 
     def drop(word: Word) -> float:
         if word.text in known or word.text[0] in '<"':
-            return KNOWN
+            return KNOWN_COST
         if word.text.casefold() in FILLERS or word.text in (";", ".", "->", "then", "next", "by"):
-            return NOISE
+            return NOISE_COST
         if not word.text[0].isalnum():
             return 0.3 if not word.terminals else 1.0
         if word.text[0].isdigit():
             return 2.0
-        return 1.6 if word.text in KEYWORDS else PLAIN
+        return 1.6 if word.text in KEYWORDS else WORD_COST
 
     return drop
 
@@ -200,34 +200,36 @@ class _Meanings:
         self.stages = stages
         self.names = _Things()
 
-    def __call__(self, words: Sequence[Word], at: int) -> list[Meaning]:
+    def __call__(self, words: Sequence[Word], at: int) -> list[Replacement]:
         """See `Speller.meant`."""
         said = [w.text for w in words[at : at + LONGEST]]
         found = [
-            Meaning(length, (terminal,), meant, cost)
+            Replacement(length, (terminal,), meant, cost)
             for length, meant, cost in self.of(said[:LONGEST_NAME], at == 0)
             for terminal in (("NAME",) if meant.endswith("_1") else _kinds(meant))
         ]
         for length, call in sentences(said, self.names, _verb):
-            found.append(Meaning(length, terminals_of_call(len(call) - 1), called(call), LIKELY))
+            found.append(
+                Replacement(length, terminals_of_call(len(call) - 1), called(call), LIKELY)
+            )
         if said[0] in self.names and len(said) > 1 and said[1] in ("<", ">", "<=", ">="):
             read = ("SIGNAL", "LPAR", "NAME", "RPAR")
-            found.append(Meaning(1, read, f"signal({said[0]})", GUESS))
+            found.append(Replacement(1, read, f"signal({said[0]})", GUESS))
         if said[0] == "<" and (ref := _REFERENCE.match(" ".join(said))):
             found.append(
-                Meaning(ref[0].count(" ") + 1, ("STAGE",), f"<{_stage_name(ref[1])}>", LIKELY)
+                Replacement(ref[0].count(" ") + 1, ("STAGE",), f"<{_stage_name(ref[1])}>", LIKELY)
             )
         if at == 0 and _STAGE.fullmatch(said[0]):
-            found.append(Meaning(1, ("HEAD",), f"{said[0]} ::=", LIKELY))
+            found.append(Replacement(1, ("HEAD",), f"{said[0]} ::=", LIKELY))
         if at == 0 and (head := _head_of(said)) is not None:
-            found.append(Meaning(head[0], ("HEAD",), f"<{head[1]}> ::=", LIKELY))
+            found.append(Replacement(head[0], ("HEAD",), f"<{head[1]}> ::=", LIKELY))
         return found
 
     def of(self, said: Sequence[str], first: bool) -> Iterator[tuple[int, str, float]]:
         """(Number of words, meaning, cost) of the first words."""
         word, called = said[0], len(said) > 1 and said[1] == "("
         low = word.casefold()
-        for length, meant in meant_by(said):
+        for length, meant in meanings_of(said):
             if not (called and length == 1):
                 yield length, meant, LIKELY
                 yield from ((length, s, GUESS) for s in _IN_COURSES.get(meant, ()))
@@ -307,7 +309,7 @@ def corrected(text: str, place: SourceLocation, may_go_on: Callable[[], bool]) -
     if chunk is None or len(chunk.raw) > LONGEST_STATEMENT:
         return
     begin = _offset(text, chunk.line, chunk.column)
-    for repair in corrections(chunk.raw, 0, speller(cleaned), may_go_on):
+    for repair in least_cost_repairs(chunk.raw, 0, speller(cleaned), may_go_on):
         hint = said(text, place, Repair(repair.begin + begin, repair.end + begin, repair.new))
         if hint is not None:
             yield hint

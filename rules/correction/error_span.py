@@ -15,7 +15,7 @@ Span = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Culprit:
+class ErrorSpan:
     """What of a text is wrong, by a change that mends it.
 
     Attributes:
@@ -27,7 +27,7 @@ class Culprit:
     shown: Span
 
 
-def culprit(text: str, begin: int, end: int, new: str) -> Culprit | None:
+def error_span(text: str, begin: int, end: int, new: str) -> ErrorSpan | None:
     """The words of a text that a change is about; None if only blanks are changed.
 
     Args:
@@ -36,10 +36,10 @@ def culprit(text: str, begin: int, end: int, new: str) -> Culprit | None:
         end: Offset of its end.
         new: What is put in its place.
 
-    >>> culprit("speed(a) < 3 m/s", 0, 16, "speed(a) < 3 px/s")
-    Culprit(words=((13, 16),), shown=(13, 16))
-    >>> culprit("gap(a b) < 3 px", 0, 8, "gap(a, b)")
-    Culprit(words=((4, 5), (6, 7)), shown=(4, 5))
+    >>> error_span("speed(a) < 3 m/s", 0, 16, "speed(a) < 3 px/s")
+    ErrorSpan(words=((13, 16),), shown=(13, 16))
+    >>> error_span("gap(a b) < 3 px", 0, 8, "gap(a, b)")
+    ErrorSpan(words=((4, 5), (6, 7)), shown=(4, 5))
     """
     begin, end, new = _with_neighbours(text, begin, end, new)
     found = list(_changed(text, begin, end, new))
@@ -49,7 +49,7 @@ def culprit(text: str, begin: int, end: int, new: str) -> Culprit | None:
     stop = text.find("\n", first)
     last = max(end for *_, (start, end) in found if stop < 0 or start < stop)
     words = tuple(span for *some, _ in found for span in some)
-    return Culprit(words, (first, last if stop < 0 else min(last, stop)))
+    return ErrorSpan(words, (first, last if stop < 0 else min(last, stop)))
 
 
 def _with_neighbours(text: str, begin: int, end: int, new: str) -> tuple[int, int, str]:
@@ -76,12 +76,12 @@ def _changed(text: str, begin: int, end: int, new: str) -> Iterator[list[Span]]:
     old, put = [text[s:e] for s, e in spans], _TOKEN.findall(new)
     for kind, a, b, c, _ in SequenceMatcher(None, old, put, autojunk=False).get_opcodes():
         if kind == "insert":
-            yield [*spans[max(a - 1, 0) : a + 1], _beside(text, spans, a, put[c])]
+            yield [*spans[max(a - 1, 0) : a + 1], _neighbour_shown(text, spans, a, put[c])]
         elif kind != "equal":
             yield [(spans[a][0], spans[b - 1][1])] * 2
 
 
-def _beside(text: str, spans: list[Span], at: int, put: str) -> Span:
+def _neighbour_shown(text: str, spans: list[Span], at: int, put: str) -> Span:
     """The word after which a bracket, a sign or a unit is missing, else the one before which something is."""
     if at == 0:
         return spans[0]

@@ -11,10 +11,10 @@ from lark import Lark
 
 from visup.agent.model.did_you_mean import close_matches, closest
 from visup.rules.correction.automaton import LrAutomaton
-from visup.rules.correction.everyday import FILLERS, meant_by
-from visup.rules.correction.search import Meaning, Speller
-from visup.rules.correction.sentences import LONGEST, called, sentences, terminals_of_call
-from visup.rules.correction.words import Word, terminals_of
+from visup.rules.correction.everyday_phrases import FILLERS, meanings_of
+from visup.rules.correction.plain_sentences import LONGEST, called, sentences, terminals_of_call
+from visup.rules.correction.repair_search import EditCosts, Replacement
+from visup.rules.correction.tokens import Word, terminals_of
 from visup.rules.formula.units import UNITS_MEANT, Unit
 from visup.rules.language.keywords import FUNCTIONS, KEYWORDS
 from visup.rules.language.synonyms import synonym
@@ -22,7 +22,7 @@ from visup.rules.predicates.vocabulary import RULES
 
 SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
 """Cost of replacing a word: by one that differs in case; by a synonym; by one spelt similarly."""
-NOISE, PLAIN, KNOWN = 0.2, 0.7, 2.5
+NOISE_COST, WORD_COST, KNOWN_COST = 0.2, 0.7, 2.5
 """Cost of dropping a filler word, an unknown word, and a known word."""
 LONGEST_NAME = 4
 """Most words joined to one name, such as `time to contact` for `time_to_contact`."""
@@ -60,7 +60,7 @@ _UNITS = tuple(u for u in Unit if u)
 _VOCABULARY = (*RULES.words, *RULES.quantities, *FUNCTIONS)
 
 
-def speller(parser: Lark, start: str, text: str) -> Speller:
+def edit_costs(parser: Lark, start: str, text: str) -> EditCosts:
     """The edit costs for a text of rules.
 
     Args:
@@ -76,7 +76,7 @@ def speller(parser: Lark, start: str, text: str) -> Speller:
     put["STRING"] = (2.0, (f'"{said or plain}"', f'"{plain}"'))
     put["NAME"] = (2.2, (*variables[:3], *lacking) or ("a",))
     meant = partial(_meant, variables, lacking)
-    return Speller(_automaton(parser, start), terminals_of(parser), put, _drops(variables), meant)
+    return EditCosts(_automaton(parser, start), terminals_of(parser), put, _drops(variables), meant)
 
 
 def variables_of(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -104,11 +104,11 @@ def _drops(variables: Sequence[str]) -> Callable[[Word], float]:
 
     def drop(word: Word) -> float:
         if word.text.casefold() in FILLERS and word.text not in known:
-            return NOISE
+            return NOISE_COST
         if not word.terminals:
-            return NOISE if len(word.text) == 1 else PLAIN
+            return NOISE_COST if len(word.text) == 1 else WORD_COST
         if word.terminals[0] == "NAME":
-            return KNOWN if word.text in known else PLAIN
+            return KNOWN_COST if word.text in known else WORD_COST
         return COST_OF_LEAVING_OUT.get(word.terminals[0], 1.6)
 
     return drop
@@ -127,20 +127,20 @@ COST_OF_LEAVING_OUT: Mapping[str, float] = MappingProxyType(
 
 def _meant(
     variables: Sequence[str], lacking: Sequence[str], words: Sequence[Word], at: int
-) -> list[Meaning]:
+) -> list[Replacement]:
     said = [w.text for w in words[at : at + LONGEST]]
     found = [
-        Meaning(n, terminals_of_call(len(call) - 1), called(call), LIKELY)
+        Replacement(n, terminals_of_call(len(call) - 1), called(call), LIKELY)
         for n, call in sentences(said, variables, _verb)
     ]
     head = _head_meant([w.text for w in words[:LONGEST_HEAD]], variables) if at == 0 else None
     found += _calls_meant(said, variables)
     if words[at].text in KEYWORDS and all(w.text != "when" for w in words[:at]):
-        found += [Meaning(1, ("NAME",), name, LIKELY) for name in lacking]
+        found += [Replacement(1, ("NAME",), name, LIKELY) for name in lacking]
     return [*_meanings(words, at), *found, *([head] if head else [])]
 
 
-def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Meaning]:
+def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Replacement]:
     """Calls written as words without brackets, or missing before what follows."""
     first, follows = said[0], said[1] if len(said) > 1 else ""
     if first in _TAKES and follows != "(":
@@ -149,17 +149,17 @@ def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Mean
         for words in (given, list(variables)):
             if takes and len(words) >= len(takes):
                 call, read = (first, *words[: len(takes)]), len(takes) if words is given else 0
-                yield Meaning(1 + read, terminals_of_call(len(takes)), called(call), LIKELY)
+                yield Replacement(1 + read, terminals_of_call(len(takes)), called(call), LIKELY)
     if first.isidentifier() and first not in _TAKES and follows in ("<", ">", "<=", ">="):
-        yield Meaning(1, terminals_of_call(1), f"signal({first})", GUESS)
+        yield Replacement(1, terminals_of_call(1), f"signal({first})", GUESS)
     if first in ("say", "hold", "cooldown", "unless") and variables:
         call = ("touching", *variables[:2]) if len(variables) > 1 else ("seen", *variables)
-        yield Meaning(
+        yield Replacement(
             0, ("WHEN", *terminals_of_call(len(call) - 1)), f"when {called(call)}", 2 * GUESS
         )
 
 
-def _head_meant(said: Sequence[str], variables: Sequence[str]) -> Meaning | None:
+def _head_meant(said: Sequence[str], variables: Sequence[str]) -> Replacement | None:
     """The head of a rule, from the words before `when`: a name, the used variables, the severity."""
     ends = (n for n, w in enumerate(said) if w.casefold() in _WHEN)
     before = said[: next(ends, 0)]
@@ -172,7 +172,7 @@ def _head_meant(said: Sequence[str], variables: Sequence[str]) -> Meaning | None
         return None
     name = f"{name}_1" if name in KEYWORDS else name
     terminals = ("RULE", *terminals_of_call(len(variables)), "COLON", "SEVERITY")
-    return Meaning(
+    return Replacement(
         len(before), terminals, f"rule {name}({', '.join(variables)}): {severity}", 2 * GUESS
     )
 
@@ -226,53 +226,53 @@ _RELATIONS = [
 ]
 
 
-def _meanings(words: Sequence[Word], at: int) -> Iterator[Meaning]:
+def _meanings(words: Sequence[Word], at: int) -> Iterator[Replacement]:
     """Possible meanings of the words from an index on."""
     said = [w.text for w in words[at : at + LONGEST_NAME]]
     first, called = said[0], len(said) > 1 and said[1] == "("
-    for length, meant in meant_by(said):
+    for length, meant in meanings_of(said):
         if meant.casefold() != first.casefold() or length > 1:
-            yield Meaning(length, (_terminal(meant),), meant, LIKELY)
+            yield Replacement(length, (_terminal(meant),), meant, LIKELY)
     if at and words[at - 1].text[0].isdigit():
         units = close_matches(first.casefold(), _UNITS, n=2, cutoff=0.5)
         yield from (
-            Meaning(1, ("UNIT",), unit, GUESS)
+            Replacement(1, ("UNIT",), unit, GUESS)
             for unit in units
             if words[at].terminals[:1] != ("UNIT",)
         )
     if first.casefold() in UNITS_MEANT:
-        yield Meaning(1, ("UNIT",), UNITS_MEANT[first.casefold()], LIKELY)
+        yield Replacement(1, ("UNIT",), UNITS_MEANT[first.casefold()], LIKELY)
     yield from _signs_meant(first)
     if first in TEMPORAL and len(said) > 1 and said[1] in "[(":
-        yield Meaning(1, (_terminal(TEMPORAL[first]),), TEMPORAL[first], LIKELY)
+        yield Replacement(1, (_terminal(TEMPORAL[first]),), TEMPORAL[first], LIKELY)
     if not first[0].isalpha():
         return
     for length in range(2, len(said) + 1):
         joined = "_".join(said[:length]).replace("_-_", "_")
         if joined in _VOCABULARY:
-            yield Meaning(length, ("NAME",), joined, LIKELY)
+            yield Replacement(length, ("NAME",), joined, LIKELY)
     if first in KEYWORDS:
         if called or (len(said) > 1 and said[1] in ",)"):
-            yield Meaning(1, ("NAME",), f"{first}_1", GUESS)
+            yield Replacement(1, ("NAME",), f"{first}_1", GUESS)
     elif first.casefold() in KEYWORDS:
-        yield Meaning(1, (_terminal(first.casefold()),), first.casefold(), SURE)
+        yield Replacement(1, (_terminal(first.casefold()),), first.casefold(), SURE)
     elif not called and first not in _VOCABULARY and (near := closest(first, KEYWORDS, 0.7)):
-        yield Meaning(1, (_terminal(near),), near, GUESS)
+        yield Replacement(1, (_terminal(near),), near, GUESS)
     if called and first not in _VOCABULARY:
         named = synonym(first, _VOCABULARY) or closest(first, _VOCABULARY)
         if named is not None:
-            yield Meaning(1, ("NAME",), named, LIKELY)
+            yield Replacement(1, ("NAME",), named, LIKELY)
 
 
-def _signs_meant(first: str) -> Iterator[Meaning]:
+def _signs_meant(first: str) -> Iterator[Replacement]:
     """Possible meanings of signs, and of the small words of `let`."""
     if first in (",", ":", "-", "to"):
-        yield Meaning(1, ("__ANON_0",), "..", LIKELY)
+        yield Replacement(1, ("__ANON_0",), "..", LIKELY)
     if first in _LET:
-        yield Meaning(1, (_LET[first].upper(),), _LET[first], GUESS)
+        yield Replacement(1, (_LET[first].upper(),), _LET[first], GUESS)
     if first in _BRACKETS:
         terminal, bracket, cost = _BRACKETS[first]
-        yield Meaning(1, (terminal,), bracket, cost)
+        yield Replacement(1, (terminal,), bracket, cost)
 
 
 TEMPORAL: Mapping[str, str] = MappingProxyType(

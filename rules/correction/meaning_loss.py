@@ -9,48 +9,48 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-from visup.rules.correction.everyday import FILLERS
+from visup.rules.correction.everyday_phrases import FILLERS
 
-KNOWN = 1.75
+COMMON_FIX_BONUS = 1.75
 """What a usual meaning may lose more than an edit of which nothing is known but that it is legal."""
 
 _CONTENT = re.compile(r"\d+(?:\.\d+)?|[^\W\d_]+|[|]")
 NUMBER_WEIGHT = 2
 """A number is seldom said in other words."""
-REPLACED = 0.5
-TURNING_WEIGHT = 3
+REPLACED_WEIGHT = 0.5
+NEGATING_WEIGHT = 3
 """Without them a text says the contrary, or the same of another time; or they begin a statement."""
-TURNING = frozenset(
+NEGATING = frozenset(
     (
         *("not", "never", "already", "optional", "another", "unless", "eventually", "henceforth"),
         *("once", "previous", "since", "until", "always", "actor", "bystander", "zone", "ground"),
         *("parameter", "task", "include", "part"),
     )
 )
-MADE_UP = 0.25
+ADDED_WEIGHT = 0.25
 """Putting a word in is better than leaving one out, and worse than a sign alone."""
-LITTLE = 0.75
+SMALL_LOSS = 0.75
 """Loss up to which a change is taken without looking for another: a word replaced, or three put in."""
 
 
-def loss(before: str, after: str) -> float:
+def meaning_lost(before: str, after: str) -> float:
     """What of a text is lost in another.
 
-    >>> loss("touching(a, b) within 5 frames", "touching(a, b) within 5 s")
+    >>> meaning_lost("touching(a, b) within 5 frames", "touching(a, b) within 5 s")
     0.5
-    >>> loss("pick and place", "pick_and_place")
+    >>> meaning_lost("pick and place", "pick_and_place")
     0.0
-    >>> loss("touching(a, b) within 5 frames", "touching(a, b)")
+    >>> meaning_lost("touching(a, b) within 5 frames", "touching(a, b)")
     4.0
-    >>> loss("hidden(a) not", "not hidden(a)"), loss("hidden(a) not", "hidden(a)")
+    >>> meaning_lost("hidden(a) not", "not hidden(a)"), meaning_lost("hidden(a) not", "hidden(a)")
     (0.0, 3.0)
     """
     old, new = _content(before), _content(after)
     lost, made_up = old - new, Counter(set((new - old).elements()))
-    turned = TURNING_WEIGHT * _turning(lost) + _turning(made_up)
+    turned = NEGATING_WEIGHT * _negating(lost) + _negating(made_up)
     left_out, put_in = _weight(lost), _weight(made_up)
     replaced = min(left_out, put_in)
-    return turned + left_out - (1 - REPLACED) * replaced + MADE_UP * (put_in - replaced)
+    return turned + left_out - (1 - REPLACED_WEIGHT) * replaced + ADDED_WEIGHT * (put_in - replaced)
 
 
 def _content(text: str) -> Counter[str]:
@@ -61,9 +61,9 @@ def _content(text: str) -> Counter[str]:
 
 
 def _weight(words: Counter[str]) -> float:
-    some = ((w, n) for w, n in words.items() if w not in TURNING)
+    some = ((w, n) for w, n in words.items() if w not in NEGATING)
     return sum(n * (NUMBER_WEIGHT if w[0].isdigit() else 1) for w, n in some)
 
 
-def _turning(words: Counter[str]) -> int:
-    return sum(n for w, n in words.items() if w in TURNING)
+def _negating(words: Counter[str]) -> int:
+    return sum(n for w, n in words.items() if w in NEGATING)
