@@ -42,12 +42,12 @@ def test_a_folder_without_missions_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_rendered_mission_is_scored_end_to_end(tmp_path: Path) -> None:
-    """Truth from the renderer, the clip cut to its first seconds, every other frame, the demo's database."""
+    """Truth from the renderer, the clip cut to its first seconds, every fourth frame, the demo's database."""
     from visup.render.output.writer import write_mission
     from visup.render.scenario.library import shipped_scenario
 
     scenario = shipped_scenario("sts87")
-    camera = scenario.camera.model_copy(update={"fps": scenario.camera.fps / 2})
+    camera = scenario.camera.model_copy(update={"fps": scenario.camera.fps / 4})
     short = scenario.model_copy(update={"duration_s": 3.6, "camera": camera})
     write_mission(short.resized((320, 240)), tmp_path / "mission")
     figures = evaluate_missions(

@@ -152,7 +152,10 @@ def test_sequences_are_scored_by_folds_and_kept(tmp_path: Path) -> None:
     assert again["total"]["J"] == 0.5
 
 
-def test_a_change_is_compared_with_figures_of_before(tmp_path: Path) -> None:
+def test_a_change_is_compared_with_figures_of_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 1)  # no processes for these few frames
     sequences(tmp_path / "set")
     cache = ["--cache", str(tmp_path / "kept"), "--limit", "6"]
     words = ["motion", str(tmp_path / "set"), "--folds", "2", *cache]

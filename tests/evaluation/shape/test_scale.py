@@ -126,7 +126,7 @@ def test_noise_moves_a_contour_by_about_as_much_as_asked() -> None:
 def test_growth_is_measured(tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh", reason="views of meshes need the extra 'render'")
     trimesh.creation.box(extents=(1, 2, 3)).export(tmp_path / "box.ply")
-    figures = evaluate_scale(tmp_path, most=200)
+    figures = evaluate_scale(tmp_path, most=200, jobs=1)
     first, second, largest = figures["items"].values()
     assert first["lost"] == 0.0
     assert 0.0 <= second["lost"] <= 0.5

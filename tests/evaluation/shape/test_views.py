@@ -117,7 +117,7 @@ def test_turning_turns_clockwise() -> None:
     assert thickness[rows[-8:]].mean() > 2 * thickness[rows[:8]].mean()
 
 
-def test_figures_of_plain_solids(tmp_path: Path) -> None:
+def test_figures_of_plain_solids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A ball, a rod and a plate are told apart; each figure is where the data's README says."""
     pytest.importorskip("mahotas", reason="the extra visup[eval] is not installed")
     from visup.evaluation.shape.view_recognition import evaluate_views
@@ -130,6 +130,9 @@ def test_figures_of_plain_solids(tmp_path: Path) -> None:
         ),
     }.items():
         solid.export(tmp_path / f"{name}.ply")
+    monkeypatch.setattr(
+        "os.cpu_count", lambda: 1
+    )  # processes take longer to start than these views
     figures = evaluate_views(tmp_path, views=8, queries=3, seed=1)
     total = figures["total"]
     assert set(figures["items"]) == {"ball", "rod", "cross"}

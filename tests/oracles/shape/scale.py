@@ -49,6 +49,7 @@ def evaluate_scale(
     *,
     most: int = 100_000,
     seed: int = 0,
+    jobs: int = 2,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure databases of a folder's meshes, as they are, ten times as large, and as large as asked.
@@ -57,6 +58,7 @@ def evaluate_scale(
         folder: Meshes, `*.ply`.
         most: Views of the largest database.
         seed: Of the deformations and of the queries.
+        jobs: Processes that build the database of the meshes.
         progress: Shows what is being done.
 
     Returns:
@@ -77,7 +79,7 @@ def evaluate_scale(
     with tempfile.TemporaryDirectory() as scratch:
         progress(f"{len(meshes)} meshes")
         begin = time.perf_counter()
-        base = build_database(Path(scratch) / "base.db", meshes, views=VIEWS_OF_A_MESH, jobs=2)
+        base = build_database(Path(scratch) / "base.db", meshes, views=VIEWS_OF_A_MESH, jobs=jobs)
         rate = len(base.views) / (time.perf_counter() - begin)
         masks = Path(scratch) / "masks.npz"
         np.savez_compressed(masks, *query_masks(meshes, seed))
