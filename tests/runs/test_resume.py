@@ -67,12 +67,12 @@ def unbroken(clip: WatchSettings, tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 @pytest.fixture(scope="module")
-def answered(
-    clip: WatchSettings, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[WatchSettings, Path]:
+def answered(tmp_path_factory: pytest.TempPathFactory) -> tuple[WatchSettings, Path]:
     """Settings with models, and an unbroken run in which the operator said who object 1 is."""
-    settings = replace(clip, models=ROOT / "visup" / "data" / "demo.models")
-    folder = fresh_folder(tmp_path_factory.mktemp("answered") / "run", "")
+    place = tmp_path_factory.mktemp("answered")
+    short = write_clip(place / "disc.avi", moving_disc(28), fps=20.0)
+    settings = WatchSettings(source=str(short), models=ROOT / "visup" / "data" / "demo.models")
+    folder = fresh_folder(place / "run", "")
     told = HumanOperator({1: "spartan"})
     supervise(settings, folder, audience=Audience(operator=told), options=BARE)
     return settings, folder
