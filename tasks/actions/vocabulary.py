@@ -96,12 +96,12 @@ class TaskVocabulary:
 
     Attributes:
         meanings: Actions by name, and comparisons and actions on zones by key.
-        looks: Key or word -> evaluator, except for plain relations of the mind.
+        evaluators: Key or word -> evaluator, except for plain relations of the mind.
         rhythms: Keys of periodic actions, and of their contraries.
     """
 
     meanings: Mapping[str, ActionDefinition]
-    looks: Mapping[str, FactEvaluator]
+    evaluators: Mapping[str, FactEvaluator]
     rhythms: Mapping[str, Rhythm]
 
 
@@ -113,7 +113,7 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         actions: All actions.
     """
     zones = {z.name for z in task.zones}
-    meanings, looks = dict(actions), {n: _word(n) for n in PREDICATES if n not in ACTIONS}
+    meanings, evaluators = dict(actions), {n: _word(n) for n in PREDICATES if n not in ACTIONS}
     rhythms: dict[str, Rhythm] = {}
     for fact in _facts(task):
         name, key = action_of(fact).name, fact_key(task, fact)[0]
@@ -129,14 +129,14 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         if isinstance(fact, Comparison):
             amounts = [task.amount(a) for a in bounds_of(fact)]
             measured = _measure(task, fact, amounts[0])
-            looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
+            evaluators[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
             text = _compared(fact, name, amounts)
         elif name in SIGNAL_WORDS:
-            looks[key] = _word(name, tuple(map(str, fact.words)))
+            evaluators[key] = _word(name, tuple(map(str, fact.words)))
             text = f"as `{fact}` says"
         else:
             zone = next(str(a) for a in fact.words if a in zones)
-            looks[key] = _zone_look(task, name, zone)
+            evaluators[key] = _zone_look(task, name, zone)
             text = f"{text} {zone}"
         meaning = _draws_near(actions[name]) if _asks_for_nearness(fact) else actions[name]
         takes = tuple(k for k in meaning.kinds if k == "object")
@@ -146,10 +146,10 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         if isinstance(fact, Comparison) and fact.operator == BETWEEN:
             # Staying within a range lasts until the next step begins, and fails outside it.
             outside = f"outside {key}"
-            looks[outside] = _outside(looks[key])
+            evaluators[outside] = _outside(evaluators[key])
             meanings[key] = replace(meanings[key], lasts=True, contrary=(outside,))
     return TaskVocabulary(
-        MappingProxyType(meanings), MappingProxyType(looks), MappingProxyType(rhythms)
+        MappingProxyType(meanings), MappingProxyType(evaluators), MappingProxyType(rhythms)
     )
 
 

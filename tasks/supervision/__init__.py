@@ -2,9 +2,9 @@
 
 Read in this order: `supervise.py` (the reasoner), `snapshot.py` (the current observation), `hypotheses.py`
 (the hypotheses), `monitored_phases.py` with `open_transitions.py` and `advance.py` (the model of the task
-filter), `belief.py` (marginals, verdict), `beginning.py` (which stages have begun), `task_inference.py`
-(which of several tasks is in progress), `invariants.py`, `events.py` and `sentences.py` (reports),
-`memory.py` (state).
+filter), `belief.py` (marginals, verdict), `stage_beginnings.py` (which stages have begun),
+`task_inference.py` (which of several tasks is in progress), `invariants.py`, `events.py` and `sentences.py`
+(reports), `memory.py` (state).
 """
 
 from visup.tasks.supervision.memory import TaskMemory

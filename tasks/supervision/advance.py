@@ -19,7 +19,11 @@ from visup.tasks.supervision.open_transitions import (
     missed,
 )
 from visup.tasks.supervision.sentences import lasted, outcome
-from visup.tasks.verification.reported import ReportedRelations, joined, with_reported
+from visup.tasks.verification.reported_relations import (
+    ReportedRelations,
+    merged_reports,
+    with_reported,
+)
 from visup.tasks.verification.step_model import Observe, StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered, without_hold
 
@@ -195,12 +199,12 @@ class Advance:
     def _holds(self, step: TaskStep) -> bool:
         """Whether a step holds, or a trend by which it holds has just set in."""
         seen = self.observe(step)
-        return seen.holds is Truth.TRUE or seen.sudden is not None
+        return seen.holds is Truth.TRUE or seen.new_trend is not None
 
     def _entry(self, step: TaskStep) -> Relation | None:
         """The relation by which a step is observed to begin: one that has lasted, or is sudden; or None."""
         seen = self.observe(step)
-        return seen.entry if seen.sudden is not None or self._lasted(step, seen.entry) else None
+        return seen.entry if seen.new_trend is not None or self._lasted(step, seen.entry) else None
 
     def _lasted(self, step: TaskStep, relation: Relation | None) -> bool:
         """Whether a relation by which a step begins has lasted long enough."""
@@ -322,7 +326,7 @@ class Advance:
         same = any(leaf.step.same_as(x.step) for x in left)
         begun = (x.payload.begun for x in left)
         turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
-        told = joined(self._told(x, transition) for x in left)
+        told = merged_reports(self._told(x, transition) for x in left)
         earliest = max((earliest_end(x) for x in left), default=-math.inf)
         return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told, earliest=earliest))
 
@@ -358,7 +362,7 @@ class Advance:
         if unreached is not None:
             late = missed(leaf.payload, self.observe(leaf.step), unreached, self.now)
             leaf = replace(leaf, payload=late)
-        return self.steps.looked_at(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
+        return self.steps.observed(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
 
     def _past(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, under_way: set[str]

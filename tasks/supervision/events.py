@@ -20,8 +20,8 @@ from visup.rules.wording.sentences import describe
 from visup.tasks.automaton.backpointers import Revision
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import stages_inside
-from visup.tasks.supervision.beginning import is_first
 from visup.tasks.supervision.sentences import stage_sentence, verdict_sentence
+from visup.tasks.supervision.stage_beginnings import is_first
 from visup.tasks.supervision.task_inference import TaskActivity
 from visup.tasks.verification.step_monitor import BAD
 

@@ -60,7 +60,7 @@ class MonitoredPhases:
         task: The task.
         actions: Meanings of its actions, with those of comparisons and zones (see `task_vocabulary`).
         settings: Time constants and thresholds.
-        looks: Evaluators of facts that are not relations of the mind.
+        evaluators: Evaluators of facts that are not relations of the mind.
         rhythms: Periodic actions.
         hmm: The probabilities of the model.
     """
@@ -68,7 +68,7 @@ class MonitoredPhases:
     task: Task
     actions: Mapping[str, ActionDefinition]
     settings: TaskSettings
-    looks: Mapping[str, FactEvaluator] = field(default_factory=dict)
+    evaluators: Mapping[str, FactEvaluator] = field(default_factory=dict)
     rhythms: Mapping[str, Rhythm] = field(default_factory=dict)
     hmm: StageHmm = SUPERVISION_HMM
 
@@ -266,7 +266,7 @@ class MonitoredPhases:
             return hypothesis, 1.0
         done, moment = finished is not None, Moment(now, dt)
         looked_at = (
-            self.steps.looked_at(x, observe(x.step), moment, done) for x in leaves(hypothesis.state)
+            self.steps.observed(x, observe(x.step), moment, done) for x in leaves(hypothesis.state)
         )
         state = self.steps.together(with_leaves(hypothesis.state, looked_at), observe)
         new = leaves(state)

@@ -1,8 +1,8 @@
 """Replays recent observations when an actor is identified late.
 
-While an actor of a task is missing, past beliefs of the mind (*looks*) are stored, thinned out and for a
+While an actor of a task is missing, past beliefs of the mind are stored, thinned out and for a
 limited time. When an object is found to be the actor, they are replayed with it: the task filter restarts
-from its posterior at the beginning of that time and processes each look with the bindings known now. So
+from its posterior at the beginning of that time and processes each step with the bindings known now. So
 nothing is counted twice, and a stage that has passed meanwhile is judged by its observations.
 """
 
@@ -19,51 +19,51 @@ from visup.rules.relations.zones import ZONES
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
-from visup.tasks.verification.observation import NOTHING_KEPT, Kept
+from visup.tasks.verification.observation import NO_MEMORY, ObservationMemory
 
-KEPT_S = 60.0
-"""How long looks are stored, seconds."""
+MEMORY_S = 60.0
+"""How long past steps are stored, seconds."""
 
 EVERY_S = 0.4
-"""Interval of stored looks, seconds: that of the task filter."""
+"""Interval of stored steps, seconds: that of the task filter."""
 
 LONGEST_STEP_S = 1.0
 """Longest time step for a gap in the frames, seconds."""
 
 
 @dataclass(frozen=True, eq=False)
-class PastLook:
+class PastStep:
     """The beliefs at one moment while an actor was missing.
 
     Attributes:
         mind: The mind, reduced to what the replay needs.
-        posterior: The hypotheses before that look.
-        kept: The state of the facts before it.
+        posterior: The hypotheses before that step.
+        observations: The state of the facts before it.
     """
 
     mind: Mind
     posterior: TaskHypotheses | None
-    kept: Kept = NOTHING_KEPT
+    observations: ObservationMemory = NO_MEMORY
 
 
 def remembered(
-    looks: tuple[PastLook, ...],
+    past: tuple[PastStep, ...],
     mind: Mind,
     posterior: TaskHypotheses | None,
-    kept: Kept,
-) -> tuple[PastLook, ...]:
-    """The looks with the present one if it is due; the oldest are dropped.
+    observations: ObservationMemory,
+) -> tuple[PastStep, ...]:
+    """The past steps with the present one if it is due; the oldest are dropped.
 
     Args:
-        looks: The looks so far.
+        past: The past steps so far.
         mind: The present mind.
-        posterior: The hypotheses before this look.
-        kept: As in `PastLook`.
+        posterior: The hypotheses before this step.
+        observations: As in `PastStep`.
     """
-    if looks and mind.time - looks[-1].mind.time < EVERY_S - 1e-9:
-        return looks
-    recent = (p for p in looks if mind.time - p.mind.time <= KEPT_S)
-    return (*recent, PastLook(_stripped(mind), posterior, kept))
+    if past and mind.time - past[-1].mind.time < EVERY_S - 1e-9:
+        return past
+    recent = (p for p in past if mind.time - p.mind.time <= MEMORY_S)
+    return (*recent, PastStep(_stripped(mind), posterior, observations))
 
 
 def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -> bool:
@@ -74,33 +74,33 @@ def newly_found(before: Sequence[Binding], now: Sequence[Binding], mind: Mind) -
 
 
 def replayed(
-    model: MonitoredPhases, looks: Sequence[PastLook], bindings: Sequence[Binding]
-) -> tuple[TaskHypotheses | None, Kept]:
-    """Replay stored looks with the casting known now.
+    model: MonitoredPhases, past: Sequence[PastStep], bindings: Sequence[Binding]
+) -> tuple[TaskHypotheses | None, ObservationMemory]:
+    """Replay stored steps with the casting known now.
 
     Args:
         model: The task with its filter.
-        looks: The looks, oldest first.
+        past: The past steps, oldest first.
         bindings: The present casting.
 
     Returns:
         The hypotheses, and the state of the facts.
     """
-    if not looks:
-        return None, NOTHING_KEPT
-    posterior, kept = looks[0].posterior, looks[0].kept
-    for look in looks:
-        known = tuple(_as_of(b, look.mind) for b in bindings)
-        snapshot = TaskSnapshot(look.mind, known, model, kept)
+    if not past:
+        return None, NO_MEMORY
+    posterior, observations = past[0].posterior, past[0].observations
+    for step in past:
+        known = tuple(_as_of(b, step.mind) for b in bindings)
+        snapshot = TaskSnapshot(step.mind, known, model, observations)
         posterior = followed(model, posterior, snapshot)
-        kept = snapshot.kept
-    return posterior, kept
+        observations = snapshot.memory
+    return posterior, observations
 
 
 def followed(
     model: MonitoredPhases, posterior: TaskHypotheses | None, snapshot: TaskSnapshot
 ) -> TaskHypotheses | None:
-    """The hypotheses after one look; the task begins once all actors of a first step are found."""
+    """The hypotheses after one step; the task begins once all actors of a first step are found."""
     now = snapshot.mind.time
     if posterior is None:
         found = any(snapshot.found(step.actors) for step in model.first_steps)

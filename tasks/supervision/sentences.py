@@ -12,7 +12,7 @@ from visup.tasks.grammar.conditions import Action
 from visup.tasks.grammar.nodes import Comparison, Task
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.verification.pauses import Pause
-from visup.tasks.verification.reported import since_reported
+from visup.tasks.verification.reported_relations import since_reported
 from visup.tasks.verification.step_monitor import StepMonitor
 
 SHORT_S = 0.6

@@ -8,7 +8,7 @@ from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Hold
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
-from visup.tasks.verification.observation import NOTHING_KEPT, ActionObservation, Kept
+from visup.tasks.verification.observation import NO_MEMORY, ActionObservation, ObservationMemory
 from visup.tasks.verification.observe import RelationLookup
 from visup.tasks.verification.observe import observe as observe_action
 from visup.tasks.verification.passing import gap_between, vanished_into
@@ -30,14 +30,14 @@ class TaskSnapshot:
         mind: Mind,
         bindings: tuple[Binding, ...],
         model: MonitoredPhases,
-        before: Kept = NOTHING_KEPT,
+        before: ObservationMemory = NO_MEMORY,
     ) -> None:
         self.mind = mind
         self.bindings = bindings
         self._actions = model.actions
         self._objects = {b.actor: b.object_id for b in bindings}
         self._spare = model.spare
-        self._relations = RelationLookup(mind, model.looks, before, model.rhythms)
+        self._relations = RelationLookup(mind, model.evaluators, before, model.rhythms)
         self._conditions = ConditionEvaluator(model.task, self._holds, self._relations)
         self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
         self._observed: dict[int, tuple[TaskStep, ActionObservation]] = {}
@@ -87,10 +87,10 @@ class TaskSnapshot:
         return self._conditions.relation(condition, lasting).truth
 
     @property
-    def kept(self) -> Kept:
+    def memory(self) -> ObservationMemory:
         """The state of the facts for the next step."""
         # Facts are not evaluated during a pause: they keep their state.
-        return self._relations.kept(self.pauses, self.pauses.now(self._pausing) is not None)
+        return self._relations.memory(self.pauses, self.pauses.now(self._pausing) is not None)
 
     def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
         key = (action, actors)

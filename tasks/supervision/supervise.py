@@ -35,7 +35,6 @@ from visup.tasks.casting.matching import (
 )
 from visup.tasks.casting.recasting import Casting, recast
 from visup.tasks.grammar.nodes import Task
-from visup.tasks.supervision.beginning import is_first, stage_onsets, stirring, with_begun
 from visup.tasks.supervision.belief import (
     failed_belief,
     out_of_order_belief,
@@ -62,6 +61,12 @@ from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.replay import followed, newly_found, remembered, replayed
 from visup.tasks.supervision.snapshot import TaskSnapshot
+from visup.tasks.supervision.stage_beginnings import (
+    is_first,
+    shows_motion,
+    stage_onsets,
+    with_begun,
+)
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
 from visup.tasks.verification.step_monitor import BAD
@@ -142,7 +147,7 @@ def _model(
     task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
 ) -> MonitoredPhases:
     words = task_vocabulary(task, actions)
-    model = MonitoredPhases(task, words.meanings, settings, words.looks, words.rhythms)
+    model = MonitoredPhases(task, words.meanings, settings, words.evaluators, words.rhythms)
     model.filter.success(model.filter.start())  # explores the course now rather than in a step
     return model
 
@@ -216,7 +221,7 @@ def _with_activity(
         posterior = None  # a rival has ended; later observations do not belong to it
     if posterior and any(x.payload.status in BAD for x in leaves(posterior.likeliest.state)):
         posterior = None  # if it is in progress later, it starts from its first stage
-    memory = memory if posterior is memory.posterior else replace(memory, looks=())
+    memory = memory if posterior is memory.posterior else replace(memory, past_steps=())
     belief = suppressed(belief, activity)
     return replace(memory, activity=activity, belief=belief, posterior=posterior, inferred=now)
 
@@ -224,39 +229,42 @@ def _with_activity(
 def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemory:
     """One step of one task: bind its actors, update its hypotheses, derive the belief."""
     now, casting = mind.time, _cast(model, memory, mind)
-    start, kept = memory.posterior, memory.kept
-    if memory.looks and newly_found(memory.belief.bindings, casting.bindings, mind):
-        start, kept = replayed(model, memory.looks, casting.bindings)
-    snapshot = TaskSnapshot(mind, casting.bindings, model, kept)
+    start, observations, past = memory.posterior, memory.observations, memory.past_steps
+    if past and newly_found(memory.belief.bindings, casting.bindings, mind):
+        start, observations = replayed(model, past, casting.bindings)
+    snapshot = TaskSnapshot(mind, casting.bindings, model, observations)
     posterior = followed(model, start, snapshot)
     broken = broken_since(model, snapshot, memory)
-    akin = _akin(snapshot, memory, model.settings)
+    familiar = _familiar_objects(snapshot, memory, model.settings)
     bystanding = bystanders(model.task, mind, casting.bindings, model.settings)
-    interrupted, strangers = _interrupted(model, snapshot, memory, broken, bystanding)
-    broke = interrupted != memory.interrupted and not strangers
-    broke = broke and interrupted == violation(model, broken, now, safety=True)
+    interrupted, interrupting = _interrupted(model, snapshot, memory, broken, bystanding)
+    interrupted_now = interrupted != memory.interrupted and not interrupting
+    interrupted_now = interrupted_now and interrupted == violation(model, broken, now, safety=True)
     violated = memory.violated
     if not violated and memory.belief.verdict not in OVER:
         violated = violation(model, broken, now, safety=False)
+    unexplained = _unexplained_since(model, snapshot, memory)
+    past = remembered(past, mind, start, observations) if _awaited(model, casting) else ()
     new = replace(
         memory,
         time=now,
         posterior=posterior,
         interrupted=interrupted,
-        strangers=strangers,
-        strange_since=tuple(s for s in _strange(model, snapshot, memory) if s[0] not in akin),
+        interrupting_objects=interrupting,
+        unexplained_since=tuple(s for s in unexplained if s[0] not in familiar),
         broken_since=broken,
         rival=casting.rival,
         rival_since=casting.rival_since,
         gain=_gain(model, start, posterior, snapshot),
-        looks=remembered(memory.looks, mind, start, kept) if _awaited(model, casting) else (),
+        past_steps=past,
         violated=violated,
-        akin=akin,
-        forbidden=memory.forbidden or broke,
+        familiar_objects=familiar,
+        forbidden=memory.forbidden or interrupted_now,
         order_violation=order_violation(model, snapshot, posterior, memory.order_violation),
     )
     belief = _belief(model, snapshot, memory, new, bystanding)
-    return replace(new, belief=belief, kept=snapshot.kept)  # with all facts that were asked for
+    # The snapshot's memory now has all facts that were asked for.
+    return replace(new, belief=belief, observations=snapshot.memory)
 
 
 def _belief(
@@ -275,12 +283,12 @@ def _belief(
         belief = out_of_order_belief(belief, old, new.order_violation.why, now)
     if memory.forbidden:
         belief = replace(belief, stages=old.stages, current=old.current)
-    stirs = is_first(old.stages) and stirring(snapshot, new.posterior)
+    motion_seen = is_first(old.stages) and shows_motion(snapshot, new.posterior)
     least = model.settings.unexplained_s
     return replace(
         belief,
-        stages=with_begun(old.stages, belief.stages, stirs=stirs),
-        unexplained=tuple(i for i, since in new.strange_since if now - since >= least),
+        stages=with_begun(old.stages, belief.stages, motion_seen=motion_seen),
+        unexplained=tuple(i for i, since in new.unexplained_since if now - since >= least),
         bystanders=bystanding,
         machines=machines(model.task, snapshot.bindings),
     )
@@ -306,11 +314,13 @@ def _cast(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> Casting:
     return recast(model.task, mind, before, acting, model.settings)
 
 
-def _akin(snapshot: TaskSnapshot, memory: TaskMemory, settings: TaskSettings) -> tuple[int, ...]:
+def _familiar_objects(
+    snapshot: TaskSnapshot, memory: TaskMemory, settings: TaskSettings
+) -> tuple[int, ...]:
     """See `TaskMemory.akin`."""
     mind, bindings = snapshot.mind, snapshot.bindings
     known = {*scenery(mind, bindings, settings), *handlers(mind, bindings, settings)}
-    return tuple(sorted(known.union(memory.akin)))
+    return tuple(sorted(known.union(memory.familiar_objects)))
 
 
 def _awaited(model: MonitoredPhases, casting: Casting) -> bool:
@@ -350,11 +360,11 @@ def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
     return tuple(Revision(b.step, b.left, new.time) for b in found if b.step.stage in gone)
 
 
-def _strange(
+def _unexplained_since(
     model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[tuple[int, float], ...]:
     """Objects that are unexplained now, each with its start time."""
-    before = dict(memory.strange_since)
+    before = dict(memory.unexplained_since)
     optional = {a.name for a in model.task.actors if a.optional}
     now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional, model.task)
     return tuple((i, before.get(i, snapshot.mind.time)) for i in now)
@@ -373,8 +383,8 @@ def _interrupted(
     that has ended is not interrupted, and bystanders interrupt none.
     """
     explained = {b.object_id for b in snapshot.bindings}.union(bystanding)
-    if memory.interrupted and explained.isdisjoint(memory.strangers):
-        return memory.interrupted, memory.strangers
+    if memory.interrupted and explained.isdisjoint(memory.interrupting_objects):
+        return memory.interrupted, memory.interrupting_objects
     if memory.belief.verdict in OVER:
         return "", ()
     for alert in snapshot.mind.alerts:

@@ -25,7 +25,7 @@ class ActionObservation:
         over: Whether the end condition of its course holds; None when the course has none.
         observed: Whether anything is known about it; False while an actor is not found or its object
             is hidden.
-        sudden: A trend by which it begins that has just set in, and has not lasted yet, or None.
+        new_trend: A trend by which it begins that has just set in, and has not lasted yet, or None.
         round: Whether its entry is a trend that is due to one actor moving around the other.
         paused: Whether the work on it is paused: then there is no observation of it.
         pauses: All pauses of the task so far.
@@ -44,7 +44,7 @@ class ActionObservation:
     decisive: bool = False
     over: Truth | None = None
     observed: bool = False
-    sudden: Relation | None = None
+    new_trend: Relation | None = None
     round: bool = False
     paused: bool = False
     pauses: PauseRecord = NO_PAUSES
@@ -82,7 +82,7 @@ def overdue(step: TaskStep, seen: ActionObservation, now: float) -> RunningDeadl
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class ObservationMemory:
     """State of the facts of a task at one moment, for the next.
 
     Attributes:
@@ -98,4 +98,4 @@ class Kept:
     pauses: PauseRecord = NO_PAUSES
 
 
-NOTHING_KEPT = Kept()
+NO_MEMORY = ObservationMemory()

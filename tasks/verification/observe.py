@@ -17,11 +17,12 @@ from visup.rules.relations.reasoner import kinematics
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.rhythm import Beats, Rhythm, heard
 from visup.tasks.actions.vocabulary import FactEvaluator
+from visup.tasks.verification.new_trends import NewTrends
 from visup.tasks.verification.observation import (
-    NOTHING_KEPT,
+    NO_MEMORY,
     UNOBSERVED,
     ActionObservation,
-    Kept,
+    ObservationMemory,
 )
 from visup.tasks.verification.passing import (
     came_apart,
@@ -37,7 +38,6 @@ from visup.tasks.verification.passing import (
     went_round,
 )
 from visup.tasks.verification.pauses import PauseRecord
-from visup.tasks.verification.sudden import SuddenTrends
 
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NO_RHYTHMS: Mapping[str, Rhythm] = MappingProxyType({})
@@ -65,7 +65,7 @@ class RelationLookup:
         self,
         mind: Mind,
         looks: Mapping[str, FactEvaluator] = NOTHING,
-        before: Kept = NOTHING_KEPT,
+        before: ObservationMemory = NO_MEMORY,
         rhythms: Mapping[str, Rhythm] = NO_RHYTHMS,
     ) -> None:
         self.mind = mind
@@ -78,7 +78,7 @@ class RelationLookup:
         self._evaluated: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._passed_by: dict[tuple[int, ...], bool] = {}
-        self._sudden = SuddenTrends(mind)
+        self._sudden = NewTrends(mind)
         self._queried: set[str] = set()
         self._after: dict[str, float] = {}
 
@@ -156,7 +156,7 @@ class RelationLookup:
         if entry is not None and entry.name == "coupled" and gapes(self.mind, *objects):
             return None, None  # there is a gap: the coupling will soon be doubted
         if entry is not None:
-            return (None if self._sudden.ends(entry) else entry), None
+            return (None if self._sudden.has_opposite(entry) else entry), None
         sudden = self._sudden.first(names, objects)
         return sudden, sudden
 
@@ -208,7 +208,7 @@ class RelationLookup:
             self._after[key] = since
         return Relation(name, objects, truth, since if truth is Truth.TRUE else self.mind.time)
 
-    def kept(self, pauses: PauseRecord, carry: bool) -> Kept:
+    def memory(self, pauses: PauseRecord, carry: bool) -> ObservationMemory:
         """The state of this moment, for the next.
 
         Args:
@@ -219,7 +219,7 @@ class RelationLookup:
         if carry:
             unasked = {k: s for k, s in self._before.items() if k not in self._queried}
             lasting, beats = unasked | lasting, self._beats_before | beats
-        return Kept(self.time, tuple(lasting.items()), tuple(beats.items()), pauses)
+        return ObservationMemory(self.time, tuple(lasting.items()), tuple(beats.items()), pauses)
 
     def _rhythm_relation(self, rhythm: Rhythm, name: str, objects: tuple[int, ...]) -> Relation:
         """The relation that a periodic fact keeps its rhythm, or is late, depending on `rhythm`."""
@@ -289,7 +289,7 @@ def observe(
     if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
         contrary = None
     known = (*meaning.helps, *meaning.contrary)
-    entry, sudden = relations.begun(meaning.begins, ids)
+    entry, new_trend = relations.begun(meaning.begins, ids)
     return ActionObservation(
         holds=holds,
         held_by=held_by,
@@ -297,7 +297,7 @@ def observe(
         entry=entry,
         contrary=contrary,
         observed=relations.known(known, ids),
-        sudden=sudden,
+        new_trend=new_trend,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and moves_on(relations.mind, ids),
         unreached=unreached,

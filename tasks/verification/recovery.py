@@ -8,11 +8,11 @@ from __future__ import annotations
 from visup.agent import Truth
 from visup.tasks.verification.observation import ActionObservation
 
-REGAINED = 0.5
+RECOVERY_SHARE = 0.5
 """Greatest gap at which an approach counts as recovery, as a share of the greatest gap since the failure."""
 
 
-def farthest(before: float | None, seen: ActionObservation) -> float | None:
+def greatest_gap(before: float | None, seen: ActionObservation) -> float | None:
     """The greatest gap between the actors of a failing step so far, pixels; None if unknown.
 
     Args:
@@ -24,16 +24,16 @@ def farthest(before: float | None, seen: ActionObservation) -> float | None:
     return max(before, seen.distance)
 
 
-def regained(farthest_px: float | None, seen: ActionObservation) -> bool:
+def has_come_back(greatest_gap_px: float | None, seen: ActionObservation) -> bool:
     """Whether observed progress of a failing step counts as recovery.
 
     Args:
-        farthest_px: Greatest gap between its actors since it fails, pixels; None if unknown.
+        greatest_gap_px: Greatest gap between its actors since it fails, pixels; None if unknown.
         seen: The observation.
 
     Returns:
         True if the action holds, if the gap is at most half of the greatest, or if either gap is unknown.
     """
-    if seen.holds is Truth.TRUE or farthest_px is None or seen.distance is None:
+    if seen.holds is Truth.TRUE or greatest_gap_px is None or seen.distance is None:
         return True
-    return seen.distance <= REGAINED * farthest_px
+    return seen.distance <= RECOVERY_SHARE * greatest_gap_px

@@ -86,11 +86,11 @@ class ConditionEvaluator:
         true = found if found.truth is Truth.TRUE else None
         match condition.kind:
             case "begins":
-                return replace(seen, entry=true, sudden=None, observed=known)
+                return replace(seen, entry=true, new_trend=None, observed=known)
             case "ends":
                 return replace(seen, over=found.truth, observed=known)
             case "progresses":
                 helps = seen.helps if seen.holds is Truth.TRUE else true
-                return replace(seen, helps=helps, sudden=None, observed=known)
+                return replace(seen, helps=helps, new_trend=None, observed=known)
             case "fails":
                 return replace(seen, contrary=true, decisive=True, observed=known)

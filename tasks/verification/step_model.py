@@ -11,10 +11,10 @@ from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
+from visup.tasks.verification.concurrent_actions import reset_lapsed_actions
 from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
-from visup.tasks.verification.together import at_the_same_time
 
 Observe = Callable[[TaskStep], ActionObservation]
 """The present observation of a step."""
@@ -34,7 +34,7 @@ class StepModel:
     settings: TaskSettings
     hmm: StageHmm
 
-    def looked_at(
+    def observed(
         self, leaf: Leaf[StepMonitor], seen: ActionObservation, moment: Moment, done: bool
     ) -> Leaf[StepMonitor]:
         """A step with its monitor updated by an observation, unless work is paused.
@@ -58,7 +58,7 @@ class StepModel:
     ) -> Leaf[StepMonitor]:
         """A step that begins now, updated as if a relation still held that has just become uncertain."""
         then = replace(seen, observed=True, holds=Truth.TRUE, held_by=held_by, helps=held_by)
-        return self.looked_at(leaf, then, Moment(now, 0.0), False)
+        return self.observed(leaf, then, Moment(now, 0.0), False)
 
     def together(self, state: State[StepMonitor], observe: Observe) -> State[StepMonitor]:
         """The state with monitors corrected so that actions joined by `&` must have held at the same time."""
@@ -66,7 +66,7 @@ class StepModel:
         def gap(step: TaskStep, since: float, until: float) -> float:
             return observe(step).elapsed(step, since, until) if until > since else 0.0
 
-        return at_the_same_time(state, self._judged, gap, self.settings.contact_s)
+        return reset_lapsed_actions(state, self._judged, gap, self.settings.contact_s)
 
     def _judged(self, step: TaskStep) -> bool:
         return not self.actions[step.action].lasts and not step.has_stage_conditions

@@ -13,8 +13,8 @@ from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.states import RunningDeadline, TaskStep
 from visup.tasks.verification.observation import UNOBSERVED, ActionObservation, overdue
-from visup.tasks.verification.recovery import farthest, regained
-from visup.tasks.verification.reported import ReportedRelations, with_reported
+from visup.tasks.verification.recovery import greatest_gap, has_come_back
+from visup.tasks.verification.reported_relations import ReportedRelations, with_reported
 from visup.tasks.verification.settings import TaskSettings
 
 BAD = (Status.FAILING, Status.FAILED)
@@ -112,7 +112,7 @@ class StepMonitor:
     fulfilled_at: float | None = None
     told: ReportedRelations = ()
     earliest: float = -math.inf
-    farthest: float | None = None
+    greatest_gap: float | None = None
 
     @property
     def begun_anew(self) -> bool:
@@ -153,8 +153,8 @@ def update(
     worked = partial(seen.elapsed, step)
     if monitor.early:
         monitor, seen = _disregard_early(monitor, seen, moment, settings, worked)
-    gap = farthest(monitor.farthest, seen) if monitor.status in BAD else None
-    monitor = monitor if gap == monitor.farthest else replace(monitor, farthest=gap)
+    gap = greatest_gap(monitor.greatest_gap, seen) if monitor.status in BAD else None
+    monitor = monitor if gap == monitor.greatest_gap else replace(monitor, greatest_gap=gap)
     noted = _note_progress(monitor, step, meaning, seen, moment, settings)
     noted = _note_contrary(noted, seen, now)
     noted = _note_lateness(noted, step, meaning, seen, now)
@@ -187,7 +187,7 @@ def _beginning(
         monitor = replace(monitor, opened=seen.entry is not None)
         if not monitor.opened:
             return monitor, replace(UNOBSERVED, observed=seen.observed, pauses=seen.pauses)
-    return monitor, seen if seen.helps is not None else replace(seen, helps=seen.sudden)
+    return monitor, seen if seen.helps is not None else replace(seen, helps=seen.new_trend)
 
 
 def _note_reported(monitor: StepMonitor, step: TaskStep, status: Status, now: float) -> StepMonitor:
@@ -309,7 +309,7 @@ def _note_progress(
         helped_since=seen.helps.since if seen.helps else monitor.helped_since,
         helped_at=now if helping else monitor.helped_at,
         better_since=_first(monitor.better_since, now)
-        if helping and not seen.contrary and regained(monitor.farthest, seen)
+        if helping and not seen.contrary and has_come_back(monitor.greatest_gap, seen)
         else None,
         ceased=ceased,
         denied=monitor.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,

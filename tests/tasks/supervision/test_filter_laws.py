@@ -59,7 +59,7 @@ MIXED = (
 
 def model_of(task: Task) -> MonitoredPhases:
     words = task_vocabulary(task, known_actions())
-    return MonitoredPhases(task, words.meanings, DEFAULT_SETTINGS, words.looks)
+    return MonitoredPhases(task, words.meanings, DEFAULT_SETTINGS, words.evaluators)
 
 
 def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
@@ -68,7 +68,7 @@ def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
     found = []
     for mind in followed:
         memory = mind.memory["tasks"][0]
-        scene = TaskSnapshot(mind, memory.belief.bindings, model, memory.kept)
+        scene = TaskSnapshot(mind, memory.belief.bindings, model, memory.observations)
         found.append((mind.time, scene.observe))
     return found
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.tasks.scripted import ARM, IDENTITIES, SATELLITE, Script, Spell, mind_at
 from visup.agent import Mind, Observation, Status, TaskBelief, Verdict
 from visup.tasks import parse_task
-from visup.tasks.supervision.replay import EVERY_S, KEPT_S
+from visup.tasks.supervision.replay import EVERY_S, MEMORY_S
 from visup.tasks.supervision.supervise import MEMORY, finish, task_reasoner
 
 DOCK = """<dock> ::= <approach> <captured> <leave>
@@ -82,10 +82,10 @@ def test_after_the_name_the_hypotheses_are_those_of_an_early_name(late: float) -
 
 def test_what_is_kept_is_bounded_and_let_go() -> None:
     waiting = lived({ARM: 0.0}, GOOD, 70.0).recall(MEMORY)[0]
-    assert len(waiting.looks) <= KEPT_S / EVERY_S + 2
-    assert all(not look.mind.tasks for look in waiting.looks)
-    assert all("tasks" not in look.mind.memory for look in waiting.looks)
-    assert lived({ARM: 0.0, SATELLITE: 3.0}, GOOD, 5.0).recall(MEMORY)[0].looks == ()
+    assert len(waiting.past_steps) <= MEMORY_S / EVERY_S + 2
+    assert all(not look.mind.tasks for look in waiting.past_steps)
+    assert all("tasks" not in look.mind.memory for look in waiting.past_steps)
+    assert lived({ARM: 0.0, SATELLITE: 3.0}, GOOD, 5.0).recall(MEMORY)[0].past_steps == ()
 
 
 def test_an_object_that_comes_late_has_no_past() -> None:

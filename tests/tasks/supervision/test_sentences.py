@@ -12,7 +12,12 @@ from visup.agent import Status
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.supervision.sentences import evidence, in_retrospect, outcome
-from visup.tasks.verification.reported import excludes, joined, since_reported, with_reported
+from visup.tasks.verification.reported_relations import (
+    excludes,
+    merged_reports,
+    since_reported,
+    with_reported,
+)
 from visup.tasks.verification.step_monitor import StepMonitor
 
 NEARED = StepMonitor(1.0, begun=2.3, helped_since=2.0, helped_at=3.0)
@@ -125,7 +130,7 @@ TELLINGS = st.lists(st.tuples(st.permutations(PAIR), RELATIONS, st.floats(0, 9))
 def test_no_two_that_exclude_each_other_are_told_for_the_same_time(
     tellings: list[tuple[list[str], str, float]], relation: str, since: float
 ) -> None:
-    told = joined(with_reported((), who, what, until) for who, what, until in tellings)
+    told = merged_reports(with_reported((), who, what, until) for who, what, until in tellings)
     begins = since_reported(told, PAIR, relation, since)
     assert begins >= since
     untils = [until for _, what, until in tellings if excludes(what, relation)]

@@ -11,24 +11,25 @@ from visup.tasks.automaton.states import TaskStep, leaves
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
-from visup.tasks.verification.dating import stage_onset
+from visup.tasks.verification.motion_onset import moving_bodies
 from visup.tasks.verification.observe import TRENDS
-from visup.tasks.verification.setting_out import setting_out
+from visup.tasks.verification.stage_onset import stage_onset
 
 
 def with_begun(
-    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], *, stirs: bool
+    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], *, motion_seen: bool
 ) -> tuple[StageBelief, ...]:
     """Update whether each stage has begun.
 
     Args:
         before: The previous beliefs, in the same order.
         stages: The present beliefs.
-        stirs: Whether an actor of an active step starts to move, which begins the first stage of a task.
+        motion_seen: Whether an actor of an active step starts to move, which begins the first stage of a
+            task.
     """
-    stirs = stirs and is_first(before)
+    motion_seen = motion_seen and is_first(before)
     pairs = zip(before, stages, strict=True)
-    return tuple([replace(s, begun=True) if _begun(b, s, stirs) else s for b, s in pairs])
+    return tuple([replace(s, begun=True) if _begun(b, s, motion_seen) else s for b, s in pairs])
 
 
 def is_first(stages: tuple[StageBelief, ...]) -> bool:
@@ -36,14 +37,14 @@ def is_first(stages: tuple[StageBelief, ...]) -> bool:
     return not any(s.begun for s in stages)
 
 
-def _begun(before: StageBelief, now: StageBelief, stirs: bool) -> bool:
+def _begun(before: StageBelief, now: StageBelief, motion_seen: bool) -> bool:
     if now.status is Status.PENDING:
         return False
     if now.status is Status.PAUSED:
         return before.begun
     anew = before.status is Status.DONE and now.status is Status.ACTIVE
     return (
-        stirs
+        motion_seen
         or now.begun
         or (before.begun and not anew)
         or now.status not in (Status.ACTIVE, Status.UNKNOWN)
@@ -86,7 +87,7 @@ CAME_LATER_S = 0.3
 begins a task."""
 
 
-def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
+def shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
     """Whether actors of the most likely active steps start to move, or have just appeared.
 
     Of a stage with several steps, an actor of each must move; for a trend, the actor named first: that the
@@ -101,7 +102,7 @@ def stirring(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
     start = min((b.first_seen for b in mind.objects.values()), default=0.0)
     if came and max(came) - start > CAME_LATER_S:
         return True
-    out = setting_out(mind)
+    out = moving_bodies(mind)
 
     def stirs(step: TaskStep, *, alone: bool) -> bool:
         leads = step.actors[:1] if step.action in TRENDS and not alone else step.actors

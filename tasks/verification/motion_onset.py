@@ -19,39 +19,39 @@ from visup.rules.relations.samples import SampleWindow
 LAG_S = 0.4
 """Interval over which the change of an outline is measured, seconds."""
 
-REACH = 0.012
+LEAST_ADVANCE = 0.012
 """Least change of an outline's extent, image diagonals. In rendered worlds of ten kinds outlines change by at
 most 0.009 before anything moves, and a robot's by 0.03 within 0.6 s after it sets out."""
 
-FARTHER = 2.0
+LEAST_RATIO = 2.0
 """Least ratio of the change of a slow body's extent to that of some other body for it to move by itself: a
 swaying camera moves all bodies alike, but for parallax."""
 
 MOVING_SIGMAS = 3.0
 """Least speed of a moving body, in standard deviations of its velocity."""
 
-Marks = NDArray[np.bool_]
+Mask = NDArray[np.bool_]
 
 
-def setting_out(mind: Mind) -> frozenset[int]:
+def moving_bodies(mind: Mind) -> frozenset[int]:
     """Ids of the bodies that move by themselves now, as a whole or in part."""
     diagonal = image_diagonal(mind.frame_size)
     now, window = kinematics(mind), sample_window(mind)
     if window.ids != now.ids or not len(window.times):
         return frozenset()
-    slowly = moving(now, RelationSettings().still_speed * diagonal)
-    slowly &= farther_than_others(window)
-    moves = slowly | reaching_out(window, REACH * diagonal)
-    return frozenset(i for i, sets_out in zip(now.ids, moves.tolist(), strict=True) if sets_out)
+    moving_slowly = moving(now, RelationSettings().still_speed * diagonal)
+    moving_slowly &= moving_more_than_others(window)
+    is_moving = moving_slowly | advancing_outlines(window, LEAST_ADVANCE * diagonal)
+    return frozenset(i for i, moves in zip(now.ids, is_moving.tolist(), strict=True) if moves)
 
 
-def moving(now: Kinematics, still: float) -> Marks:
+def moving(now: Kinematics, still: float) -> Mask:
     """(M,) bool: the bodies that move faster than `still`, pixels per second, and than noise explains."""
     with np.errstate(invalid="ignore"):
         return np.asarray(now.speed > np.maximum(still, MOVING_SIGMAS * now.velocity_sigma))
 
 
-def farther_than_others(window: SampleWindow) -> Marks:
+def moving_more_than_others(window: SampleWindow) -> Mask:
     """Bodies whose outlines have changed their extent much more than that of some other body.
 
     Args:
@@ -68,11 +68,11 @@ def farther_than_others(window: SampleWindow) -> Marks:
     found = np.ones(len(span), dtype=bool)
     for i in range(len(span)):
         others = np.delete(span, i)[np.delete(known, i)]
-        found[i] = not len(others) or span[i] > FARTHER * others.min()
+        found[i] = not len(others) or span[i] > LEAST_RATIO * others.min()
     return found
 
 
-def reaching_out(window: SampleWindow, limit: float) -> Marks:
+def advancing_outlines(window: SampleWindow, limit: float) -> Mask:
     """Bodies whose outlines have just advanced in some direction, unlike those of the others.
 
     The outline of a moving body advances on at least one side; that of a body being covered only recedes.
@@ -91,12 +91,12 @@ def reaching_out(window: SampleWindow, limit: float) -> Marks:
     known = window.free[-1] & window.free[then]
     reach = window.steady_support
     change = np.where(known, reach[-1] - reach[then], np.nan)
-    farther = change - _of_others(change)
+    farther = change - _medians_of_others(change)
     with np.errstate(invalid="ignore"):
         return np.asarray(((change > limit) & (farther > limit)).any(axis=1))
 
 
-def _of_others(values: Floats) -> Floats:
+def _medians_of_others(values: Floats) -> Floats:
     """(M, K) medians of the values of all other bodies; 0 where no other is known."""
     found = np.zeros_like(values)
     for i in range(len(values)):

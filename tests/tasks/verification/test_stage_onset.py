@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from visup.rules.relations.samples import SampleWindow
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.automaton.states import Leaf, TaskStep
-from visup.tasks.verification.dating import stage_onset
+from visup.tasks.verification.stage_onset import stage_onset
 from visup.tasks.verification.step_monitor import StepMonitor
 
 NOW = 10.0

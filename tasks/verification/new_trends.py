@@ -20,18 +20,18 @@ from visup.rules.relations.trend import SIGNS
 
 OPPOSITE = {"converging": "diverging", "diverging": "converging"}
 
-HEIGHT = 0.0067
+LEAST_CHANGE = 0.0067
 """Least change of the distance, image diagonals: four pixels in an image of 480 x 360. Closing fingers change
 it by two."""
 
-SWAY = 0.2
+SWAY_SHARE = 0.2
 """Least rate, as a share of the speed of the slower body: a carried body sways and rotates."""
 
 CONFIDENCE = 0.7
 """Confidence of a trend that has not lasted yet."""
 
 
-class SuddenTrends:
+class NewTrends:
     """The sudden trends of one moment, each computed once.
 
     Args:
@@ -50,26 +50,26 @@ class SuddenTrends:
         """
         found = (self._trend(name, ids) for name in names if name in SIGNS)
         sudden = next((t for t in found if t is not None), None)
-        return None if sudden is None or self._comes_by_the_other(ids) else sudden
+        return None if sudden is None or self._only_second_moves(ids) else sudden
 
-    def ends(self, relation: Relation) -> bool:
+    def has_opposite(self, relation: Relation) -> bool:
         """Whether a relation is a trend of which the opposite has just set in."""
         opposite = OPPOSITE.get(relation.name)
         return opposite is not None and self._trend(opposite, relation.objects) is not None
 
     def _trend(self, name: str, ids: tuple[int, ...]) -> Relation | None:
         if (name, ids) not in self._found:
-            self._found[name, ids] = sudden_trend(self._mind, name, ids)
+            self._found[name, ids] = new_trend(self._mind, name, ids)
         return self._found[name, ids]
 
-    def _comes_by_the_other(self, ids: tuple[int, ...]) -> bool:
+    def _only_second_moves(self, ids: tuple[int, ...]) -> bool:
         """Whether the second of two moves while the first one rests, as far as is known."""
         now, still = kinematics(self._mind), RelationSettings().still_speed
         still *= image_diagonal(self._mind.frame_size)
         return now.one("speed", ids[0]) < still < now.one("speed", ids[1])
 
 
-def sudden_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
+def new_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
     """A trend of the distance of two bodies that has just set in.
 
     Args:
@@ -90,8 +90,8 @@ def sudden_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | Non
     speeds = [v for v in (now.one("speed", i) for i in ids) if v == v]  # NaN is not equal to itself
     limits = RiseLimits(
         sqrt(2.0) * RelationSettings().thresholds.noise_px,
-        HEIGHT * image_diagonal(mind.frame_size),
-        SWAY * min(speeds, default=0.0),
+        LEAST_CHANGE * image_diagonal(mind.frame_size),
+        SWAY_SHARE * min(speeds, default=0.0),
     )
     at = sudden_rise(window.times[known], SIGNS[trend] * distance[known], limits)
     return None if at is None else Relation(trend, ids, Truth.TRUE, at, CONFIDENCE)

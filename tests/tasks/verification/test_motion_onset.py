@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats
 from visup.rules.relations.samples import SampleWindow
-from visup.tasks.verification.setting_out import LAG_S, farther_than_others, reaching_out
+from visup.tasks.verification.motion_onset import LAG_S, advancing_outlines, moving_more_than_others
 
 TIMES = np.arange(0.0, 1.0, 0.1)
 LIMIT = 7.0
@@ -46,15 +46,15 @@ def path(shift: tuple[float, float]) -> Floats:
 
 @given(st.integers(1, 4))
 def test_what_rests_sets_out_nowhere(bodies: int) -> None:
-    assert not reaching_out(window(resting(bodies)), LIMIT).any()
+    assert not advancing_outlines(window(resting(bodies)), LIMIT).any()
 
 
 @given(st.integers(2, 4), shifts)
 def test_what_all_do_alike_is_the_cameras_doing(bodies: int, shift: tuple[float, float]) -> None:
     seen = window(resting(bodies) + path(shift)[:, None])
-    assert not reaching_out(seen, LIMIT).any()
+    assert not advancing_outlines(seen, LIMIT).any()
     if np.hypot(*shift) > 1.0:
-        assert not farther_than_others(seen).any()
+        assert not moving_more_than_others(seen).any()
 
 
 @given(st.integers(1, 4), st.integers(0, 3), shifts)
@@ -63,7 +63,7 @@ def test_one_that_goes_far_enough_is_the_one_that_sets_out(
 ) -> None:
     reach, who = resting(bodies), who % bodies
     reach[:, who] += path(shift)
-    found = reaching_out(window(reach), LIMIT)
+    found = advancing_outlines(window(reach), LIMIT)
     lag = np.abs(path(shift)[-1] - path(shift)[round(len(TIMES) - 1 - LAG_S / 0.1)]).max()
     others = [k for k in range(bodies) if k != who]
     assert found[who] == (lag > LIMIT) or lag == pytest.approx(LIMIT)
@@ -75,30 +75,30 @@ def test_the_order_of_bodies_does_not_matter(order: list[int], shift: tuple[floa
     reach = resting(4)
     reach[:, 1] += path(shift)
     seen, turned = window(reach), window(reach[:, order])
-    for question in (farther_than_others, lambda w: reaching_out(w, LIMIT)):
+    for question in (moving_more_than_others, lambda w: advancing_outlines(w, LIMIT)):
         assert np.array_equal(question(turned), question(seen)[order])
 
 
 def test_a_part_that_reaches_out_is_enough() -> None:
     reach = resting(3)
     reach[6:, 0, 3] += 10.0
-    assert reaching_out(window(reach), LIMIT).tolist() == [True, False, False]
+    assert advancing_outlines(window(reach), LIMIT).tolist() == [True, False, False]
 
 
 def test_what_something_else_begins_to_cover_sets_out_nowhere() -> None:
     reach = resting(3)
     reach[6:, 0, 3:6] -= 15.0
-    assert not reaching_out(window(reach), LIMIT).any()
+    assert not advancing_outlines(window(reach), LIMIT).any()
 
 
 def test_what_is_cut_by_the_border_tells_nothing() -> None:
     reach, free = resting(2), np.ones((len(TIMES), 2, FAN))
     reach[6:, 0, 3] += 10.0
     free[:, 0, 3] = 0.0
-    assert not reaching_out(window(reach, free), LIMIT).any()
+    assert not advancing_outlines(window(reach, free), LIMIT).any()
 
 
 def test_a_history_that_is_too_short_tells_nothing() -> None:
     reach = resting(2)[:3]
     reach[2, 0] += 30.0
-    assert not reaching_out(window(reach), LIMIT).any()
+    assert not advancing_outlines(window(reach), LIMIT).any()

@@ -10,9 +10,9 @@ from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.reasoner import RELATIONS, RelationMemory
 from visup.rules.relations.samples import SampleWindow
 from visup.tasks.actions.actions import ACTIONS
+from visup.tasks.verification.new_trends import NewTrends, new_trend
 from visup.tasks.verification.observe import RelationLookup, observe
 from visup.tasks.verification.pauses import NO_PAUSES
-from visup.tasks.verification.sudden import SuddenTrends, sudden_trend
 
 TIMES = np.arange(0.0, 1.5, 1 / 15)
 NOW = float(TIMES[-1])
@@ -35,39 +35,39 @@ def mind(
 
 @pytest.mark.parametrize(("rate", "trend"), [(90.0, "diverging"), (-90.0, "converging")])
 def test_a_trend_is_known_a_quarter_of_a_second_after_its_onset(rate: float, trend: str) -> None:
-    found = sudden_trend(mind(rate), trend, (1, 2))
+    found = new_trend(mind(rate), trend, (1, 2))
     assert found is not None
     assert found.since == pytest.approx(SINCE)
     other = "converging" if trend == "diverging" else "diverging"
-    assert sudden_trend(mind(rate), other, (1, 2)) is None
+    assert new_trend(mind(rate), other, (1, 2)) is None
 
 
 def test_slow_changes_and_the_sway_of_what_is_carried_are_none() -> None:
-    assert sudden_trend(mind(5.0), "diverging", (1, 2)) is None
-    assert sudden_trend(mind(90.0, speed=300.0), "diverging", (1, 2)) is not None
-    assert sudden_trend(mind(90.0, speed=500.0), "diverging", (1, 2)) is None
+    assert new_trend(mind(5.0), "diverging", (1, 2)) is None
+    assert new_trend(mind(90.0, speed=300.0), "diverging", (1, 2)) is not None
+    assert new_trend(mind(90.0, speed=500.0), "diverging", (1, 2)) is None
 
 
 def test_nothing_is_known_of_strangers_or_of_one_alone() -> None:
-    assert sudden_trend(mind(90.0), "diverging", (1, 7)) is None
-    assert sudden_trend(mind(90.0), "diverging", (1,)) is None
-    assert sudden_trend(Mind(time=NOW), "diverging", (1, 2)) is None
+    assert new_trend(mind(90.0), "diverging", (1, 7)) is None
+    assert new_trend(mind(90.0), "diverging", (1,)) is None
+    assert new_trend(Mind(time=NOW), "diverging", (1, 2)) is None
 
 
 def test_a_trend_ends_when_the_opposite_sets_in() -> None:
-    trends = SuddenTrends(mind(90.0))
-    assert trends.ends(Relation("converging", (1, 2), Truth.TRUE, 0.0))
-    assert not trends.ends(Relation("diverging", (1, 2), Truth.TRUE, 0.0))
-    assert not trends.ends(Relation("touching", (1, 2), Truth.TRUE, 0.0))
+    trends = NewTrends(mind(90.0))
+    assert trends.has_opposite(Relation("converging", (1, 2), Truth.TRUE, 0.0))
+    assert not trends.has_opposite(Relation("diverging", (1, 2), Truth.TRUE, 0.0))
+    assert not trends.has_opposite(Relation("touching", (1, 2), Truth.TRUE, 0.0))
 
 
 def test_an_action_begins_by_it_but_does_not_hold_yet() -> None:
     seen = observe(ACTIONS["diverging"], (1, 2), RelationLookup(mind(90.0)))
-    assert seen.entry is seen.sudden is not None
+    assert seen.entry is seen.new_trend is not None
     assert seen.held_by is seen.helps is None
     stale = (Relation("converging", (1, 2), Truth.TRUE, 0.0),)
     closing = observe(ACTIONS["converging"], (1, 2), RelationLookup(mind(90.0, relations=stale)))
-    assert closing.entry is closing.sudden is None
+    assert closing.entry is closing.new_trend is None
     assert closing.held_by is not None
 
 
@@ -95,10 +95,10 @@ def passing(relative_speed: float) -> Mind:
 def test_who_has_come_to_rest_no_longer_passes_by() -> None:
     lookup = RelationLookup(passing(100.0))
     assert lookup.find("touching", (1, 2)).truth is Truth.UNKNOWN
-    before = lookup.kept(NO_PAUSES, carry=False)
+    before = lookup.memory(NO_PAUSES, carry=False)
     first = RelationLookup(passing(1.0), before=before)
     assert first.find("touching", (1, 2)).truth is Truth.UNKNOWN  # for a moment only, yet
-    later = first.kept(NO_PAUSES, carry=False)
+    later = first.memory(NO_PAUSES, carry=False)
     rests = passing(1.0)
     rests = rests.remember(RELATIONS, rests.recall(RELATIONS), time=NOW + 0.4)
     assert RelationLookup(rests, before=later).find("touching", (1, 2)).truth is Truth.TRUE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, Script, Spell, watch
-from visup.tasks.supervision import beginning
+from visup.tasks.supervision import stage_beginnings
 
 APPROACH = "<t> ::= converging(arm, satellite)"
 THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
@@ -89,7 +89,7 @@ def test_a_first_stage_of_two_things_begins_as_all_who_come_set_out(
     monkeypatch: pytest.MonkeyPatch, movers: tuple[int, ...], at: float
 ) -> None:
     """The giver brings its payload; the offer begins when the receiver, who is named first, sets out, too."""
-    monkeypatch.setattr(beginning, "setting_out", lambda mind: frozenset(movers))
+    monkeypatch.setattr(stage_beginnings, "moving_bodies", lambda mind: frozenset(movers))
     nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = Script((nears,), THREE, identities=IDENTITIES)
     assert begun(script, OFFER)["t"] == pytest.approx(at, abs=0.4)

@@ -35,17 +35,17 @@ def with_reported(
     reported: ReportedRelations, actors: Iterable[str], relation: str, until: float
 ) -> ReportedRelations:
     """The reports so far, with a relation reported to hold until a time."""
-    who = tuple(sorted(actors))
-    same = [t for t in reported if t[:2] == (who, relation)]
+    pair = tuple(sorted(actors))
+    same = [t for t in reported if t[:2] == (pair, relation)]
     until = max((until, *(t[2] for t in same)))
-    return (*(t for t in reported if t not in same), (who, relation, until))
+    return (*(t for t in reported if t not in same), (pair, relation, until))
 
 
-def joined(parts: Iterable[ReportedRelations]) -> ReportedRelations:
+def merged_reports(parts: Iterable[ReportedRelations]) -> ReportedRelations:
     """Several sets of reports merged, each relation once."""
     found: ReportedRelations = ()
-    for who, relation, until in (t for part in parts for t in part):
-        found = with_reported(found, who, relation, until)
+    for pair, relation, until in (t for part in parts for t in part):
+        found = with_reported(found, pair, relation, until)
     return found
 
 
@@ -53,5 +53,5 @@ def since_reported(
     reported: ReportedRelations, actors: Iterable[str], relation: str, since: float
 ) -> float:
     """When to report that a relation began, given when it did (`since`), seconds."""
-    who = tuple(sorted(actors))
-    return max((since, *(t[2] for t in reported if t[0] == who and excludes(t[1], relation))))
+    pair = tuple(sorted(actors))
+    return max((since, *(t[2] for t in reported if t[0] == pair and excludes(t[1], relation))))
