@@ -13,7 +13,7 @@ from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal_reader import Recording
 
 EVERY = 6
-UNTIL_S = 4.0
+UNTIL_S = 3.0
 """Seconds of the clip: both actors are recognised, and the first stage progresses. What is perceived is
 compared to the last bit, of which events show little."""
 
