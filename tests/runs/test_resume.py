@@ -85,7 +85,10 @@ def outcome(folder: Path) -> object:
     return told, list(run.summaries()), [pack_observation(o) for o in run.observations()]
 
 
-def test_killed_runs_that_are_resumed_equal_an_unbroken_one() -> None:
+def test_killed_runs_that_are_resumed_equal_an_unbroken_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(resume, "FRAMES", 32)  # the squares have crossed by then
     figures = evaluate_resume(kills=2, seed=5)
     assert figures["failures"] == []
     assert figures["total"]["equal"] == 2
@@ -95,6 +98,7 @@ def test_killed_runs_that_are_resumed_equal_an_unbroken_one() -> None:
 def test_a_kill_that_comes_after_the_end_is_judged_like_any_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(resume, "FRAMES", 32)
     monkeypatch.setattr(resume, "_kill", lambda child, after_s: os.waitpid(child, 0))
     figures = evaluate_resume(kills=1, seed=5)
     assert figures["failures"] == []
