@@ -133,8 +133,8 @@ class DenseTimeMonitor:
         twin = copy.deepcopy(self)
         twin._after = "unknown"
         moment = self._then / TICKS
-        told = (v.robustness for v in twin.finish() if v.begin_s <= moment < v.end_s)
-        return next(told, UNKNOWN)
+        values = (v.robustness for v in twin.finish() if v.begin_s <= moment < v.end_s)
+        return next(values, UNKNOWN)
 
     def finish(self, end_s: float | None = None) -> list[TimedVerdict]:
         """End the recording: the remaining verdicts.

@@ -24,18 +24,18 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.rules.identity.votes import (
     VOTES,
-    LookKind,
+    MatchKind,
     ObjectVotes,
     Tally,
     VoteMemory,
     VoteSettings,
     candidates,
     confirmed_candidate,
-    faded,
-    joined,
+    similarity_weight,
+    total_votes,
     unknown_probability,
+    update_tally,
     weights,
-    worth,
 )
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object, recognised
@@ -101,24 +101,26 @@ class IdentityReasoner(ExplainableReasoner):
         hypotheses = hypotheses_by_object(mind, observation)
         found = recognised(mind, observation)
         mind = _with_kinds(mind, hypotheses)
-        every: dict[int, ObjectVotes] = {}
+        votes_of: dict[int, ObjectVotes] = {}
         events: list[Event] = []
         beliefs: list[ObjectBelief] = []
         for object_id, belief in sorted(mind.objects.items()):
-            before = old.of.get(object_id, ObjectVotes())
-            look = _look(belief, hypotheses.get(object_id, ()), found)
-            votes = self._count(mind, belief, before, look, dt)
-            believed = self._believe(mind, belief, votes)
-            beliefs.append(believed)
-            votes = self._lead(votes, believed.candidates, observation.time)
-            if decide(self._conditions(believed, votes, mind), log, "identified", (object_id,)):
-                now = mind.with_objects(believed)
-                events.append(_identified(now, believed, votes.reported, observation))
+            before = old.votes.get(object_id, ObjectVotes())
+            evidence = _name_evidence(belief, hypotheses.get(object_id, ()), found)
+            votes = self._count(mind, belief, before, evidence, dt)
+            updated = self._with_candidates(mind, belief, votes)
+            beliefs.append(updated)
+            votes = self._update_leader(votes, updated.candidates, observation.time)
+            if decide(self._conditions(updated, votes, mind), log, "identified", (object_id,)):
+                now = mind.with_objects(updated)
+                events.append(_identified(now, updated, votes.reported, observation))
                 votes = replace(votes, reported=votes.leader)
-            every[object_id] = votes
+            votes_of[object_id] = votes
         mind = mind.with_objects(*beliefs)
-        mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(every)))
-        reported = {i: votes.reported for i, votes in every.items() if votes.reported is not None}
+        mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(votes_of)))
+        reported = {
+            i: votes.reported for i, votes in votes_of.items() if votes.reported is not None
+        }
         mind = mind.remember(REPORTED_NAMES, MappingProxyType(reported))
         return Outcome(mind, tuple(events))
 
@@ -136,12 +138,17 @@ class IdentityReasoner(ExplainableReasoner):
             yield at_least("votes of the best name, beside none of the models,", most, votes.none)
         name = belief.name
         yield Condition("it was not identified so before", votes.reported != name)
-        yield at_least(f"likelihood of {name}", belief.confidence, s.settle)
-        yield at_least("leads for", mind.time - votes.leads_since, s.settle_s, " s", slack=1e-9)
+        yield at_least(f"likelihood of {name}", belief.confidence, s.report_likelihood)
+        yield at_least("leads for", mind.time - votes.leads_since, s.report_s, " s", slack=1e-9)
         yield Condition("it has entered", belief.confirmed)
 
     def _count(
-        self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes, look: NameEvidence, dt: float
+        self,
+        mind: Mind,
+        belief: ObjectBelief,
+        votes: ObjectVotes,
+        evidence: NameEvidence,
+        dt: float,
     ) -> ObjectVotes:
         """The votes on an object after a step of `dt` seconds: decayed, plus those of its hypotheses."""
         s = self.settings
@@ -149,32 +156,43 @@ class IdentityReasoner(ExplainableReasoner):
         hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
         blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
         tau = s.tau_hidden_s if hidden or blind else s.tau_s
-        waited = awaited(mind, belief.id)
+        awaited_models = awaited(mind, belief.id)
         new_votes, share = Tally(), 0.0
-        if look.hypotheses and not (hidden or blind):
-            new = 1.0 if votes.heard is None else min(1.0, (mind.time - votes.heard) / s.apart_s)
-            new_votes, share = self._weighed(mind, belief.id, look, waited), new * visible
-            votes = replace(votes, heard=mind.time)
+        if evidence.hypotheses and not (hidden or blind):
+            new = (
+                1.0
+                if votes.last_matched is None
+                else min(1.0, (mind.time - votes.last_matched) / s.independent_s)
+            )
+            new_votes, share = (
+                self._cast_votes(mind, belief.id, evidence, awaited_models),
+                new * visible,
+            )
+            votes = replace(votes, last_matched=mind.time)
         tallies = {}
         for kind, tally in (("shape", votes.shape), ("found", votes.found)):
-            heard = new_votes if kind == look.kind else Tally()
-            tallies[kind] = faded(tally, heard, share, (dt, tau), s.most_candidates)
-        return joined(replace(votes, **tallies), s, waited)
+            kind_votes = new_votes if kind == evidence.kind else Tally()
+            tallies[kind] = update_tally(tally, kind_votes, share, (dt, tau), s.most_candidates)
+        return total_votes(replace(votes, **tallies), s, awaited_models)
 
-    def _weighed(
-        self, mind: Mind, object_id: int, look: NameEvidence, waited: Collection[str]
+    def _cast_votes(
+        self, mind: Mind, object_id: int, evidence: NameEvidence, awaited_models: Collection[str]
     ) -> Tally:
         """The votes cast by the hypotheses of one step: weights of names, and of none of the models."""
         s = self.settings
-        kind: LookKind = getattr(s, look.kind)
-        heard = weights(look.hypotheses, s, waited, kind.awaited)
+        kind: MatchKind = getattr(s, evidence.kind)
+        name_weights = weights(evidence.hypotheses, s, awaited_models, kind.awaited)
         if not at_border(mind.objects[object_id].region, mind.frame_size):
             # Views that are inconsistent over time count against a name (paper, figure 5). The visible
             # part of what the border cuts keeps changing, so that its views cannot agree.
-            heard = {n: w * pose_support(mind, object_id, n) for n, w in heard.items()}
-        return Tally(tuple(heard.items()), worth(s.stranger, s))
+            name_weights = {
+                n: w * pose_support(mind, object_id, n) for n, w in name_weights.items()
+            }
+        return Tally(tuple(name_weights.items()), similarity_weight(s.unknown_similarity, s))
 
-    def _believe(self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes) -> ObjectBelief:
+    def _with_candidates(
+        self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes
+    ) -> ObjectBelief:
         """The belief about an object with its candidates: by the operator's answer, otherwise by votes."""
         s = self.settings
         answer = mind.answers.get(belief.id)
@@ -190,15 +208,17 @@ class IdentityReasoner(ExplainableReasoner):
             unknown=unknown_probability(votes.counts, s, votes.none),
         )
 
-    def _lead(self, votes: ObjectVotes, named: tuple[Candidate, ...], now: float) -> ObjectVotes:
+    def _update_leader(
+        self, votes: ObjectVotes, named: tuple[Candidate, ...], now: float
+    ) -> ObjectVotes:
         """The votes with the clear leader and its time updated."""
-        clear = named and named[0].confidence >= self.settings.settle
+        clear = named and named[0].confidence >= self.settings.report_likelihood
         leader = named[0].name if clear else None
         since = votes.leads_since if leader == votes.leader else now
         return replace(votes, leader=leader, leads_since=since)
 
 
-def _look(
+def _name_evidence(
     belief: ObjectBelief, hypotheses: tuple[Hypothesis, ...], found: Collection[int]
 ) -> NameEvidence:
     """The hypotheses about an object, with their kind."""
@@ -207,10 +227,10 @@ def _look(
 
 def _with_kinds(mind: Mind, hypotheses: Mapping[int, Sequence[Hypothesis]]) -> Mind:
     """The mind with the names of kinds recorded."""
-    heard = {h.name for some in hypotheses.values() for h in some if h.of_kind}
+    names = {h.name for some in hypotheses.values() for h in some if h.of_kind}
     known = mind.recall(KIND_NAMES)
     return (
-        mind if heard <= set(known) else mind.remember(KIND_NAMES, (*sorted(heard | set(known)),))
+        mind if names <= set(known) else mind.remember(KIND_NAMES, (*sorted(names | set(known)),))
     )
 
 

@@ -41,7 +41,7 @@ VoteCounts = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class LookKind:
+class MatchKind:
     """Settings of one kind of match.
 
     Attributes:
@@ -65,14 +65,15 @@ class VoteSettings:
         most_candidates: Most names of an object.
         least_share: Names with a smaller share of the votes are dropped.
         known_votes: Votes that the best name needs for the object to be known at all.
-        stranger: Similarity that an object has to some model even if it is none of them.
+        unknown_similarity: Similarity that an object has to some model even if it is none of them.
         shape: Settings of matches of the silhouette.
         found: Settings of matches by the behaviour that detected the region.
-        expected: Prior votes of an awaited model, unless the behaviour that detected the object has votes.
-        apart_s: Interval from which successive hypotheses count in full, seconds.
+        awaited_votes: Prior votes of an awaited model, unless the behaviour that detected the object has
+            votes.
+        independent_s: Interval from which successive hypotheses count in full, seconds.
         evidence: Log likelihood per vote.
-        settle: Likelihood from which a name is reported.
-        settle_s: How long it must have had that likelihood, seconds.
+        report_likelihood: Likelihood from which a name is reported.
+        report_s: How long it must have had that likelihood, seconds.
     """
 
     least_similarity: float = 0.4
@@ -83,14 +84,14 @@ class VoteSettings:
     most_candidates: int = 5
     least_share: float = 0.03
     known_votes: float = 0.3
-    stranger: float = 0.5
-    shape: LookKind = LookKind(awaited=0.1)
-    found: LookKind = LookKind(awaited=0.06)
-    expected: float = 4.0
-    apart_s: float = 0.2
+    unknown_similarity: float = 0.5
+    shape: MatchKind = MatchKind(awaited=0.1)
+    found: MatchKind = MatchKind(awaited=0.06)
+    awaited_votes: float = 4.0
+    independent_s: float = 0.2
     evidence: float = 2.2
-    settle: float = 0.7
-    settle_s: float = 0.8
+    report_likelihood: float = 0.7
+    report_s: float = 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +116,8 @@ class ObjectVotes:
         none: Votes for its being none of the models.
         shape: Votes of matches of its silhouette.
         found: Votes of matches by the behaviour that detected it.
-        heard: Time of the last hypotheses about it, seconds, or None.
-        leader: The name whose likelihood is at least `settle` now, or None.
+        last_matched: Time of the last hypotheses about it, seconds, or None.
+        leader: The name whose likelihood is at least `report_likelihood` now, or None.
         leads_since: Time since when `leader` has its value, seconds.
         reported: The last reported name, or None.
     """
@@ -125,7 +126,7 @@ class ObjectVotes:
     none: float = 0.0
     shape: Tally = Tally()
     found: Tally = Tally()
-    heard: float | None = None
+    last_matched: float | None = None
     leader: str | None = None
     leads_since: float = 0.0
     reported: str | None = None
@@ -137,11 +138,11 @@ class VoteMemory:
 
     Attributes:
         time: Seconds of the last count.
-        of: Object id -> its votes.
+        votes: Object id -> its votes.
     """
 
     time: float
-    of: Mapping[int, ObjectVotes] = field(default_factory=lambda: MappingProxyType({}))
+    votes: Mapping[int, ObjectVotes] = field(default_factory=lambda: MappingProxyType({}))
 
 
 VOTES: MemoryKey[VoteMemory | None] = MemoryKey("rules.votes", None)
@@ -150,7 +151,7 @@ VOTES: MemoryKey[VoteMemory | None] = MemoryKey("rules.votes", None)
 def object_votes(mind: Mind, object_id: int) -> ObjectVotes:
     """The memory of the votes on an object."""
     memory = mind.recall(VOTES) or VoteMemory(mind.time)
-    return memory.of.get(object_id, ObjectVotes())
+    return memory.votes.get(object_id, ObjectVotes())
 
 
 def weights(
@@ -176,16 +177,19 @@ def weights(
             similarity = min(1.0, h.similarity + more * (h.name in awaited))
             best[h.name] = max(best.get(h.name, 0.0), similarity)
     ranked = sorted(best.items(), key=lambda item: (-item[1], item[0]))
-    return {name: settings.rank**k * worth(s, settings) for k, (name, s) in enumerate(ranked)}
+    return {
+        name: settings.rank**k * similarity_weight(s, settings)
+        for k, (name, s) in enumerate(ranked)
+    }
 
 
-def worth(similarity: float, settings: VoteSettings) -> float:
+def similarity_weight(similarity: float, settings: VoteSettings) -> float:
     """The weight of a similarity, 0 to 1."""
     room = 1.0 - settings.least_similarity
     return max(0.0, similarity - settings.least_similarity) / room
 
 
-def updated_votes(
+def update_votes(
     tally: VoteCounts,
     new: Mapping[str, float],
     dt: float,
@@ -215,23 +219,23 @@ def updated_votes(
 
 
 def candidates(
-    tally: VoteCounts, settings: VoteSettings, stranger: float = 0.0
+    tally: VoteCounts, settings: VoteSettings, unknown_votes: float = 0.0
 ) -> tuple[Candidate, ...]:
     """Candidates supported by votes, each with its likelihood.
 
     Args:
         tally: Votes, most first.
         settings: Number of candidates, and the scale of votes.
-        stranger: Votes for the object's being none of the models.
+        unknown_votes: Votes for the object's being none of the models.
 
     Returns:
-        Most likely first; empty while the best name has too few votes, or fewer than `stranger`.
+        Most likely first; empty while the best name has too few votes, or fewer than `unknown_votes`.
     """
-    if not tally or tally[0][1] <= 0.0 or tally[0][1] < max(settings.known_votes, stranger):
+    if not tally or tally[0][1] <= 0.0 or tally[0][1] < max(settings.known_votes, unknown_votes):
         return ()
     total = sum(v for _, v in tally)
     odds = [exp(settings.evidence * (v - tally[0][1])) for _, v in tally]
-    whole = sum(odds) + exp(settings.evidence * (stranger - tally[0][1]))
+    whole = sum(odds) + exp(settings.evidence * (unknown_votes - tally[0][1]))
     found = (
         Candidate(name, v, v / total, o / whole)
         for (name, v), o in zip(tally[: settings.most_candidates], odds, strict=False)
@@ -239,15 +243,15 @@ def candidates(
     return tuple(c for c in found if c.share >= settings.least_share)
 
 
-def unknown_probability(tally: VoteCounts, settings: VoteSettings, stranger: float) -> float:
+def unknown_probability(tally: VoteCounts, settings: VoteSettings, unknown_votes: float) -> float:
     """Probability that an object is none of the models, 0 to 1; 1 without votes on a name.
 
     Args:
         tally: Votes on names.
         settings: Scale of votes.
-        stranger: Votes for the object's being none of the models.
+        unknown_votes: Votes for the object's being none of the models.
     """
-    odds = sum(exp(settings.evidence * (v - stranger)) for _, v in tally)
+    odds = sum(exp(settings.evidence * (v - unknown_votes)) for _, v in tally)
     return 1.0 / (1.0 + odds)
 
 
@@ -256,7 +260,9 @@ def confirmed_candidate(name: str, tally: VoteCounts) -> Candidate:
     return Candidate(name, dict(tally).get(name, 0.0), 1.0, 1.0)
 
 
-def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], most: int) -> Tally:
+def update_tally(
+    tally: Tally, new: Tally, share: float, fade: tuple[float, float], most: int
+) -> Tally:
     """Update a tally by one step.
 
     Args:
@@ -268,11 +274,13 @@ def faded(tally: Tally, new: Tally, share: float, fade: tuple[float, float], mos
     """
     if not (tally.counts or tally.none or new.counts):
         return tally
-    counts = updated_votes(tally.counts, dict(new.counts), *fade, most, share)
+    counts = update_votes(tally.counts, dict(new.counts), *fade, most, share)
     return Tally(counts, tally.none * exp(-fade[0] / fade[1]) + share * new.none)
 
 
-def joined(votes: ObjectVotes, settings: VoteSettings, awaited: Collection[str]) -> ObjectVotes:
+def total_votes(
+    votes: ObjectVotes, settings: VoteSettings, awaited: Collection[str]
+) -> ObjectVotes:
     """The votes on an object with `counts` and `none` summed over all kinds of matches.
 
     Args:
@@ -287,6 +295,6 @@ def joined(votes: ObjectVotes, settings: VoteSettings, awaited: Collection[str])
             total[name] = total.get(name, 0.0) + v
     if not votes.found.counts:
         for name in total.keys() & awaited:
-            total[name] += settings.expected
+            total[name] += settings.awaited_votes
     counts = tuple(sorted(total.items(), key=lambda item: (-item[1], item[0])))
     return replace(votes, counts=counts, none=sum(t.none for t in kinds))

@@ -115,9 +115,9 @@ def estimate_angular_velocity(
 
 def _inflated(rate: AngularVelocity, recent: SpinFit, settings: SpinSettings) -> AngularVelocity:
     """The rate with its covariance inflated if the last seconds alone disagree: it may be changing."""
-    lately = _angular_velocity_of(recent, settings)
-    apart = lately.vector - rate.vector
-    both = lately.covariance + rate.covariance
+    recent_rate = _angular_velocity_of(recent, settings)
+    apart = recent_rate.vector - rate.vector
+    both = recent_rate.covariance + rate.covariance
     if apart @ np.linalg.solve(both, apart) < settings.doubt:
         return rate
     return replace(rate, covariance=rate.covariance + np.outer(apart, apart) / 4)

@@ -89,9 +89,9 @@ def came_in(facts: Snapshot) -> Codes:
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
 
     def evaluate(b: ObjectBelief) -> int:
-        if b.id not in memory.of:
+        if b.id not in memory.tracks:
             return MAYBE
-        track = memory.of[b.id]
+        track = memory.tracks[b.id]
         mostly_visible = track.visible_share >= LEAST_VISIBLE
         return code(mostly_visible and _crossed_border(track.coherent_box, b.region.bbox, size))
 
@@ -129,7 +129,7 @@ def at_home(facts: Snapshot) -> Codes:
     if not zones or memory.start is None:
         return facts.codes_of_ids(())
     early = [b for b in facts.beliefs if b.first_seen - memory.start <= START_S]
-    boxes = {b.id: memory.of[b.id].first_box for b in early if b.id in memory.of}
+    boxes = {b.id: memory.tracks[b.id].first_box for b in early if b.id in memory.tracks}
     return facts.codes_of_ids(
         {i for i, box in boxes.items() if any(_begins_in(box, z) for z in zones)}
     )

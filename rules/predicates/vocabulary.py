@@ -179,7 +179,7 @@ def first_contact(facts: Snapshot) -> Codes:
 
 def lost(facts: Snapshot) -> Codes:
     """Whether an object is out of view for no known reason."""
-    known = presence_memory(facts.mind).of
+    known = presence_memory(facts.mind).tracks
     return facts.codes_of_ids([i for i in facts.ids if i in known and known[i].lost])
 
 

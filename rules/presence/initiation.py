@@ -37,7 +37,7 @@ def confirm_new(context: StepContext) -> None:
 
 def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
     """Conditions for the entry of an object: seen steadily, large enough, and not a part of another one."""
-    s, track = context.settings, context.of[belief.id]
+    s, track = context.settings, context.tracks[belief.id]
     if _known_at_first_sight(context, belief):
         yield Condition("not part of another object", not context.may_be_part(belief))
         return
@@ -46,7 +46,7 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
     named = belief.id in context.recognised
     if named and _is_moving(belief) and not _is_known_already(context, belief):
         return
-    hidden = not named and in_place_of_hidden(belief, context.mind, context.of)
+    hidden = not named and in_place_of_hidden(belief, context.mind, context.tracks)
     yield Condition("not in the place of a hidden object", not hidden)
     if not belief.candidates:
         width, height = context.mind.frame_size
@@ -87,7 +87,7 @@ def _is_known_already(context: StepContext, belief: ObjectBelief) -> bool:
 
 def _is_early(context: StepContext, belief: ObjectBelief) -> bool:
     """Whether it was present when the video began."""
-    since = context.of[belief.id].coherent_since
+    since = context.tracks[belief.id].coherent_since
     return since - context.start <= context.settings.start_s
 
 

@@ -72,38 +72,38 @@ def confirm(
         template: Sentence of the event; {0} is the object.
         confidence: Confidence of the event, 0 to 1.
     """
-    context.put(replace(belief, confirmed=True))
-    context.tell(kind, template, belief.id, confidence=confidence)
+    context.store(replace(belief, confirmed=True))
+    context.report(kind, template, belief.id, confidence=confidence)
 
 
 def demote(context: StepContext, belief: ObjectBelief) -> None:
     """Make a part of another object tentative again."""
-    context.put(replace(belief, confirmed=False))
+    context.store(replace(belief, confirmed=False))
 
 
 def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief | None) -> None:
     """Report that an object is hidden by another one, or by something unknown (None)."""
     known = occluder if occluder is not None and occluder.confirmed else None
-    came = known is not None and came_to(context.of[belief.id], known.region)
+    came = known is not None and came_to(context.tracks[belief.id], known.region)
     _go(context, belief, Presence.HIDDEN, lost=False, into=known.id if known and came else None)
     if known is not None:
-        context.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, known.id)
+        context.report("occlusion", "{0} {is} hidden by {1}.", belief.id, known.id)
     else:
-        context.tell("occlusion", "{0} {is} hidden.", belief.id)
+        context.report("occlusion", "{0} {is} hidden.", belief.id)
 
 
 def lose(context: StepContext, belief: ObjectBelief) -> None:
     """Report that an object is lost: it is no longer seen, for no apparent reason."""
     _go(context, belief, Presence.HIDDEN, lost=True)
     template = "{0} {is} lost: it is no longer seen, for no apparent reason."
-    context.tell("lost", template, belief.id)
+    context.report("lost", template, belief.id)
 
 
 def leave(context: StepContext, belief: ObjectBelief) -> None:
     """Report that an object has left over the border of the image."""
     _go(context, belief, Presence.LEFT, lost=False)
     template = "{0} {leaves} the field of view."
-    context.tell("exit", template, belief.id, confidence=EXIT_CONFIDENCE)
+    context.report("exit", template, belief.id, confidence=EXIT_CONFIDENCE)
 
 
 def _go(
@@ -115,17 +115,17 @@ def _go(
     into: int | None = None,
 ) -> None:
     gone = replace(belief, presence=where)
-    context.put(gone, lost=lost, partial_since=None, clear_since=None, vanished_into=into)
+    context.store(gone, lost=lost, partial_since=None, clear_since=None, vanished_into=into)
 
 
 def reappear(context: StepContext, belief: ObjectBelief) -> None:
     """Report that an object is visible again after it was occluded, was lost, or had left."""
-    before = state_of(belief, context.of[belief.id])
+    before = state_of(belief, context.tracks[belief.id])
     seen = replace(belief, presence=Presence.SEEN)
-    context.put(seen, lost=False, clear_since=None, partial_since=None, vanished_into=None)
+    context.store(seen, lost=False, clear_since=None, partial_since=None, vanished_into=None)
     if before is LifecycleState.LEFT:
-        context.tell("entry", "{0} {comes} back into the field of view.", belief.id)
+        context.report("entry", "{0} {comes} back into the field of view.", belief.id)
     elif before is LifecycleState.LOST:
-        context.tell("found", "{0} {is} seen again.", belief.id)
+        context.report("found", "{0} {is} seen again.", belief.id)
     else:
-        context.tell("reappearance", "{0} {reappears}.", belief.id)
+        context.report("reappearance", "{0} {reappears}.", belief.id)

@@ -86,11 +86,11 @@ class PresenceMemory:
 
     Attributes:
         start: Time of the first observation of regions, seconds; None before it.
-        of: Object id -> its track.
+        tracks: Object id -> its track.
     """
 
     start: float | None = None
-    of: Mapping[int, ObjectTrack] = field(default_factory=lambda: MappingProxyType({}))
+    tracks: Mapping[int, ObjectTrack] = field(default_factory=lambda: MappingProxyType({}))
 
 
 TRACKS = MemoryKey("rules.presence", PresenceMemory())
@@ -104,14 +104,16 @@ def presence_memory(mind: Mind) -> PresenceMemory:
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
     """Pairs of objects that share one region now."""
     found = [
-        (i, t.merged_with) for i, t in presence_memory(mind).of.items() if t.merged_with is not None
+        (i, t.merged_with)
+        for i, t in presence_memory(mind).tracks.items()
+        if t.merged_with is not None
     ]
     return tuple(sorted(found)) if found else ()
 
 
 def visible_share(mind: Mind, object_id: int) -> float:
     """Visible share of an object, 0 to 1; 1 while unknown, 0 while it is in a merged region."""
-    of = presence_memory(mind).of
+    of = presence_memory(mind).tracks
     track = of.get(object_id)
     if track is None:
         return 1.0

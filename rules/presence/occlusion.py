@@ -38,15 +38,15 @@ def update_visible(context: StepContext) -> None:
 
 
 def _check_hiding(context: StepContext, belief: ObjectBelief) -> None:
-    track = context.of[belief.id]
+    track = context.tracks[belief.id]
     hiding = context.decide("occlusion", belief.id, _occlusion_conditions(context, belief))
     leaving = context.decide("exit", belief.id, _exit_conditions(context, track, hiding))
     if not (hiding or leaving):
         if track.partial_since is not None:
-            context.put(belief, partial_since=None)
+            context.store(belief, partial_since=None)
         return
     since = context.now if track.partial_since is None else track.partial_since
-    context.put(belief, partial_since=since)
+    context.store(belief, partial_since=since)
     lasted = at_least(
         "that lasts for", context.now - since, context.settings.partial_s, " s", slack=1e-6
     )
@@ -60,7 +60,7 @@ def _check_hiding(context: StepContext, belief: ObjectBelief) -> None:
 
 def _occlusion_conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
     """Conditions for the occlusion of an object of which a little is visible."""
-    visible, s = context.of[belief.id].visible_share, context.settings
+    visible, s = context.tracks[belief.id].visible_share, context.settings
     yield less_than("visible share", visible, s.hidden_share)
     yield Condition("another object covers it", _occluder(context, belief) is not None)
 
@@ -75,15 +75,15 @@ def _exit_conditions(context: StepContext, track: ObjectTrack, hiding: bool) -> 
 
 
 def _check_reappearance(context: StepContext, belief: ObjectBelief) -> None:
-    track = context.of[belief.id]
+    track = context.tracks[belief.id]
     if not context.decide(
         "reappearance", belief.id, _reappearance_conditions(context, belief, track)
     ):
         if track.clear_since is not None:
-            context.put(belief, clear_since=None)
+            context.store(belief, clear_since=None)
         return
     since = context.now if track.clear_since is None else track.clear_since
-    context.put(belief, clear_since=since)
+    context.store(belief, clear_since=since)
     lasted = at_least(
         "that lasts for", context.now - since, context.settings.shown_s, " s", slack=1e-6
     )
@@ -108,7 +108,7 @@ def _reappearance_conditions(
 def update_missing(context: StepContext) -> None:
     """Decide on occlusion, exit or loss of the confirmed objects that have no region now."""
     for belief in context.missing():
-        track = context.of.get(belief.id)
+        track = context.tracks.get(belief.id)
         if track is None or belief.presence is not Presence.SEEN:
             continue
         gate = tuple(_missing_conditions(context, track))
@@ -193,7 +193,7 @@ def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None
             continue
         if belief.last_seen == context.now and context.near(belief.region, other.region):
             return other
-        share = _covered_share(context, context.of[belief.id], other)
+        share = _covered_share(context, context.tracks[belief.id], other)
         if share > 0.3 and (best is None or share > best[0]):
             best = (share, other)
     return best[1] if best else None

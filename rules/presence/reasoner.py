@@ -62,7 +62,7 @@ class PresenceReasoner(ExplainableReasoner):
         _update_tracks(context)
         starting = context.now - context.start <= self.settings.start_s
         test = FragmentTest(self.fragments)
-        context.fragments = test(context.fragments, context.mind, context.of, starting=starting)
+        context.fragments = test(context.fragments, context.mind, context.tracks, starting=starting)
         confirm_new(context)
         update_visible(context)
         update_missing(context)
@@ -72,7 +72,7 @@ class PresenceReasoner(ExplainableReasoner):
         self, mind: Mind, observation: Observation, log: DecisionLog | None
     ) -> StepContext:
         old = presence_memory(mind)
-        known = {i: t for i, t in old.of.items() if i in mind.objects}
+        known = {i: t for i, t in old.tracks.items() if i in mind.objects}
         fragments = mind.recall(FRAGMENTS)
         start = observation.time if old.start is None else old.start
         return StepContext(mind, observation, known, fragments, self.settings, start, log)
@@ -104,7 +104,7 @@ def _preconditions(
 
 def _remembered(context: StepContext) -> Mind:
     """The mind with the memory of objects that are still known."""
-    tracks = {i: t for i, t in context.of.items() if i in context.mind.objects}
+    tracks = {i: t for i, t in context.tracks.items() if i in context.mind.objects}
     mind = context.mind.remember(TRACKS, PresenceMemory(context.start, MappingProxyType(tracks)))
     return mind.remember(FRAGMENTS, MappingProxyType(dict(context.fragments)))
 
@@ -112,22 +112,22 @@ def _remembered(context: StepContext) -> Mind:
 def _update_tracks(context: StepContext) -> None:
     seen = context.seen()
     around = _recently_seen(context)
-    hosts = {t.merged_with for t in context.of.values()}
+    hosts = {t.merged_with for t in context.tracks.values()}
     for belief in seen:
-        track = context.of.get(belief.id)
+        track = context.tracks.get(belief.id)
         if track is None:
-            context.of[belief.id] = new_track(belief.region, context.now)
+            context.tracks[belief.id] = new_track(belief.region, context.now)
             continue
         if track.merged_with is not None:
             # It has its own region again.
-            context.put(belief, merged_with=None, parted_at=context.now)
-            track = context.of[belief.id]
+            context.store(belief, merged_with=None, parted_at=context.now)
+            track = context.tracks[belief.id]
         crowded = belief.id in hosts or any(
             context.near(belief.region, other.region)
             for other in around
             if other.id != belief.id and not context.may_be_part(other, belief)
         )
-        context.of[belief.id] = update_track(
+        context.tracks[belief.id] = update_track(
             track,
             belief.region,
             context.now,

@@ -17,10 +17,10 @@ from visup.rules.presence.lifecycle import demote
 from visup.rules.presence.object_tracks import border_sides, new_track, predicted_box, sides_of
 from visup.rules.presence.step_context import StepContext
 
-PART = 0.7
+PART_AREA_SHARE = 0.7
 """Greatest area of an object that may be a part of a region, as a share of the region's."""
 
-WITHIN = 0.5
+PART_HULL_SHARE = 0.5
 """Least share of such an object's outline inside the region's convex hull."""
 
 
@@ -30,14 +30,14 @@ def reidentify(context: StepContext) -> None:
         if new.confirmed:
             continue
         scored = [
-            (_match_score(context, new, b), b) for b in context.missing() if b.id in context.of
+            (_match_score(context, new, b), b) for b in context.missing() if b.id in context.tracks
         ]
         score, old = max(scored, key=lambda s: (s[0], -s[1].id), default=(0.0, new))
         if score <= 0.0:
             continue
         _take_region(context, new, old)
         taken = replace(old, region=new.region, last_seen=context.now)
-        context.put(taken, merged_with=None, changed_at=context.now)
+        context.store(taken, merged_with=None, changed_at=context.now)
 
 
 def parts_of(context: StepContext, whole: ObjectBelief) -> list[ObjectBelief]:
@@ -58,7 +58,7 @@ def absorb_parts(context: StepContext, whole: ObjectBelief, parts: list[ObjectBe
     """
     oldest = parts[0]
     _take_region(context, whole, oldest)
-    context.of[oldest.id] = new_track(whole.region, context.now)
+    context.tracks[oldest.id] = new_track(whole.region, context.now)
     context.mind = context.mind.with_objects(replace(oldest, region=whole.region))
     for other in parts[1:]:
         demote(context, other)
@@ -71,18 +71,18 @@ def _take_region(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> 
 
 
 def _was_part(context: StepContext, part: ObjectBelief, whole: ObjectBelief) -> bool:
-    track, size = context.of[part.id], context.mind.frame_size
-    if part.region.area > PART * whole.region.area or sides_of(track.first_box, size):
+    track, size = context.tracks[part.id], context.mind.frame_size
+    if part.region.area > PART_AREA_SHARE * whole.region.area or sides_of(track.first_box, size):
         return False
     width, height = track.first_box[2:]
     x, y, w, h = expanded(track.first_box, round(max(width, height) / 2))
     stayed = x <= part.region.centroid[0] < x + w and y <= part.region.centroid[1] < y + h
-    return stayed and share_within(part.region, whole.region) >= WITHIN
+    return stayed and share_within(part.region, whole.region) >= PART_HULL_SHARE
 
 
 def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
     """Match score of a new region and a missing object, 0 to 1; 0 for no match."""
-    track = context.of[old.id]
+    track = context.tracks[old.id]
     named = bool(new.candidates and old.candidates) and new.name == old.name
     if named and new.id in context.recognised and old.confidence > 0.9:
         return 1.0  # a taught name denotes a single object

@@ -24,7 +24,7 @@ class StepContext:
     Attributes:
         mind: The mind so far.
         observation: The observation.
-        of: Object id -> its track.
+        tracks: Object id -> its track.
         fragments: Object id -> whether it may be only a part of another.
         settings: Settings of the reasoner.
         start: Time of the first observation of regions, seconds.
@@ -34,7 +34,7 @@ class StepContext:
 
     mind: Mind
     observation: Observation
-    of: dict[int, ObjectTrack]
+    tracks: dict[int, ObjectTrack]
     fragments: Mapping[int, FragmentHypothesis]
     settings: PresenceSettings
     start: float
@@ -87,13 +87,13 @@ class StepContext:
         """Whether all conditions of a decision about an object are met; logs them."""
         return decide(conditions, self.log, kind, (object_id,))
 
-    def put(self, belief: ObjectBelief, **track: object) -> None:
+    def store(self, belief: ObjectBelief, **track: object) -> None:
         """Store a belief, and replace fields of the object's track, given by name."""
         self.mind = self.mind.with_objects(belief)
         if track:
-            self.of[belief.id] = replace(self.of[belief.id], **track)
+            self.tracks[belief.id] = replace(self.tracks[belief.id], **track)
 
-    def tell(self, kind: str, template: str, *ids: int, confidence: float = 0.9) -> None:
+    def report(self, kind: str, template: str, *ids: int, confidence: float = 0.9) -> None:
         """Add an event; its template refers to the objects as {0}, {1}."""
         text = sentence(self.mind, template, *ids, confidence=confidence)
         self.events.append(

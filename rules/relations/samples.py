@@ -176,7 +176,7 @@ def reindexed(history: SampleWindow, ids: tuple[int, ...]) -> SampleWindow:
 
 def without_reassigned(history: SampleWindow, mind: Mind) -> SampleWindow:
     """A history without the samples of objects from before they were given another region."""
-    of = presence_memory(mind).of
+    of = presence_memory(mind).tracks
     changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
     if not len(history.times) or not (changed > history.times[0] + 1e-9).any():
         return history

@@ -102,25 +102,27 @@ class ZoneReasoner:
         states, smooth = self._before(old, ids, names, mind.time)
         apart = np.array([[self._apart(z, b, mind) for b in objects] for z in mind.zones])
         apart = apart.reshape(len(names), len(ids), 4)
-        flat = apart.reshape(-1, 4).T
-        band = np.full(flat.shape, s.enter * image_diagonal(mind.frame_size))
+        smoothed = apart.reshape(-1, 4).T
+        band = np.full(smoothed.shape, s.enter * image_diagonal(mind.frame_size))
         spread = [s.depth_sigmas * (b.depth_sigma or 0.0) for b in objects]
         band[3] = np.tile(spread, len(names))
         jump = 2.0 * s.enter * image_diagonal(mind.frame_size)
         # Depth is already smoothed, and -inf where a zone has no range.
-        flat = np.append(
-            exponential_mean(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
+        smoothed = np.append(
+            exponential_mean(smooth[:3], smoothed[:3], mind.time - old.time, jump),
+            smoothed[3:],
+            axis=0,
         )
-        wanted = edge_sign(flat, states.state, band)
-        states = advance(states, wanted, mind.time, s.minimum_s)
-        kept = ZoneMemory(ids, names, states, apart[:, :, 0], flat, mind.time)
-        told = tuple(
-            _relation(kept, question, i, name)
+        candidates = edge_sign(smoothed, states.state, band)
+        states = advance(states, candidates, mind.time, s.minimum_s)
+        memory = ZoneMemory(ids, names, states, apart[:, :, 0], smoothed, mind.time)
+        relations = tuple(
+            _relation(memory, question, i, name)
             for name in names
             for i in ids
             for question in QUESTIONS
         )
-        return Outcome(mind.remember(ZONES, kept, relations=mind.relations + told))
+        return Outcome(mind.remember(ZONES, memory, relations=mind.relations + relations))
 
     def _before(
         self, old: ZoneMemory, ids: tuple[int, ...], names: tuple[str, ...], now: float
@@ -234,16 +236,18 @@ def zone_truth(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
     return _relation(kept, question, object_id, zone).truth
 
 
-def _relation(kept: ZoneMemory, question: str, object_id: int, zone: str) -> Relation:
+def _relation(memory: ZoneMemory, question: str, object_id: int, zone: str) -> Relation:
     """Combine image and depth: outside in either is outside, even if the other is unknown."""
-    k = kept.names.index(zone) * len(kept.ids) + kept.ids.index(object_id)
+    k = memory.names.index(zone) * len(memory.ids) + memory.ids.index(object_id)
     rows = [QUESTIONS.index(question), 3]
-    codes = [int(c) for c in kept.states.state[rows, k]]
-    since = float(kept.states.since[rows, k].max())
+    codes = [int(c) for c in memory.states.state[rows, k]]
+    since = float(memory.states.since[rows, k].max())
     if ABOVE in codes:
         # Outside since the earlier of the two.
-        told = [t for c, t in zip(codes, kept.states.since[rows, k], strict=True) if c == ABOVE]
-        return Relation(f"{question} {zone}", (object_id,), Truth.FALSE, float(min(told)))
+        outside_since = [
+            t for c, t in zip(codes, memory.states.since[rows, k], strict=True) if c == ABOVE
+        ]
+        return Relation(f"{question} {zone}", (object_id,), Truth.FALSE, float(min(outside_since)))
     if UNKNOWN in codes:
         return Relation(f"{question} {zone}", (object_id,), Truth.UNKNOWN, since, 0.0)
     return Relation(f"{question} {zone}", (object_id,), Truth.TRUE, since)

@@ -83,23 +83,29 @@ def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleEx
     low, high = parts[0].interval
     interval = (-np.inf, min(high, -parts[1].interval[0])) if suspended else (low, high)
     names = ", ".join(short(values.facts.mind, i) for i in ids)
-    titled = tuple(
+    titled_parts = tuple(
         replace(p, text=f"{word} {p.text}")
         for word, p in zip(("when", "unless"), parts, strict=False)
     )
-    found = Truth.FALSE if suspended else parts[0].verdict
-    told = RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+    truth = Truth.FALSE if suspended else parts[0].verdict
+    explanation = RuleExplanation(
+        f"{rule.name}({names})", interval, truth, titled_parts, parts[0].late_s
+    )
     early = values.compiled.early_refs[values.compiled.rules.index(rule)]
-    return told if early is None else _with_early(told, values.interval(early, reader.rows))
+    return (
+        explanation
+        if early is None
+        else _with_early(explanation, values.interval(early, reader.rows))
+    )
 
 
 def _with_early(late: RuleExplanation, interval: Interval) -> RuleExplanation:
     """A rule with its early verdict, which may make it true already."""
     early = RuleExplanation("what is decided by now", interval, verdict(interval))
-    told = replace(late, parts=(*late.parts, early))
+    explanation = replace(late, parts=(*late.parts, early))
     if late.verdict is Truth.TRUE or early.verdict is not Truth.TRUE:
-        return told
-    return replace(told, interval=interval, verdict=Truth.TRUE, late_s=0.0)
+        return explanation
+    return replace(explanation, interval=interval, verdict=Truth.TRUE, late_s=0.0)
 
 
 MAX_LINES = 4096

@@ -67,8 +67,8 @@ class ExpressionValue:
             return "unknown"
         scale = 100.0 if self.unit == "%" else 1.0
         first, last = f"{low * scale:.4g}", f"{high * scale:.4g}"
-        told = first if first == last else f"{first} to {last}"
-        return f"{told} {self.unit}".rstrip()
+        text = first if first == last else f"{first} to {last}"
+        return f"{text} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,8 +215,8 @@ def _of_text(text: str, fault: RuleError | ErrorGroup) -> RuleError | ErrorGroup
     """Translate errors of the wrapping rule to errors of the text, at its own lines."""
     found = list(fault.errors) if isinstance(fault, ErrorGroup) else [fault]
     own = [e for e in found if isinstance(e.where, SourceLocation) and e.where.line > 1]
-    told = [_unwrapped(text, e) for e in own or found]
-    return told[0] if len(told) == 1 else ErrorGroup(list(told))
+    translated = [_unwrapped(text, e) for e in own or found]
+    return translated[0] if len(translated) == 1 else ErrorGroup(list(translated))
 
 
 def _unwrapped(text: str, fault: VisupError) -> RuleError:

@@ -83,13 +83,13 @@ class TraitMemory:
     Attributes:
         start: Seconds of the first step.
         time: Seconds of the last step.
-        of: Object id -> its traits.
+        traits: Object id -> its traits.
         colours_at: Seconds of the newest colours used.
     """
 
     start: float = 0.0
     time: float = 0.0
-    of: Mapping[int, Traits] = field(default_factory=lambda: MappingProxyType({}))
+    traits: Mapping[int, Traits] = field(default_factory=lambda: MappingProxyType({}))
     colours_at: float = -math.inf
 
 
@@ -100,7 +100,7 @@ NO_TRAITS = Traits()
 def traits_of(mind: Mind, object_id: int) -> Traits | None:
     """The traits of an object, or None."""
     memory = mind.recall(TRAITS)
-    return memory.of.get(object_id) if memory is not None else None
+    return memory.traits.get(object_id) if memory is not None else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ class TraitReasoner:
         moving = _moving(mind, self.settings.relations)
         of = {}
         for object_id, belief in sorted(mind.objects.items()):
-            known = old.of.get(object_id) or self._initial_traits(belief, old.start)
+            known = old.traits.get(object_id) or self._initial_traits(belief, old.start)
             if belief.presence is Presence.SEEN and belief.last_seen == mind.time:
                 known = self._with_observation(known, belief, mind, keep)
                 known = self._with_motion(known, moving.get(object_id), mind.time)

@@ -11,7 +11,7 @@ from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
 REPORTED_LIKELIHOOD = 0.7
-"""Likelihood from which on the identity of an object is reported; see `VoteSettings.settle`."""
+"""Likelihood from which on the identity of an object is reported; see `VoteSettings.report_likelihood`."""
 
 REPORTED_NAMES: MemoryKey[Mapping[int, str] | None] = MemoryKey("rules.told_names", None)
 """Object id -> the identity last reported; None where identities are not reported. The reasoner that counts

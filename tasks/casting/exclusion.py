@@ -55,14 +55,14 @@ def guessed(
     playing = {b.object_id for b in bindings if b.object_id is not None}
     unknown = [o for o in mind.present() if o.id not in playing and _unknown(o, settings)]
     was = next((b.object_id for b in before if b.guessed and b.actor == bindings[k].actor), None)
-    it = next((o.id for o in unknown if o.id == was), None)
+    object_id = next((o.id for o in unknown if o.id == was), None)
     known = [mind.objects[i] for i in playing if i in mind.objects]
-    if it is None and not any(_movers(known, mind, known)):
-        it = _only_mover(unknown, mind, known)
-    if it is None:
+    if object_id is None and not any(_movers(known, mind, known)):
+        object_id = _only_mover(unknown, mind, known)
+    if object_id is None:
         return tuple(bindings)
-    guess = replace(bindings[k], object_id=it, strength=settings.bind_at, guessed=True)
-    return (*bindings[:k], guess, *bindings[k + 1 :])
+    binding = replace(bindings[k], object_id=object_id, strength=settings.bind_at, guessed=True)
+    return (*bindings[:k], binding, *bindings[k + 1 :])
 
 
 def _told_by_looks(task: Task, binding: Binding) -> bool:

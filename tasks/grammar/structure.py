@@ -135,10 +135,10 @@ def pause_conditions(task: Task) -> Iterator[StageCondition]:
     """All pause conditions of a task, in order with duplicates."""
     for stage in task.stages:
         courses = () if isinstance(stage.body, Actors) else walk(stage.body)
-        told = (
+        conditions = (
             c for course in courses if isinstance(course, Conditioned) for c in course.conditions
         )
-        yield from (c for c in told if c.kind == "pauses")
+        yield from (c for c in conditions if c.kind == "pauses")
 
 
 def _facts(stage: Stage) -> Iterator[Fact]:

@@ -143,10 +143,10 @@ class Release:
 
     def spans(self, rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[Span]:
         """From the last release, if it was not long before, to the end of each run, seconds."""
-        told = [[e.at for e in row if e.symbol == self.parted] for row in rows]
+        partings = [[e.at for e in row if e.symbol == self.parted] for row in rows]
         return [
             (max([run.end - SETTLED_S, *times]), run.end)
-            for times, run in zip(told, runs, strict=True)
+            for times, run in zip(partings, runs, strict=True)
         ]
 
 

@@ -326,19 +326,20 @@ class Advance:
         same = any(leaf.step.same_as(x.step) for x in left)
         begun = (x.payload.begun for x in left)
         turn = math.inf if same else min((b for b in begun if b is not None), default=-math.inf)
-        told = merged_reports(self._told(x, transition) for x in left)
+        reported = merged_reports(self._reports(x, transition) for x in left)
         earliest = max((earliest_end(x) for x in left), default=-math.inf)
-        return replace(leaf, payload=replace(leaf.payload, turn=turn, told=told, earliest=earliest))
+        monitor = replace(leaf.payload, turn=turn, reported=reported, earliest=earliest)
+        return replace(leaf, payload=monitor)
 
-    def _told(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
+    def _reports(self, left: Leaf[StepMonitor], transition: OpenTransition) -> ReportedRelations:
         """The reports after a step is completed: about it and its predecessors."""
         step, monitor = left.step, left.payload
         if self._ending(left, followed := self._followed(transition)).status is not Status.DONE:
-            return monitor.told
+            return monitor.reported
         meaning, denied = self.steps.actions[step.action], self._denied(step)
         _, until = lasted(step, meaning, monitor, self.now, followed, denied)
         until = self.now if until is None else until
-        return with_reported(monitor.told, step.actors, meaning.name, until)
+        return with_reported(monitor.reported, step.actors, meaning.name, until)
 
     def _after(self, leaf: Leaf[StepMonitor], transition: OpenTransition) -> Leaf[StepMonitor]:
         """A beginning step with the end of its predecessor, from which its delay counts."""

@@ -81,18 +81,18 @@ def task_belief(
         probability = _under_way(posterior)[current]
     why = _why(verdict, teller, stages, current)
     near = likely(posterior)
-    told = Verdict.INTERRUPTED if interrupted else verdict
+    outcome = Verdict.INTERRUPTED if interrupted else verdict
     return TaskBelief(
         name,
-        told,
+        outcome,
         stages,
         current,
         snapshot.bindings,
         _expected(model, snapshot, near),
         confidence=probability,
         evidence=interrupted or why,
-        prospects=() if told in LOST else _prospects(model, snapshot, near),
-        success=0.0 if told in LOST else model.filter.success(near),
+        prospects=() if outcome in LOST else _prospects(model, snapshot, near),
+        success=0.0 if outcome in LOST else model.filter.success(near),
     )
 
 
@@ -283,8 +283,8 @@ def _why(
         failed = [s for s, (_, status) in standings(teller).items() if status is Status.FAILED]
         return next((s.evidence for s in stages if s.stage in failed), "")
     bad = next((s for s in stages if s.status in BAD), None)
-    told = bad or next((s for s in stages if s.stage == current), None)
-    return told.evidence if told else ""
+    deciding = bad or next((s for s in stages if s.stage == current), None)
+    return deciding.evidence if deciding else ""
 
 
 def _under_way(posterior: TaskHypotheses) -> dict[str, float]:
@@ -315,8 +315,8 @@ def _prospects(
     for stage, chance in model.filter.next_stages(near):
         absent = (model.spare[a] for a in called(stage)[1] if a in model.spare)
         kind = "" if snapshot.found(called(stage)[1]) else next(absent, "")
-        told = awaited.setdefault(kind, stage) if kind else stage
-        chances[told] = chances.get(told, 0.0) + chance
+        stage_named = awaited.setdefault(kind, stage) if kind else stage
+        chances[stage_named] = chances.get(stage_named, 0.0) + chance
     likely = sorted((s for s in chances.items() if s[1] >= NEAR), key=lambda s: -s[1])
     return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
 

@@ -48,7 +48,7 @@ def evidence(
             return _late(step, monitor)
         case Status.FAILING | Status.FAILED if monitor.contrary is not None:
             known = monitor.entered if monitor.contrary_since is None else monitor.contrary_since
-            since = since_reported(monitor.told, step.actors, monitor.contrary, known)
+            since = since_reported(monitor.reported, step.actors, monitor.contrary, known)
             what = _clause(monitor.contrary, actions, f"{who} {have} been", "has held")
             return (
                 f"{what} since {since:.1f} s; {_demand(step, meaning, monitor.contrary, actions)}"
@@ -60,7 +60,7 @@ def evidence(
             return f"{what}; {_demand(step, meaning, monitor.fault, actions)}"
         case Status.PROGRESSING if monitor.helped_since is not None:
             by, known = monitor.helped_by or "", max(0.0, monitor.helped_since)
-            since = since_reported(monitor.told, step.actors, by, known)
+            since = since_reported(monitor.reported, step.actors, by, known)
             return f"{_clause(by, actions, f'{who} {have} been', 'has held')} since {since:.1f} s"
         case Status.STALLED if monitor.helped_at is not None:
             return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
@@ -169,11 +169,11 @@ def lasted(
     latest = monitor.helped_since or 0.0
     if meaning.lasts or monitor.held_s == 0.0:
         since, until = _first_known(monitor), last_held(meaning, monitor, now, followed)
-        told = since_reported(monitor.told, step.actors, meaning.name, since)
+        told = since_reported(monitor.reported, step.actors, meaning.name, since)
         # If something else was reported in between, it began anew.
         return (since if told == since else max(told, latest)), until
     known = max(0.0, now - monitor.held_s, latest)
-    since = since_reported(monitor.told, step.actors, meaning.name, known)
+    since = since_reported(monitor.reported, step.actors, meaning.name, known)
     return since, denied if denied is not None and denied > since else None
 
 

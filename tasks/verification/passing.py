@@ -199,7 +199,7 @@ def vanished_into(mind: Mind, objects: tuple[int, ...]) -> float | None:
     """
     if len(objects) != 2:
         return None
-    tracks = presence_memory(mind).of
+    tracks = presence_memory(mind).tracks
     for body, other in (objects, objects[::-1]):
         if body in tracks and tracks[body].vanished_into == other:
             return tracks[body].last_seen

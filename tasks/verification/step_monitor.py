@@ -70,7 +70,7 @@ class StepMonitor:
         after: When the previous step was over; for the first step, the start.
         hasty_s: Delay after which it began, if the course requires a longer one; else None.
         fulfilled_at: When it was first fulfilled, or None.
-        told: Reported relations of this and of earlier steps; incompatible ones are reported to begin later.
+        reported: Relations reported of this and of earlier steps; incompatible ones then begin later.
         earliest: The earliest time at which it can have begun: when the previous step was first observed, or
             had lasted as long as required.
         farthest: Greatest gap between its actors since it fails, pixels; None if it does not, or if unknown.
@@ -110,7 +110,7 @@ class StepMonitor:
     after: float = -math.inf
     hasty_s: float | None = None
     fulfilled_at: float | None = None
-    told: ReportedRelations = ()
+    reported: ReportedRelations = ()
     earliest: float = -math.inf
     greatest_gap: float | None = None
 
@@ -194,9 +194,9 @@ def _note_reported(monitor: StepMonitor, step: TaskStep, status: Status, now: fl
     """Record a reported change of status, with the relation that caused it."""
     by = monitor.helped_by if status is Status.PROGRESSING else None
     by = monitor.contrary if status in BAD else by
-    return (
-        replace(monitor, told=with_reported(monitor.told, step.actors, by, now)) if by else monitor
-    )
+    if not by:
+        return monitor
+    return replace(monitor, reported=with_reported(monitor.reported, step.actors, by, now))
 
 
 def _note_lateness(

@@ -58,7 +58,7 @@ def checked_run(observations: Iterable[Observation]) -> set[str]:
 
     before: dict[int, object] = {}
     for thought in think((*rules.update, *map(checked, rules.cogitate)), observations):
-        tracks = presence_memory(thought.mind).of
+        tracks = presence_memory(thought.mind).tracks
         after = {i: state_of(b, tracks.get(i)) for i, b in thought.mind.objects.items()}
         steps = {(before[i], state) for i, state in after.items() if i in before}
         assert {(a, b) for a, b in steps if a is not b} <= TRANSITIONS

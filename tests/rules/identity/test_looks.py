@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.rules.runs import think
 from tests.rules.scenes import box_region, seen
 from visup.agent import ObjectBelief, Observation, Report, ReportState
-from visup.rules.identity.votes import ObjectVotes, Tally, VoteSettings, faded, joined
+from visup.rules.identity.votes import ObjectVotes, Tally, VoteSettings, total_votes, update_tally
 from visup.rules.reasoners import default_reasoners
 
 SET = VoteSettings()
@@ -53,10 +53,12 @@ def believed(
 def test_votes_of_all_looks_are_added_up(
     shape: tuple[tuple[str, float], ...], found: tuple[tuple[str, float], ...], none: float
 ) -> None:
-    counted = joined(ObjectVotes(shape=Tally(shape, none), found=Tally(found, none)), SET, {"a"})
+    counted = total_votes(
+        ObjectVotes(shape=Tally(shape, none), found=Tally(found, none)), SET, {"a"}
+    )
     for name, v in counted.counts:
         own = dict(shape).get(name, 0.0) + dict(found).get(name, 0.0)
-        assert v == pytest.approx(own + SET.expected * (name == "a" and not found))
+        assert v == pytest.approx(own + SET.awaited_votes * (name == "a" and not found))
     assert counted.none == pytest.approx(2.0 * none)
     assert [v for _, v in counted.counts] == sorted((v for _, v in counted.counts), reverse=True)
 
@@ -66,7 +68,7 @@ def test_votes_of_all_looks_are_added_up(
 def test_where_nobody_looked_a_tally_only_fades(
     counts: tuple[tuple[str, float], ...], none: float, dt: float
 ) -> None:
-    after = faded(Tally(counts, none), Tally(), 0.0, (dt, SET.tau_s), 5)
+    after = update_tally(Tally(counts, none), Tally(), 0.0, (dt, SET.tau_s), 5)
     assert after.none <= none
     assert all(v <= dict(counts)[name] for name, v in after.counts)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Hypothesis, ReportState
-from visup.rules.identity.votes import VoteSettings, candidates, updated_votes, weights
+from visup.rules.identity.votes import VoteSettings, candidates, update_votes, weights
 
 SET = VoteSettings()
 names = st.sampled_from("abcdef")
@@ -29,7 +29,7 @@ def test_recurrent_hypotheses_beat_those_that_change(others: list[str], s: float
     tally: tuple[tuple[str, float], ...] = ()
     for i, other in enumerate(others):
         said = (Hypothesis(1, "z", 0, s), Hypothesis(1, f"{other}{i % 3}", 0, s - 0.01))
-        tally = updated_votes(tally, weights(said, SET), 0.1, SET.tau_s, SET.most_candidates)
+        tally = update_votes(tally, weights(said, SET), 0.1, SET.tau_s, SET.most_candidates)
     assert tally[0][0] == "z"
     assert share(tally, "z") > max(share(tally, n) for n, _ in tally if n != "z")
 
@@ -37,17 +37,17 @@ def test_recurrent_hypotheses_beat_those_that_change(others: list[str], s: float
 @some
 @given(st.floats(0.5, 1.0), st.floats(0.5, 20.0))
 def test_what_is_not_hypothesised_is_forgotten(s: float, silence: float) -> None:
-    tally = updated_votes((), weights((Hypothesis(1, "a", 0, s),), SET), 0.0, SET.tau_s, 5)
-    later = updated_votes(tally, {}, silence, SET.tau_s, 5)
+    tally = update_votes((), weights((Hypothesis(1, "a", 0, s),), SET), 0.0, SET.tau_s, 5)
+    later = update_votes(tally, {}, silence, SET.tau_s, 5)
     assert dict(later).get("a", 0.0) < tally[0][1] * exp(-0.49 * silence / SET.tau_s)
 
 
 @some
 @given(st.floats(0.5, 1.0), st.floats(0.1, 10.0))
 def test_hidden_objects_keep_their_votes_longer(s: float, hidden: float) -> None:
-    tally = updated_votes((), weights((Hypothesis(1, "a", 0, s),), SET), 0.0, SET.tau_s, 5)
-    held = dict(updated_votes(tally, {}, hidden, SET.tau_hidden_s, 5)).get("a", 0.0)
-    lost = dict(updated_votes(tally, {}, hidden, SET.tau_s, 5)).get("a", 0.0)
+    tally = update_votes((), weights((Hypothesis(1, "a", 0, s),), SET), 0.0, SET.tau_s, 5)
+    held = dict(update_votes(tally, {}, hidden, SET.tau_hidden_s, 5)).get("a", 0.0)
+    lost = dict(update_votes(tally, {}, hidden, SET.tau_s, 5)).get("a", 0.0)
     assert held > lost
     assert held > 0.8 * tally[0][1]
 
@@ -71,7 +71,7 @@ def test_votes_follow_the_formula(similarities: list[float], dt: float) -> None:
     tally: tuple[tuple[str, float], ...] = ()
     for s in similarities:
         votes = votes * exp(-dt / SET.tau_s) + (s - 0.4) / 0.6
-        tally = updated_votes(tally, weights((Hypothesis(1, "a", 0, s),), SET), dt, SET.tau_s, 5)
+        tally = update_votes(tally, weights((Hypothesis(1, "a", 0, s),), SET), dt, SET.tau_s, 5)
     assert dict(tally).get("a", 0.0) == pytest.approx(votes, abs=1e-3)
 
 

@@ -43,17 +43,23 @@ COUPLED = with_reported((), PAIR, "coupled", 8.3)
         ("coupled", HELD, (7.9,), 7.9, "coupled until 7.9 s"),
         ("coupled", HELD, (), 3.0, "coupled since 3.9 s"),
         # What excludes it was told in between: it began anew.
-        ("converging", replace(NEARED, told=PARTED), (), None, "converging from 2.4 s to 3.0 s"),
+        (
+            "converging",
+            replace(NEARED, reported=PARTED),
+            (),
+            None,
+            "converging from 2.4 s to 3.0 s",
+        ),
         (
             "coupled",
-            replace(HELD, told=with_reported((), PAIR, "diverging", 5.6)),
+            replace(HELD, reported=with_reported((), PAIR, "diverging", 5.6)),
             (),
             None,
             "since 5.6 s",
         ),
         (
             "coupled",
-            replace(HELD, told=with_reported((), PAIR, "touching", 5.6)),
+            replace(HELD, reported=with_reported((), PAIR, "touching", 5.6)),
             (),
             None,
             "since 3.9 s",
@@ -78,7 +84,7 @@ def test_times_of_what_is_over_agree_with_what_follows(
     [
         (StepMonitor(8.3, helped_by="diverging", helped_since=8.1), "diverging since 8.1 s"),
         (
-            StepMonitor(8.3, helped_by="diverging", helped_since=8.1, told=COUPLED),
+            StepMonitor(8.3, helped_by="diverging", helped_since=8.1, reported=COUPLED),
             "diverging since 8.3 s",
         ),
     ],

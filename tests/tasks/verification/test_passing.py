@@ -272,7 +272,7 @@ def test_only_what_comes_to_a_body_vanishes_into_it(
     assert came_to(track, other.region) is came
     told: dict[str, Any] = {}
     context = SimpleNamespace(
-        of={PART: track},
+        tracks={PART: track},
         mind=SimpleNamespace(objects={PART: body}),
         put=lambda belief, **fields: told.update(fields),
         tell=lambda *words: None,

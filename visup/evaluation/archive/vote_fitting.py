@@ -97,7 +97,7 @@ def labelled_votes(lake: Lake, truth: Mapping[str, RunTruth]) -> Iterator[Labell
         for number, belief in sorted(mind.objects.items()):
             name = truth[run].objects.get(str(number))
             counted = object_votes(mind, number)
-            if name is not None and belief.confirmed and counted.heard is not None:
+            if name is not None and belief.confirmed and counted.last_matched is not None:
                 yield _labelled(counted, name)
 
 

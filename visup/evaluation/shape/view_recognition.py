@@ -27,7 +27,7 @@ from visup.percepts.shape.building.mesh_views import half_sphere_directions, loa
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
 from visup.rules.identity.votes import VoteSettings
 
-STRANGER = VoteSettings().stranger
+STRANGER = VoteSettings().unknown_similarity
 """Similarity above which a name gets more votes than "none of the models"."""
 
 TOP = 5

@@ -202,7 +202,7 @@ def identity_unmet(step: LastStep, object_id: int) -> Why:
     if votes.reported is not None and votes.reported == belief.name:
         return Why(f"object {object_id} was identified as {votes.reported}")
     parts = [*_conditions(step, IdentityReasoner, "identified", (object_id,))]
-    heard = "never" if votes.heard is None else f"at {votes.heard:.2f} s"
+    heard = "never" if votes.last_matched is None else f"at {votes.last_matched:.2f} s"
     parts.append(Why(f"what it looks like was last said {heard}"))
     if not belief.confirmed:
         parts.append(entry_unmet(step, object_id))
