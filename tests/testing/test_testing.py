@@ -64,7 +64,7 @@ CHEATS: dict[str, tuple[type, str]] = {
     "writes": (plug(write), "read-only"),
     "keeps": (plug(keep), "percepts of earlier frames changed later"),
     "chance": (plug(lambda s, f, seen: next(TICKET)), "is deterministic: a second run"),
-    "slow": (plug(lambda s, f, seen: time.sleep(0.01), cost_ms=5), "keeps its budget: "),
+    "slow": (plug(lambda s, f, seen: time.sleep(0.002), cost_ms=1), "keeps its budget: "),
     "unknown need": (plug(lambda s, f, seen: 0, needs=("smell",)), "have no 'smell'"),
 }
 
