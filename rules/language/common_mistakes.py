@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 from math import degrees
 
@@ -24,12 +25,22 @@ class MistakePattern:
         new: Its correction; a template as for `re.Match.expand`, or a function of the match.
     """
 
-    pattern: re.Pattern[str]
+    pattern: str
     new: str | Callable[[re.Match[str]], str]
+
+    def found(self, text: str, begin: int, end: int) -> Iterator[re.Match[str]]:
+        """Where the pattern is found in a part of a text."""
+        return _compiled(self.pattern).finditer(text, begin, end)
+
+
+@cache
+def _compiled(pattern: str) -> re.Pattern[str]:
+    """Compiled when it is first needed: there are hundreds, and most processes read no mistake."""
+    return re.compile(pattern, re.MULTILINE)
 
 
 def _fix(pattern: str, new: str | Callable[[re.Match[str]], str]) -> MistakePattern:
-    return MistakePattern(re.compile(pattern, re.MULTILINE), new)
+    return MistakePattern(pattern, new)
 
 
 WORDS_OF_PAIRS = (

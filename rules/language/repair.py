@@ -192,7 +192,7 @@ def common_fixes(
     """
     end = len(text) if high is None else high
     for slip in MISTAKE_PATTERNS:
-        for match in slip.pattern.finditer(text, low, end):
+        for match in slip.found(text, low, end):
             if match.start() - 1 <= at + length and at - 1 <= match.end():
                 new = match.expand(slip.new) if isinstance(slip.new, str) else slip.new(match)
                 yield Repair(match.start(), match.end(), new)

@@ -225,7 +225,7 @@ def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
     for usual in (*FOREIGN_FORMS, *USUAL):
         if fault.code not in usual.codes:
             continue
-        matches = list(usual.pattern.finditer(line))
+        matches = list(usual.found(line))
         for match in sorted(matches, key=lambda m: _distance(m, fault.place.column - 1)):
             new = match.expand(usual.new) if isinstance(usual.new, str) else usual.new(match)
             if new != match[0]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from visup.agent.model.did_you_mean import closest
 from visup.rules.correction.everyday_phrases import NUMBERS
@@ -28,13 +29,23 @@ class UsualMeaning:
     """
 
     codes: tuple[str, ...]
-    pattern: re.Pattern[str]
+    pattern: str
     new: New
+
+    def found(self, line: str) -> Iterator[re.Match[str]]:
+        """Where the pattern is found in a line."""
+        return _compiled(self.pattern).finditer(line)
+
+
+@cache
+def _compiled(pattern: str) -> re.Pattern[str]:
+    """Compiled when it is first needed: there are hundreds, and most processes read no mistake."""
+    return re.compile(pattern)
 
 
 def usual(codes: str, pattern: str, new: New) -> UsualMeaning:
     """A usual meaning of mistakes with these codes, separated by blanks."""
-    return UsualMeaning(tuple(codes.split()), re.compile(pattern), new)
+    return UsualMeaning(tuple(codes.split()), pattern, new)
 
 
 STAGES_MEANT = {"near": "converging", "hold": "coupled", "holding": "coupled", "present": "present",
