@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -165,8 +165,15 @@ def _relations(
     return tuple(found)
 
 
+@cache
+def _never(name: str, pair: tuple[int, int]) -> Relation:
+    return Relation(name, pair, Truth.FALSE, 0.0)
+
+
 def _relation(script: Script, name: str, pair: tuple[int, int], time: float) -> Relation:
-    mine = script.told.get((name, frozenset(pair)), ())
+    mine = script.told.get((name, frozenset(pair)))
+    if mine is None:
+        return _never(name, pair)
     for spell in mine:
         if spell.from_s <= time < spell.to_s:
             return Relation(name, pair, spell.truth, spell.from_s, spell.confidence)

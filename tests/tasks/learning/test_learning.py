@@ -73,7 +73,7 @@ def picked(name: str, seed: int, spoilt: str = "") -> RunTrace:
         spells[3:] = [Spell("diverging", t2, t2 + 8.0, (ARM, PART))]
     elif spoilt == "bump":
         spells.append(Spell("touching", t2, t2 + 2.0, (ARM, CRATE)))
-    return run_of(name, spells)
+    return run_of(name, spells, t4 + 14.0)
 
 
 @cache
