@@ -65,18 +65,20 @@ _LAYOUTS: dict[type, _RecordLayout] = {}
 
 
 def _of_open(record: Record, changes: Mapping[str, Any], layout: _RecordLayout) -> Record:
-    held, alike = record.__dict__, True
+    held: dict[str, Any] = record.__dict__
     for name, value in changes.items():
-        alike = held[name] is value and alike
-    if alike:
+        if held[name] is not value:
+            break
+    else:
         return record
+    if len(held) != len(layout.place):  # cached properties of the old fields are dropped
+        held = dict(zip(layout.place, layout.read(record), strict=True))
+    values = {**held, **changes}
+    if len(values) != len(held):
+        raise KeyError(next(name for name in changes if name not in held))
     new = object.__new__(type(record))
-    inside = new.__dict__
-    if len(held) == len(layout.place):
-        inside.update(held)
-    else:  # cached properties of the old fields are dropped
-        inside.update(zip(layout.place, layout.read(record), strict=True))
-    inside.update(changes)
+    # A dict that is merged at once is made in half the time of one that is filled.
+    object.__setattr__(new, "__dict__", values)
     return new
 
 

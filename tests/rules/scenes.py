@@ -35,17 +35,16 @@ def box_region(id_: int, rect: Rect, size: tuple[int, int] = SIZE) -> Region | N
     if right <= left or bottom <= top:
         return None
     along_x, along_y = np.linspace(x0, x1 - 1, 40), np.linspace(y0, y1 - 1, 40)
-    sides = (
-        [(x, y0) for x in along_x],
-        [(x1 - 1, y) for y in along_y],
-        [(x, y1 - 1) for x in along_x[::-1]],
-        [(x0, y) for y in along_y[::-1]],
-    )
+    contour = np.empty((4, 40, 2), np.float32)
+    contour[0, :, 0], contour[0, :, 1] = along_x, y0
+    contour[1, :, 0], contour[1, :, 1] = x1 - 1, along_y
+    contour[2, :, 0], contour[2, :, 1] = along_x[::-1], y1 - 1
+    contour[3, :, 0], contour[3, :, 1] = x0, along_y[::-1]
     return Region(
         id=id_,
         bbox=(left, top, right - left, bottom - top),
         mask=np.ones((bottom - top, right - left), dtype=bool),
-        contour=np.array([p for side in sides for p in side], dtype=np.float32),
+        contour=contour.reshape(-1, 2),
         centroid=((x0 + x1 - 1) / 2, (y0 + y1 - 1) / 2),
         area=float((right - left) * (bottom - top)),
         cut=left == 0 or top == 0 or right == size[0] or bottom == size[1],

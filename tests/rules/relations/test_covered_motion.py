@@ -46,11 +46,12 @@ def swept(
     """A body that moves, and an edge that covers it from one side and draws back when it is half covered."""
     ys, xs = np.mgrid[: SIZE[1], : SIZE[0]]
     toward = np.array([np.cos(way), np.sin(way)])
+    along = xs * toward[0] + ys * toward[1]
     for frame in range(FRAMES):
         time = frame / FPS
         at = np.array([240.0, 180.0]) + np.array(velocity) * (time - 2.0)
         reach = 100.0 - abs(pace * (time - 1.5) - 100.0)
-        hidden = (xs - at[0]) * toward[0] + (ys - at[1]) * toward[1] < reach - 100.0
+        hidden = along < reach - 100.0 + at @ toward
         mask = body((at[0], at[1]), turn) & ~hidden
         region = region_of(mask, 1, velocity)
         yield replace(region, velocity_sigma=SIGMA if image else 0.0)
