@@ -274,8 +274,8 @@ def test_only_what_comes_to_a_body_vanishes_into_it(
     context = SimpleNamespace(
         tracks={PART: track},
         mind=SimpleNamespace(objects={PART: body}),
-        put=lambda belief, **fields: told.update(fields),
-        tell=lambda *words: None,
+        store=lambda belief, **fields: told.update(fields),
+        report=lambda *words: None,
     )
     occlude(context, body, other)  # type: ignore[arg-type]
     assert told["vanished_into"] == (TARGET if came else None)
