@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import time
+from contextlib import chdir
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -30,6 +32,12 @@ def text_of(path: Path) -> str:
     return path.read_bytes().decode("utf-8")
 
 
+@cache  # several tests tell of the same files
+def faults_of(path: Path) -> tuple[Diagnostic, ...]:
+    with chdir(path.parent):  # where they look for what they include
+        return tuple(diagnose(text_of(path), path.name)[1])
+
+
 def expected_of(text: str, word: str) -> list[str]:
     line = next(x for x in text.splitlines() if x.startswith(f"# {word}:"))
     return line.split(":", 1)[1].split()
@@ -45,25 +53,18 @@ def test_good_files_have_the_stages_and_actors_that_they_say(path: Path) -> None
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda p: p.stem)
-def test_bad_files_are_told_as_written_beside_them(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(path.parent)  # where they look for what they include
-    _, faults = diagnose(text_of(path), path.name)
-    assert "".join(f"{f}\n" for f in faults) == path.with_suffix(".txt").read_text("utf-8")
+def test_bad_files_are_told_as_written_beside_them(path: Path) -> None:
+    assert "".join(f"{f}\n" for f in faults_of(path)) == path.with_suffix(".txt").read_text("utf-8")
 
 
-def test_bad_files_with_one_mistake_give_one_message(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(HERE / "bad")
+def test_bad_files_with_one_mistake_give_one_message() -> None:
     several = {"three_mistakes": 3, "everything": 6, "typographic": 2}
     for path in BAD:
-        _, faults = diagnose(text_of(path), path.name)
-        assert len(faults) == several.get(path.stem, 1), path.stem
+        assert len(faults_of(path)) == several.get(path.stem, 1), path.stem
 
 
-def test_every_code_is_shown_by_a_bad_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(HERE / "bad")
-    shown = {f.code for p in BAD for f in diagnose(text_of(p), p.name)[1]}
+def test_every_code_is_shown_by_a_bad_file() -> None:
+    shown = {f.code for p in BAD for f in faults_of(p)}
     assert shown | {"E231"} == set(CODES)
 
 
