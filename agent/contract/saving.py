@@ -30,6 +30,6 @@ class Stateless:
         """Nothing to restore."""
 
 
-def saved_attributes(it: object, *left_out: str) -> dict[str, Any]:
+def saved_attributes(behaviour: object, *left_out: str) -> dict[str, Any]:
     """The attributes of an object except those left out: the result of most `save` methods."""
-    return {name: value for name, value in vars(it).items() if name not in left_out}
+    return {name: value for name, value in vars(behaviour).items() if name not in left_out}

@@ -81,12 +81,12 @@ def alert_events(
     opened: Iterable[Alert], closed: Iterable[Alert], time: float, frame_index: int
 ) -> tuple[Event, ...]:
     """The events of alerts that opened or closed."""
-    told = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
+    opening_events = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
     over = [
         _event("alert_closed", f"Resolved: {a.cause}", a, time, frame_index, Severity.INFO)
         for a in closed
     ]
-    return (*told, *over)
+    return (*opening_events, *over)
 
 
 def _event(
@@ -96,8 +96,8 @@ def _event(
     return Event(kind, time, frame_index, text, alert.objects, severity=severity, data=data)
 
 
-def _key(it: Alert | AlertCondition) -> Key:
-    return it.kind, it.objects, it.key
+def _key(record: Alert | AlertCondition) -> Key:
+    return record.kind, record.objects, record.key
 
 
 def _by_key(conditions: Iterable[AlertCondition]) -> dict[Key, AlertCondition]:

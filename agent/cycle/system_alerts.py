@@ -33,9 +33,13 @@ SYSTEM_ALERTS = NOT_PASSED_ON | NOT_WATCHED
 
 def grave_kinds(reported: Iterable[Event | Alert]) -> Iterator[str]:
     """Kinds of events or alerts of severity warning and above; for an `alert` event, that of its alert."""
-    for it in reported:
-        if it.severity >= Severity.WARNING:
-            yield str(it.data.get("alert_kind", it.kind)) if isinstance(it, Event) else it.kind
+    for record in reported:
+        if record.severity >= Severity.WARNING:
+            yield (
+                str(record.data.get("alert_kind", record.kind))
+                if isinstance(record, Event)
+                else record.kind
+            )
 
 
 def verdict_without_task(kinds: Iterable[str], so_far: Verdict | None = None) -> Verdict | None:

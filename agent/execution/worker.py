@@ -134,9 +134,13 @@ def _run(
         seen = from_document(one["observation"])
         past.append(PastFrame(Frame(one["index"], one["time"], image), seen))
     frame = Frame(request["index"], request["time"], _image(request["image"], frames))
-    told = from_document(request["observation"])
+    observation_so_far = from_document(request["observation"])
     observation = Observation(
-        told.frame_index, told.time, told.frame_size, told.reports, tuple(past)
+        observation_so_far.frame_index,
+        observation_so_far.time,
+        observation_so_far.frame_size,
+        observation_so_far.reports,
+        tuple(past),
     )
     directives = tuple(decode(d) for d in request["directives"])
     percepts = run_behaviour(behaviour, contract, frame, observation, directives)

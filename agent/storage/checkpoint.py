@@ -199,10 +199,10 @@ class _StateReader:
         return {self._of(k): self._of(v) for k, v in nodes}
 
     def made(self, name: str, attributes: list[tuple[str, _Node]]) -> Any:
-        it: Any = object.__new__(_class(name))
+        record: Any = object.__new__(_class(name))
         for attribute, node in attributes:
-            object.__setattr__(it, attribute, self._of(node))
-        return it
+            object.__setattr__(record, attribute, self._of(node))
+        return record
 
     def named(self, name: str, nodes: list[_Node]) -> Any:
         kind = _class(name)
@@ -214,10 +214,10 @@ class _StateReader:
         kind = _class(name)
         if not issubclass(kind, str) or issubclass(kind, Enum):
             raise ValueError(f"{name} is not a text")
-        it = str.__new__(kind, text)
+        made = str.__new__(kind, text)
         for attribute, node in attributes:
-            object.__setattr__(it, attribute, self._of(node))
-        return it
+            object.__setattr__(made, attribute, self._of(node))
+        return made
 
     def csr(self, *parts: _Node) -> Any:
         from scipy.sparse import csr_matrix

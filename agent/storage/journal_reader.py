@@ -66,10 +66,10 @@ class Recording:
                 expected=f"a run folder with {JOURNAL}",
                 hint=_nearest_run(run),
             )
-        it = cls(path)
-        for _ in it._rows("SELECT 1 FROM steps, run LIMIT 1"):
+        recording = cls(path)
+        for _ in recording._rows("SELECT 1 FROM steps, run LIMIT 1"):
             pass
-        return it
+        return recording
 
     def facts(self) -> Mapping[str, Any]:
         """Facts about the run, from `Journal.note`."""
@@ -166,8 +166,8 @@ class Recording:
         """
         sql = "SELECT frame_index, time, summary, seen, crc FROM steps WHERE frame_index = ?"
         for path, (index, time, text, data, crc) in self._rows(sql, (frame,)):
-            told = {"frame_index": index, "time": time, **self._record(text)}
-            return told, _observation_of(path, index, data, crc)
+            fields = {"frame_index": index, "time": time, **self._record(text)}
+            return fields, _observation_of(path, index, data, crc)
         raise self._no_step(frame)
 
     def _no_step(self, frame: int) -> OutputError:

@@ -361,8 +361,8 @@ class MotionSegmenter:
         camera = self._predict_camera(scene.time, span)
         guess = predicted_positions(scene, tracks, camera, lag, span)
         noise = self.settings.noise
-        look = partial(track_points, nearby=self._foreground.moves)
-        return self._executor.submit(look, scene.points, guess, (old, scene.image), lag, noise)
+        track = partial(track_points, nearby=self._foreground.moves)
+        return self._executor.submit(track, scene.points, guess, (old, scene.image), lag, noise)
 
     def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
         """The background motion fitted to the constraints over one baseline."""

@@ -141,10 +141,10 @@ def _run(step: Operation, slot: int) -> Run:
     one, other = (*step.reads, -1, -1)[:2]
     first, second = (*step.numbers, 0.0, 0.0)[:2]
     if step.operator is not None:
-        return _remembering(_update(step.operator), slot, one, other)
+        return _operator_run(_update(step.operator), slot, one, other)
     if step.node is not None:
         name = step.node.name
-        return _looking(name)
+        return _lookup_run(name)
     if step.kind == "number":
         return lambda v, before, after, now, signals: (first, second)
     function = _FUNCTIONS[step.kind]
@@ -153,19 +153,19 @@ def _run(step: Operation, slot: int) -> Run:
     return lambda v, before, after, now, signals: function(v[one], first, second)
 
 
-def _looking(name: str) -> Run:
+def _lookup_run(name: str) -> Run:
     """An executor that looks up a signal; with a fast path for floats."""
 
-    def look(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Interval:
+    def lookup(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Interval:
         value = signals.get(name)
         if type(value) is float and value == value:  # NaN is not equal to itself
             return (value, value)
         return known_interval(value)
 
-    return look
+    return lookup
 
 
-def _remembering(update: Update, slot: int, one: int, other: int) -> Run:
+def _operator_run(update: Update, slot: int, one: int, other: int) -> Run:
     """An executor that reads and writes its state in a slot."""
 
     def single(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:

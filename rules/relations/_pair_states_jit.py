@@ -262,7 +262,7 @@ def _together(
     relative: float,
     halves: tuple[float, float],
     slower: float,
-    lately: float,
+    image_speed: float,
     before: int,
     limits: tuple[float, ...],
 ) -> int:
@@ -274,7 +274,9 @@ def _together(
     still, half, wide, goes_on = limits
     held = before == 1
     # Fast motion sways, and motion before it started is irrelevant.
-    if lately > 4.0 * still and halves[1] < max(half, SWAY * (wide if held else 1.0) * lately):
+    if image_speed > 4.0 * still and halves[1] < max(
+        half, SWAY * (wide if held else 1.0) * image_speed
+    ):
         return 1
     if np.isnan(relative):
         return UNKNOWN
@@ -315,8 +317,8 @@ def classify_motion(
                 tables[PairQuantity.RELATIVE_SPEED, i, j],
                 min(now.speed[i], now.speed[j]),
             )
-            lately = min(_speed(now.motion[2], i), _speed(now.motion[2], j))
-            codes[2, k] = _together(relative, halves, slower, lately, state[2, k], limits.rest)
+            image_speed = min(_speed(now.motion[2], i), _speed(now.motion[2], j))
+            codes[2, k] = _together(relative, halves, slower, image_speed, state[2, k], limits.rest)
             meets = tables[PairQuantity.GAP, i, j] <= limits.touch[0]
             if now.marks[k] & COUPLED and meets and found == DIVERGING:
                 # A rotating body changes its outline; it separates when its parts no longer touch.

@@ -95,9 +95,13 @@ def _plain(
     rule: Rule, formula: Formula, rows: list[tuple[float, Values]], reading: Reading
 ) -> tuple[Formula, list[tuple[float, dict[str, SignalValue]]]]:
     """Convert a formula to plain signals, with their samples."""
-    looks: dict[str, SignalEvaluator] = {}
-    plain: Any = rebuilt(formula, lambda node: _signal(rule, node, looks, reading))
-    return plain, [(t, {key: look(row) for key, look in looks.items()}) for t, row in rows]
+    evaluators: dict[str, SignalEvaluator] = {}
+    formula_over_signals: Any = rebuilt(
+        formula, lambda node: _signal(rule, node, evaluators, reading)
+    )
+    return formula_over_signals, [
+        (t, {key: evaluate(row) for key, evaluate in evaluators.items()}) for t, row in rows
+    ]
 
 
 def _at(verdicts: list[TimedVerdict], time: float) -> Truth:
@@ -106,13 +110,15 @@ def _at(verdicts: list[TimedVerdict], time: float) -> Truth:
     return verdict(next(robustness, (-inf, -inf)))
 
 
-def _signal(rule: Rule, node: Node, looks: dict[str, SignalEvaluator], reading: str) -> Node | None:
+def _signal(
+    rule: Rule, node: Node, evaluators: dict[str, SignalEvaluator], reading: str
+) -> Node | None:
     """Convert a signal word to a plain signal, recorded under a name."""
     if not isinstance(node, Predicate | Measure):
         return None
     key, words = str(node), node.words
     if isinstance(node, Measure) and node.name == "signal":
-        looks[key] = lambda values: number_of(values.get(words[0]))
+        evaluators[key] = lambda values: number_of(values.get(words[0]))
         return Measure(key, (), node.span)
     fact = _FACTS.get(node.name) if isinstance(node, Predicate) else None
     if fact is None:
@@ -121,7 +127,7 @@ def _signal(rule: Rule, node: Node, looks: dict[str, SignalEvaluator], reading: 
     if reading == "linear":
         what, hint = f"'{node}' has no line between samples", HELD
         raise _refused(rule, node.span, what, "numbers alone", hint)
-    looks[key] = lambda values: _SIGNAL_OF[fact(values, *words)]
+    evaluators[key] = lambda values: _SIGNAL_OF[fact(values, *words)]
     return Comparison(Measure(key, (), node.span), ">", NONE, None, node.span)
 
 

@@ -136,7 +136,7 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             text = f"as `{fact}` says"
         else:
             zone = next(str(a) for a in fact.words if a in zones)
-            evaluators[key] = _zone_look(task, name, zone)
+            evaluators[key] = _zone_evaluator(task, name, zone)
             text = f"{text} {zone}"
         meaning = _draws_near(actions[name]) if _asks_for_nearness(fact) else actions[name]
         takes = tuple(k for k in meaning.kinds if k == "object")
@@ -223,13 +223,13 @@ def _said(task: Task) -> Iterator[Fact]:
 def _word(name: str, words: tuple[str, ...] = ()) -> FactEvaluator:
     """The evaluator of a word of rules; `words` are its arguments other than objects."""
 
-    def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
+    def evaluate(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
         return TRUTH_OF[int(PREDICATES[name].evaluate(facts, *words)[rows])]
 
-    return look
+    return evaluate
 
 
 def _rows(facts: Snapshot, ids: tuple[int, ...]) -> tuple[int, ...] | None:
@@ -275,17 +275,17 @@ def _comparison(
 ) -> FactEvaluator:
     """Compare a quantity with a bound: true or false if its whole interval agrees, else unknown."""
 
-    def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
+    def evaluate(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
         low, high = measured(facts, rows)
         if sign == BETWEEN:
             return _within(low, high, bound, most)
-        told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
-        return Truth.UNKNOWN if len(told) > 1 else truth_if(told.pop())
+        truths = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
+        return Truth.UNKNOWN if len(truths) > 1 else truth_if(truths.pop())
 
-    return look
+    return evaluate
 
 
 def _within(low: float, high: float, least: float, most: float) -> Truth:
@@ -295,29 +295,29 @@ def _within(low: float, high: float, least: float, most: float) -> Truth:
     return Truth.FALSE if high < least or low > most else Truth.UNKNOWN
 
 
-def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
+def _zone_evaluator(task: Task, name: str, zone: str) -> FactEvaluator:
     """The evaluator of a zone: one defined in the task directly, one of the settings as in rules."""
     declared = next(z for z in task.zones if z.name == zone)
     corners, floor = declared.corners, floor_polygon(declared, task.ground)
     polygon = np.asarray(corners, dtype=float)
     question = "reaching" if name == "outside" else name
 
-    def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
+    def evaluate(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None:
             return Truth.UNKNOWN
         if declared.floor:
-            told = Truth.UNKNOWN
+            truth = Truth.UNKNOWN
             if floor is not None:
-                told = stands_in(facts.beliefs[rows[0]], floor, question, facts.mind.frame_size)
+                truth = stands_in(facts.beliefs[rows[0]], floor, question, facts.mind.frame_size)
         elif corners:
             region = facts.beliefs[rows[0]].region
             centre = np.array([region.centroid])
             points = centre if name == "inside" else np.asarray(region.contour, dtype=float)
             within = contains(points, polygon)
-            told = truth_if(bool(within.all() if name == "wholly_inside" else within.any()))
+            truth = truth_if(bool(within.all() if name == "wholly_inside" else within.any()))
         else:
-            told = zone_truth(facts.mind, question, ids[0], zone)
-        return NEGATION[told] if name == "outside" else told
+            truth = zone_truth(facts.mind, question, ids[0], zone)
+        return NEGATION[truth] if name == "outside" else truth
 
-    return look
+    return evaluate

@@ -283,12 +283,12 @@ class NameCheck:
 
     def unobserved(self) -> Iterator[Diagnostic]:
         """Actions whose percepts are not available, each reported once."""
-        told = set()
+        reported = set()
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
             missing = sorted(meaning.needs - self.percepts) if meaning else []
-            if missing and name not in told:
-                told.add(name)
+            if missing and name not in reported:
+                reported.add(name)
                 said = " and ".join(f"`{m}`" for m in missing)
                 what = f"`{name}` can never be observed: it needs {said}, which nothing provides"
                 hint = "enable the behaviour that provides it, or require something else"

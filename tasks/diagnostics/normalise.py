@@ -73,12 +73,12 @@ def _text_in(line: str, before: str) -> re.Match[str] | None:
 def _clean_code(
     code: str, offset: int, number: int, source: Source, faults: list[Diagnostic]
 ) -> str:
-    told = set()
+    reported = set()
     for i, char in enumerate(code):
         kind = _odd(char)
         quoted = kind == "E105" and char in QUOTES
-        if kind and (kind, quoted) not in told:
-            told.add((kind, quoted))
+        if kind and (kind, quoted) not in reported:
+            reported.add((kind, quoted))
             length = _quoted(code, i) if quoted else 1
             faults.append(_odd_fault(kind, char, source.place(number, offset + i + 1, length)))
     return "".join(_meant(c) if _odd(c) else c for c in code)

@@ -70,7 +70,7 @@ class TaskSnapshot:
 
     def _required(self, step: TaskStep) -> ActionObservation:
         """The observation of a required action; an object that vanished into another one touches it."""
-        seen = self._look(step.action, step.actors).settled
+        seen = self._observe_action(step.action, step.actors).settled
         if seen.holds is not Truth.UNKNOWN or "touching" not in self._actions[step.action].holds:
             return seen
         objects = self.objects(step.actors)
@@ -92,7 +92,7 @@ class TaskSnapshot:
         # Facts are not evaluated during a pause: they keep their state.
         return self._relations.memory(self.pauses, self.pauses.now(self._pausing) is not None)
 
-    def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
+    def _observe_action(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
         key = (action, actors)
         if key not in self._seen:
             objects = tuple(self._objects.get(a) for a in actors)
@@ -105,7 +105,7 @@ class TaskSnapshot:
         return self._seen[key]
 
     def _holds(self, action: str, actors: tuple[str, ...]) -> Truth:
-        return self._look(action, actors).holds
+        return self._observe_action(action, actors).holds
 
     def found(self, actors: tuple[str, ...]) -> bool:
         """Whether all the given actors are bound to objects."""

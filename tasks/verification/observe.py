@@ -64,12 +64,12 @@ class RelationLookup:
     def __init__(
         self,
         mind: Mind,
-        looks: Mapping[str, FactEvaluator] = NOTHING,
+        evaluators: Mapping[str, FactEvaluator] = NOTHING,
         before: ObservationMemory = NO_MEMORY,
         rhythms: Mapping[str, Rhythm] = NO_RHYTHMS,
     ) -> None:
         self.mind = mind
-        self._evaluators = looks
+        self._evaluators = evaluators
         self._rhythms = rhythms
         self._previous_time = mind.time if before.time is None else before.time
         self._before = dict(before.lasting)

@@ -164,8 +164,8 @@ def track_points(
     begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
     # Between adjacent frames dense flow gives the starting point: coarse levels would only mislead.
     near = lag == 1
-    look = search if nearby else search_widely
-    there, found, misfit = look(new, old, start, begin, 1 if near else 2, near=near)
+    search_function = search if nearby else search_widely
+    there, found, misfit = search_function(new, old, start, begin, 1 if near else 2, near=near)
     home, back = _back(points, begin, there, found, images, near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # Results of lost points may not even be finite.

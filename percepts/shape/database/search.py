@@ -195,10 +195,10 @@ class ViewSearch:
         likely = self.index.candidates(query, among, wanted.most, favoured)
         shapes = [self._shapes[k] for k in likely.numbers]
         rigid = ~np.isnan(self._views.records["direction"][likely.numbers, 0])
-        looks = compare_outlines_and_areas(
+        comparison = compare_outlines_and_areas(
             query, shapes, likely.overlaps, mirror=wanted.mirror, rigid=rigid
         )
-        share, worth = looks.shares[:, 0], looks.worth
+        share, worth = comparison.shares[:, 0], comparison.worth
         ceilings = share * likely.bounds + worth
         found: list[ViewMatch] = []
         for n in np.argsort(-ceilings, kind="stable"):
@@ -210,7 +210,7 @@ class ViewSearch:
             ceiling = match_ceiling(query.graph, graph, likely.similar[n], root)
             if share[n] * ceiling + worth[n] < least:
                 continue
-            likeness = looks.joined(int(n), self._match(query, number, likely.similar[n]))
+            likeness = comparison.joined(int(n), self._match(query, number, likely.similar[n]))
             found = wanted.best([*found, ViewMatch(self._views[number], likeness)])
         return Ranking(tuple(found), len(likely.numbers))
 
@@ -238,8 +238,8 @@ class ViewSearch:
         own = query_map(query.contour, border)
         breadth = CUT_BREADTH * wanted.most
         likely = self._cut_index.likeliest(own, among, breadth, mirror=wanted.mirror)
-        looks = self._cut_looks(query.contour, border, likely)
-        worth = looks.worth
+        comparison = self._compare_cut_outlines(query.contour, border, likely)
+        worth = comparison.worth
         found: list[ViewMatch] = []
         for n in np.argsort(-worth, kind="stable"):
             number, cut = likely[n]
@@ -247,12 +247,12 @@ class ViewSearch:
             if CUT_SHARE * (CUT_SHARES[0] + float(worth[n])) < least:
                 continue
             graphs = self._part(query, number, cut, least / CUT_SHARE - worth[n])
-            likeness = looks.joined(int(n), graphs)
+            likeness = comparison.joined(int(n), graphs)
             lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
             found = wanted.best([*found, ViewMatch(self._views[number], lowered, cut)])
         return Ranking(tuple(found), len(likely))
 
-    def _cut_looks(
+    def _compare_cut_outlines(
         self, contour: NDArray[np.floating], border: float, likely: Sequence[tuple[int, CutLine]]
     ) -> OutlineAreaSimilarities:
         """Outline and area similarities of a cut silhouette with views, each cut by its line."""

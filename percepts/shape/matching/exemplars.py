@@ -25,11 +25,11 @@ def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
     out = np.eye(len(shapes))
     index = AreaIndex(np.stack([s.areas for s in shapes]))
     for i, shape in enumerate(shapes):
-        looks = compare_outlines_and_areas(
+        comparison = compare_outlines_and_areas(
             shape, shapes[:i], index.overlaps(shape.areas, np.arange(i))
         )
         graphs = np.array([match_graphs(shape.graph, o.graph).similarity for o in shapes[:i]])
-        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + looks.worth
+        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + comparison.worth
     return out
 
 

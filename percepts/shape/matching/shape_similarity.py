@@ -152,8 +152,10 @@ def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True, rigid: bool = Fal
         (1.0, True)
     """
     overlaps = area_overlaps(a.areas, b.areas[None])
-    looks = compare_outlines_and_areas(a, [b], overlaps, mirror=mirror, rigid=np.array([rigid]))
-    return looks.joined(0, match_graphs(a.graph, b.graph))
+    comparison = compare_outlines_and_areas(
+        a, [b], overlaps, mirror=mirror, rigid=np.array([rigid])
+    )
+    return comparison.joined(0, match_graphs(a.graph, b.graph))
 
 
 def compare_outlines_and_areas(
