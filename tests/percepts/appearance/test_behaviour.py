@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 
 import numpy as np
 import pytest
@@ -71,6 +72,12 @@ def carried(steps: int) -> list[Places]:
     return [*out, *[end | {"tool": (174, 67 - 6 * k)} for k in range(8)], *[end] * 4]
 
 
+@cache
+def seen_carried() -> tuple[dict[str, Region], ...]:
+    """What is seen of a part that is carried in 26 steps; several tests read it."""
+    return tuple(watch(AppearanceBehaviour(shown(START, "part", "tray")), carried(26)))
+
+
 @pytest.mark.parametrize("light", [0.4, 0.6])
 def test_things_are_found_in_other_light_by_the_views_that_were_taught(light: float) -> None:
     elsewhere = shown({"tray": (20, 20), "part": (180, 120)}, "tray", "part", "part")
@@ -105,8 +112,7 @@ def test_things_at_rest_are_named_and_keep_exactly_their_mask() -> None:
 
 
 def test_a_part_keeps_its_id_and_its_mask_while_it_is_carried() -> None:
-    course = carried(26)
-    seen = watch(AppearanceBehaviour(shown(START, "part", "tray")), course)
+    course, seen = carried(26), seen_carried()
     good = [
         s.get("part") is not None and iou(s["part"], p, "part") > 0.5
         for s, p in zip(seen, course, strict=True)
@@ -117,9 +123,7 @@ def test_a_part_keeps_its_id_and_its_mask_while_it_is_carried() -> None:
 
 
 def test_velocity_is_what_it_is() -> None:
-    course = carried(26)
-    seen = watch(AppearanceBehaviour(shown(START, "part", "tray")), course)
-    for s in seen[20:30]:
+    for s in seen_carried()[20:30]:
         speed = np.array([130, 55]) / 26 * FPS
         assert np.allclose(s["part"].velocity, speed, atol=12)
         assert 0 < s["part"].velocity_sigma < 10
