@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FADES = 0.9
+DECAY = 0.9
 """Weight of the earlier steps in each frame: they fade over some ten frames, whatever the frame rate."""
-SHAKES_PX = 5.0
+LEAST_PATH_PX = 5.0
 """Least path of the ground of a camera that shakes, working pixels."""
-GETS_NOWHERE = 0.5
+MOST_NET_SHARE = 0.5
 """Share of that path below which net motion counts as none: shaking in place 0.03 to 0.28, pans 0.6 to 1."""
 
 
@@ -33,9 +33,9 @@ class CameraSway:
     @property
     def in_place(self) -> bool:
         """Whether the camera shakes without net displacement."""
-        return self.path > SHAKES_PX and float(np.hypot(*self.net)) < GETS_NOWHERE * self.path
+        return self.path > LEAST_PATH_PX and float(np.hypot(*self.net)) < MOST_NET_SHARE * self.path
 
     def after(self, step: tuple[float, float]) -> CameraSway:
         """The sway after one more step (x, y) of the ground, working pixels."""
-        net = FADES * self.net[0] + step[0], FADES * self.net[1] + step[1]
-        return CameraSway(net, FADES * self.path + float(np.hypot(*step)))
+        net = DECAY * self.net[0] + step[0], DECAY * self.net[1] + step[1]
+        return CameraSway(net, DECAY * self.path + float(np.hypot(*step)))

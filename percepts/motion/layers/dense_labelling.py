@@ -23,9 +23,10 @@ from visup.percepts.motion.features.work_image import Floats
 
 REACH = 2.0  # pixels on either side of a point: an edge may belong to either of its sides
 CLIP = 5.0
-STAY = 4.0  # weight of the previous posterior where an object rests
+REST_WEIGHT = 4.0  # weight of the previous posterior where an object rests
 STILL_DISCARDED = 0.9  # share of the motion evidence discarded there
-UNCERTAIN = 0.03  # weight of evidence for anything but background from which a cell is uncertain
+UNCERTAIN_WEIGHT = 0.03
+"""Weight of evidence for anything but background from which a cell is uncertain."""
 UNCERTAIN_STEPS = 3  # only cells this near to uncertain ones are solved for; the rest is background
 LEAST = 0.03  # floor of the prior: no label is impossible before there is evidence
 
@@ -123,7 +124,7 @@ def random_walk(
     """
     # Far from any cell that may not be background the answer is background: only the rest is solved
     # for, with those cells as its boundary.
-    uncertain = may_be_foreground(share, weight, prior, persistence, UNCERTAIN)
+    uncertain = may_be_foreground(share, weight, prior, persistence, UNCERTAIN_WEIGHT)
     inside = np.flatnonzero(cells.dilated(uncertain[:, None], UNCERTAIN_STEPS)[:, 0])
     out = np.zeros(share.shape, np.float32)
     out[:, 0] = 1.0
@@ -168,7 +169,7 @@ def label_cells(
     bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
     bias[_border(cells.labels)] *= 10
     bias *= np.where(prior.shares[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
-    trust[stay], bias[stay] = STAY, 0.0
+    trust[stay], bias[stay] = REST_WEIGHT, 0.0
     weight[stay] *= 1 - STILL_DISCARDED
     posterior = random_walk(
         cells, share, settings.evidence * weight, prior.by_appearance, trust, bias

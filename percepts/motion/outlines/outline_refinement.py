@@ -31,26 +31,26 @@ from visup.percepts.motion.outlines._outline_refinement_jit import (
 from visup.percepts.motion.outlines.outline_motion import CropMotion
 
 ROUNDS = 2  # times that the sides are described and the outline is moved
-WINDOW = 21  # pixels: side of the window whose tones are compared
-SAMPLED = (WINDOW // 2 + 1, WINDOW // 2 + 1)  # the same in the image at half the size
-BAND = 5  # pixels from the outline within which pixels may change sides
-RING = 12  # pixels beyond the outline that count as surroundings
+WINDOW_SIDE = 21  # pixels: side of the window whose tones are compared
+HALF_WINDOW = (WINDOW_SIDE // 2 + 1, WINDOW_SIDE // 2 + 1)  # the same in the image at half the size
+BAND_WIDTH = 5  # pixels from the outline within which pixels may change sides
+RING_WIDTH = 12  # pixels beyond the outline that count as surroundings
 LEAST = 0.08  # share of the window that each side must fill
 NOISE = 6.0  # least standard deviation of tones
 MOST = 3.0  # log odds that either description may give to a pixel at most
-BOTH = 0.1  # share of the window that describes both sides
-NEITHER = 20.0  # pixels that speak for neither side, added to each bin of the histograms
-LOCAL = 1.5  # weight of the log odds by tones in the window
-COLOURS = 1.1  # weight of the log odds by colours
-MOTION = 1.0  # weight of the log odds by motion
-UNSURE = 0.02  # a prior share is at least as far from 0 and 1
-STEEP = 0.7  # weight of a pixel's prior share, per unit of log odds
-ALIKE = 32.0  # log odds that a neighbour just alike and sure of its side adds
+SHARED_PIXELS = 0.1  # share of the window that describes both sides
+SMOOTHING_PIXELS = 20.0  # pixels that speak for neither side, added to each bin of the histograms
+LOCAL_WEIGHT = 1.5  # weight of the log odds by tones in the window
+COLOUR_WEIGHT = 1.1  # weight of the log odds by colours
+MOTION_WEIGHT = 1.0  # weight of the log odds by motion
+PRIOR_MARGIN = 0.02  # a prior share is at least as far from 0 and 1
+PRIOR_WEIGHT = 0.7  # weight of a pixel's prior share, per unit of log odds
+NEIGHBOUR_WEIGHT = 32.0  # log odds that a neighbour just alike and sure of its side adds
 SWEEPS = 3  # passes of mean field in a round
 Means = tuple[Floats, Floats]
 """(h / 2, w / 2, 3) means of tones in windows, and of their squares."""
 
-CONTEXT = WINDOW // 2 + BAND
+CONTEXT = WINDOW_SIDE // 2 + BAND_WIDTH
 """Margin around the object that a crop for refinement needs, pixels."""
 
 
@@ -72,18 +72,18 @@ def refine_outline(
     flows = None if motion is None else motion.side_flows((share > 0.5).view(np.uint8))
     for _ in range(ROUNDS):
         inside = (share > 0.5).view(np.uint8)
-        near = places_of(_grown(inside, BAND) != _shrunk(inside, BAND))
+        near = places_of(_grown(inside, BAND_WIDTH) != _shrunk(inside, BAND_WIDTH))
         if not len(near):
             return share
         local = local_log_odds(inside, near, tone, half, every)
         colours = histogram_log_odds(inside, near, tone)
-        prior = np.log(share_odds(share, near, UNSURE))
-        sum_of_odds = LOCAL * local + COLOURS * colours + STEEP * prior
+        prior = np.log(share_odds(share, near, PRIOR_MARGIN))
+        sum_of_odds = LOCAL_WEIGHT * local + COLOUR_WEIGHT * colours + PRIOR_WEIGHT * prior
         odds = np.asarray(sum_of_odds, dtype=np.float32)
         if motion is not None and flows is not None:
-            odds += MOTION * motion.log_odds(near, flows)
+            odds += MOTION_WEIGHT * motion.log_odds(near, flows)
         alike = likeness_of_neighbours(near, tone)
-        share = mean_field(share, near, odds, alike, ALIKE, SWEEPS)
+        share = mean_field(share, near, odds, alike, NEIGHBOUR_WEIGHT, SWEEPS)
     return share
 
 
@@ -107,9 +107,11 @@ def local_log_odds(
         (N,) float32; 0 where a side fills too little of the window.
     """
     some = _halved(inside)
-    full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
+    full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, HALF_WINDOW), dtype=np.float32)
     mine = np.asarray(cv2.bitwise_and(half, half, mask=some), dtype=np.uint8)
-    return window_log_odds(near, full, tone, window_means(mine), every, (LEAST, NOISE, MOST, BOTH))
+    return window_log_odds(
+        near, full, tone, window_means(mine), every, (LEAST, NOISE, MOST, SHARED_PIXELS)
+    )
 
 
 def histogram_log_odds(inside: NDArray[np.uint8], near: Places, tone: NDArray[np.uint8]) -> Floats:
@@ -123,7 +125,7 @@ def histogram_log_odds(inside: NDArray[np.uint8], near: Places, tone: NDArray[np
     Returns:
         (N,) float32.
     """
-    odds = histogram_odds(near, inside, _grown(inside, RING), tone, NEITHER)
+    odds = histogram_odds(near, inside, _grown(inside, RING_WIDTH), tone, SMOOTHING_PIXELS)
     # NumPy takes logarithms of many numbers at once, compiled loops one by one.
     return np.asarray(np.clip(np.log(odds), -MOST, MOST))
 
@@ -140,8 +142,8 @@ def likeness_of_neighbours(near: Places, tone: NDArray[np.uint8]) -> Floats:
 def window_means(tones: NDArray[np.uint8]) -> Means:
     """Means of tones at half the size, and of their squares, in the window around each pixel."""
     return (
-        np.asarray(cv2.boxFilter(tones, cv2.CV_32F, SAMPLED), dtype=np.float32),
-        np.asarray(cv2.sqrBoxFilter(tones, cv2.CV_32F, SAMPLED), dtype=np.float32),
+        np.asarray(cv2.boxFilter(tones, cv2.CV_32F, HALF_WINDOW), dtype=np.float32),
+        np.asarray(cv2.sqrBoxFilter(tones, cv2.CV_32F, HALF_WINDOW), dtype=np.float32),
     )
 
 

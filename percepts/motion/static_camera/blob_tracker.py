@@ -37,11 +37,12 @@ from visup.percepts.motion.static_camera.side_by_side import (
 )
 from visup.percepts.motion.static_camera.templates import best_template_shift, split_blob
 
-CLAIM = 0.25  # least overlap for a claim, as a share of the smaller of object and blob
-VISIBLE = 0.2  # visible share of its template below which an object is hidden
+LEAST_CLAIM = 0.25  # least overlap for a claim, as a share of the smaller of object and blob
+VISIBLE_SHARE = 0.2  # visible share of its template below which an object is hidden
 FRAGMENT = 0.2  # largest gap between fragments of one object, as a share of its length
 FOLLOW = 0.35  # weight of a newly measured velocity
-PASSED = 0.6  # displacement, in lengths, after which the pieces of an object are several objects
+PASSED_SHARE = 0.6
+"""Displacement, in lengths, after which the pieces of an object are several objects."""
 PIECE = 0.35  # least area of a piece that may be an object, as a share of the largest
 GROWN = 1.3  # visible area, in areas of the template, from which the template is outdated
 
@@ -100,7 +101,7 @@ def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
     for s in ahead:
         at, own = template_window(s, view.labels.shape)
         common = np.bincount(crop(view.labels, at)[crop(s.shape, own)], minlength=view.count + 1)
-        least = CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
+        least = LEAST_CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
         claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
     _assign_unclaimed(ahead, view, claims, areas)
     return claims
@@ -170,7 +171,7 @@ def _merged_parts(
     whole, others = order[0], []
     reach = max(3, round(FRAGMENT * max(s.shape.shape)))
     # A static occluder, such as a post, splits an object only until the object has passed it.
-    two = s.split_px > PASSED * max(s.shape.shape)
+    two = s.split_px > PASSED_SHARE * max(s.shape.shape)
     for part in order[1:]:
         bodies = s.split_px > 0 and are_side_by_side(_box(whole), _box(part), slender)
         if (two or bodies) and _is_large_part(part, whole):
@@ -240,7 +241,7 @@ def _updated(
         pieces: Whether it is visible in several large pieces.
     """
     full = np.count_nonzero(s.shape)
-    if mask is None or np.count_nonzero(mask) < VISIBLE * full:
+    if mask is None or np.count_nonzero(mask) < VISIBLE_SHARE * full:
         return replace(s, visible=None, merged=not alone)
     box, shape = crop_mask(mask)
     if not alone and np.count_nonzero(mask) < GROWN * full:

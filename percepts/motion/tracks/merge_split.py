@@ -30,10 +30,11 @@ from visup.percepts.motion.tracks.track_fitting import moves_like
 
 NEAR_STEPS = 4  # cells between tracks that touch
 APART_S = 1.5
-VOTES = 3.0
+MERGE_VOTES = 3.0
 MOST_PARTS = 3
-LIMB = 0.5  # largest limb, as a share of its object's area
-SURROUNDED = 0.75  # share of a track's surroundings that one other covers when it is a part of that
+LIMB_SHARE = 0.5  # largest limb, as a share of its object's area
+SURROUNDED_SHARE = 0.75
+"""Share of a track's surroundings that one other covers when it is a part of that."""
 CONTACT = 5.0  # affinity of two flat cells of one tone
 
 
@@ -75,7 +76,7 @@ def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: FrameMea
     """Whether a part is too large and covers too much of the image border for a limb of its host."""
     area = scene.cells.area
     return bool(
-        area[part].sum() > LIMB * area[host].sum()
+        area[part].sum() > LIMB_SHARE * area[host].sum()
         and border_share(part.astype(np.float32), scene.cells) > LITTLE_BORDER
     )
 
@@ -165,7 +166,7 @@ def merge_tracks(
     near = scene.cells.dilated(members | ring, NEAR_STEPS - 1)
     touch = (near.astype(np.float32).T @ members.astype(np.float32)) > 0
     around = ring.astype(np.float32).T @ members.astype(np.float32)
-    inside = around > SURROUNDED * ring.sum(axis=0)[:, None]
+    inside = around > SURROUNDED_SHARE * ring.sum(axis=0)[:, None]
     grown = _without_edge_between(scene, winner, len(tracks))
     seen = members.any(axis=0)
     touch = (touch | touch.T) & seen & seen[:, None]
@@ -182,9 +183,9 @@ def merge_tracks(
                 votes += 1.0
             else:
                 votes += _vote(scene, a, members[:, i], members[:, j])
-            votes = max(votes, -VOTES)
+            votes = max(votes, -MERGE_VOTES)
             out[i] = replace(a, merge_votes=_with(a.merge_votes, b.key, votes))
-            if votes >= VOTES:
+            if votes >= MERGE_VOTES:
                 out[i] = merged(out[i], b)
                 out[j] = replace(b, id=-1)
                 break

@@ -16,14 +16,14 @@ from visup.percepts.motion.outlines._outline_refinement_jit import (
     taken_side,
 )
 from visup.percepts.motion.outlines.outline_refinement import (
-    BAND,
-    BOTH,
+    BAND_WIDTH,
+    HALF_WINDOW,
     LEAST,
     MOST,
-    NEITHER,
     NOISE,
     ROUNDS,
-    SAMPLED,
+    SHARED_PIXELS,
+    SMOOTHING_PIXELS,
     likeness_of_neighbours,
     local_log_odds,
     refine_outline,
@@ -50,7 +50,7 @@ def painted(mask: np.ndarray, inner: int, outer: int, seed: int = 1) -> np.ndarr
 
 def ring_of(inside: np.ndarray) -> np.ndarray:
     """Pixels beside an outline."""
-    kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
+    kernel = np.ones((2 * BAND_WIDTH + 1, 2 * BAND_WIDTH + 1), np.uint8)
     return np.asarray(cv2.dilate(inside, kernel) != cv2.erode(inside, kernel))
 
 
@@ -96,7 +96,7 @@ def test_only_pixels_beside_the_outline_may_change(x: int, y: int, radius: int, 
     tone = np.repeat(texture(seed, SHAPE)[..., None], 3, axis=2)
     inside = (share > 0.5).astype(np.uint8)
     # Each round begins at the outline that the round before has drawn.
-    kernel = np.ones((2 * ROUNDS * BAND + 1, 2 * ROUNDS * BAND + 1), np.uint8)
+    kernel = np.ones((2 * ROUNDS * BAND_WIDTH + 1, 2 * ROUNDS * BAND_WIDTH + 1), np.uint8)
     far = cv2.dilate(inside, kernel) == cv2.erode(inside, kernel)
     assert np.array_equal(refine_outline(share, tone)[far], share[far])
 
@@ -124,18 +124,18 @@ def test_odds_are_those_of_two_gaussians_in_the_window(seed: int) -> None:
     near = places_of(ring_of(inside))
     coarse = np.ascontiguousarray(tone[::2, ::2])
     found = local_log_odds(inside, near, tone, coarse, window_means(coarse))
-    some, half = tone[::2, ::2], SAMPLED[0] // 2
+    some, half = tone[::2, ::2], HALF_WINDOW[0] // 2
     wide = cv2.copyMakeBorder(some, half, half, half, half, cv2.BORDER_REFLECT_101).astype(float)
     sides = np.ascontiguousarray(inside[::2, ::2])
     mask = cv2.copyMakeBorder(sides, half, half, half, half, cv2.BORDER_REFLECT_101) > 0
     for place in rng.choice(np.flatnonzero(found), 12, replace=False):
         y, x = near[place]
         v, u = y // 2, x // 2
-        window, own = (a[v : v + SAMPLED[0], u : u + SAMPLED[0]] for a in (wide, mask))
+        window, own = (a[v : v + HALF_WINDOW[0], u : u + HALF_WINDOW[0]] for a in (wide, mask))
         assert LEAST < own.mean() < 1 - LEAST
         cost = []
         for side in (own, ~own):
-            weights = (side / side.size + BOTH / side.size).ravel()
+            weights = (side / side.size + SHARED_PIXELS / side.size).ravel()
             samples, weights = window.reshape(-1, 3), weights / weights.sum()
             mean = weights @ samples
             variance = weights @ samples**2 - mean**2 + NOISE**2
@@ -152,7 +152,7 @@ def test_odds_are_those_of_the_colours_of_the_object_and_its_surroundings(seed: 
     tone = rng.choice(np.array([10, 30, 200], np.uint8), (*SHAPE, 3))
     inside, ring = disc(45, 35, 15).view(np.uint8), disc(45, 35, 25).view(np.uint8)
     near = places_of(ring_of(inside))
-    found = np.clip(np.log(histogram_odds(near, inside, ring, tone, NEITHER)), -MOST, MOST)
+    found = np.clip(np.log(histogram_odds(near, inside, ring, tone, SMOOTHING_PIXELS)), -MOST, MOST)
     colours = tone // (256 // BINS)
     sides = (inside > 0, (ring > 0) & (inside == 0))
     sizes = np.array([side.sum() for side in sides])
@@ -162,7 +162,7 @@ def test_odds_are_those_of_the_colours_of_the_object_and_its_surroundings(seed: 
         others[at] = False
         alike = (colours == colours[at]).all(axis=2) & others
         counts = np.array([(alike & side).sum() for side in sides])
-        within, beyond = counts * sizes.sum() / sizes + NEITHER
+        within, beyond = counts * sizes.sum() / sizes + SMOOTHING_PIXELS
         expected = float(np.clip(np.log(within / beyond), -MOST, MOST))
         assert found[place] == pytest.approx(expected, abs=1e-3)
 
