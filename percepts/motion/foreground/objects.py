@@ -28,19 +28,14 @@ MOVING_BELIEF = 0.5  # belief from which a cell is part of an object
 CARRIED_SHARE = 0.4
 """Share of a cell carried from an object from which the cell remains that object's."""
 OWNED_SHARE = 0.5  # share of a new track owned by an object from which the track is that object's
-REPORT_BELIEF = 0.7
-"""Least mean belief to report an object: ghosts had 0.57 to 0.71, objects 0.74 to 0.93."""
-KEEP_BELIEF = 0.6  # the same for one reported before (hysteresis)
+REPORT_BELIEF = 0.75  # least mean belief to report an object
+KEEP_BELIEF = 0.7  # the same for one reported before (hysteresis)
+OWN_BELIEF = 0.5  # least mean belief by its own cues to report one that never had a track
 WHOLE_SHARE = 0.9  # share of an object's moving cells in a track from which the track is the object
 TRACK_BELIEF = 0.5  # mean belief in the cells of such a track
-TRACKLESS_BELIEF, TRACKLESS_OWN_BELIEF = (
-    0.9,
-    0.5,
-)  # without a track: least belief, and least by its own cues alone
 LEAST_PX = 0.25  # least residual motion, pixels per frame: twice the sampling error
 RESIDUAL = NAMES.index("residual")
 NEWEST_WEIGHT = 0.4  # weight of the newest frame in a running mean
-CONFIRM_FRAMES = 3  # frames before a candidate becomes an object
 CONNECTED_STEPS = 12  # steps from cell to cell over which cells connect to an object
 MISSED_S = 0.5  # an unobserved object is deleted after this many seconds
 
@@ -73,14 +68,15 @@ class MovingObject:
 
     @property
     def is_reportable(self) -> bool:
-        """Whether to report it: the bar is higher when no track supports it.
+        """Whether to report it.
 
         Context may sustain an object but not begin one: otherwise anything that resembles a mover and lies
         where one was believed would confirm itself for ever.
         """
-        if self.had_track:
-            return self.existence >= (KEEP_BELIEF if self.was_reported else REPORT_BELIEF)
-        return self.existence >= TRACKLESS_BELIEF and self.existence_alone >= TRACKLESS_OWN_BELIEF
+        if self.was_reported:
+            return self.existence >= KEEP_BELIEF
+        supported = self.had_track or self.existence_alone >= OWN_BELIEF
+        return supported and self.existence >= REPORT_BELIEF
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -348,11 +344,9 @@ def _observed(
             existence_alone=o.existence_alone
             + weight * (float(alone[k] / pixels[k]) - o.existence_alone),
         )
-        if conditions.alone and not o.id and o.frames >= CONFIRM_FRAMES and o.is_reportable:
-            if conditions.is_standing(objects.owner == k):
-                o = replace(o, frames=0)
-            else:
-                o = replace(o, id=conditions.ids.new())
+        if conditions.alone and not o.id and o.is_reportable:
+            stands = conditions.is_standing(objects.owner == k)
+            o = o if stands else replace(o, id=conditions.ids.new())
         known[k] = replace(o, was_reported=o.was_reported or bool(o.id and o.is_reportable))
     held = np.zeros(objects.last_key + 1, dtype=bool)
     held[list(known)] = True

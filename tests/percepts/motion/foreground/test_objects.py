@@ -9,7 +9,7 @@ from scipy import sparse
 from visup.percepts.motion.foreground.belief import Belief
 from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.objects import (
-    CONFIRM_FRAMES,
+    REPORT_BELIEF,
     ForegroundObjects,
     ReportingConditions,
     TrackCells,
@@ -91,21 +91,37 @@ class Row:
         }
 
 
-def test_what_lasts_is_an_object_and_keeps_its_id_as_it_moves() -> None:
+def test_what_is_believed_is_an_object_at_once_and_keeps_its_id_as_it_moves() -> None:
     world = Row()
     found = [world.step(share(slice(5 + n, 12 + n)), shift=1) for n in range(8)]
-    assert all(not f for f in found[: CONFIRM_FRAMES - 1])
-    ids = {i for f in found[CONFIRM_FRAMES - 1 :] for i in f}
+    assert all(found)
+    ids = {i for f in found for i in f}
     assert len(ids) == 1
     assert found[-1] == {ids.pop(): list(range(12, 19))}
 
 
-def test_what_flickers_or_is_small_is_none() -> None:
+def at_most(belief: float, believed: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.minimum(believed, np.float32(belief))
+
+
+def test_what_is_doubtful_or_small_is_none() -> None:
     world = Row()
     for n in range(10):
         part = slice(5, 12) if n % 2 else slice(25, 32)
-        assert world.step(share(part)) == {}
+        assert world.step(at_most(REPORT_BELIEF - 0.01, share(part))) == {}
     assert all(world.step(share(slice(20, 22))) == {} for _ in range(10))
+
+
+def test_an_object_is_believed_by_the_mean_of_its_past() -> None:
+    world = Row()
+    sure, doubtful = share(slice(5, 15)), at_most(0.6, share(slice(5, 15)))
+    for _ in range(20):
+        world.step(doubtful)
+    assert world.step(sure) == {}, "one sure frame does not outweigh many doubtful ones"
+    for _ in range(20):
+        found = world.step(sure)
+    assert world.step(doubtful) == found, "nor one doubtful frame many sure ones"
+    assert {} in [world.step(doubtful) for _ in range(10)]
 
 
 def test_what_only_its_past_and_its_looks_speak_for_is_none() -> None:
@@ -124,7 +140,7 @@ def test_what_goes_nowhere_begins_no_object() -> None:
 
 def test_the_id_of_a_track_is_that_of_its_object() -> None:
     world = Row()
-    for _ in range(CONFIRM_FRAMES):
+    for _ in range(3):
         found = world.step(share(slice(5, 15)))
     world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
     assert world.objects.id_of_track(7) == next(iter(found))
@@ -139,7 +155,7 @@ def test_a_track_gives_its_id_at_once_and_its_whole_body_belongs_to_it() -> None
 
 def test_an_object_that_a_track_comes_to_follow_keeps_its_id() -> None:
     world = Row()
-    for _ in range(CONFIRM_FRAMES + 1):
+    for _ in range(4):
         before = world.step(share(slice(5, 15)))
     after = world.step(share(slice(5, 15)), tracks(t7=slice(6, 12)))
     assert after == before
@@ -159,7 +175,7 @@ def test_what_is_not_believed_to_move_is_not_reported_whoever_tracks_it() -> Non
 
 def test_a_track_that_was_not_seen_for_a_moment_comes_back_as_the_same() -> None:
     world = Row()
-    for _ in range(CONFIRM_FRAMES + 10):
+    for _ in range(13):
         first = world.step(share(slice(5, 15)))
     world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
     hidden = TrackCells([], [7], np.zeros(COUNT, np.int64), np.zeros(COUNT, np.float32))
@@ -193,7 +209,7 @@ def test_a_track_that_is_the_whole_gives_its_outline_and_a_part_does_not() -> No
 def test_what_was_told_does_not_flicker() -> None:
     world = Row()
     sure, less = share(slice(5, 15)), share()
-    less[5:15] = 0.65
+    less[5:15] = 0.72
     assert world.step(less, tracks(t7=slice(5, 15))) == {}
     for _ in range(5):
         world.step(sure, tracks(t7=slice(5, 15)))
