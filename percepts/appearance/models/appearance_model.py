@@ -86,7 +86,6 @@ def _view_model(view: TaughtView) -> ViewModel:
     x, y, w, h = cv2.boundingRect(view.mask.astype(np.uint8))
     pose, shape = _fitted((x * scale, y * scale, w * scale, h * scale))
     mask = _mask_patch(view.mask, pose, shape, scale)
-    scale = scale
     origin = view.origin[0] * scale, view.origin[1] * scale
     placed = PatchPose(pose.x + origin[0], pose.y + origin[1], pose.scale)
     size = round(view.frame_size[0] * scale), round(view.frame_size[1] * scale)
