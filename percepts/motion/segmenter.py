@@ -35,7 +35,7 @@ from visup.percepts.motion.foreground.foreground_tracking import (
     TrackPosterior,
     initial_foreground,
     update_foreground,
-    without_model,
+    with_ground_motion,
 )
 from visup.percepts.motion.foreground.objects import ReportingConditions
 from visup.percepts.motion.foreground.perceptron import (
@@ -206,8 +206,9 @@ class MotionSegmenter:
         self, scene: FrameMeasurements, shown: FlowCues | None, tracked: TrackPosterior
     ) -> None:
         """Update the foreground belief and its objects, if there is a model."""
+        self._foreground = with_ground_motion(self._foreground, scene)
         if self._model is None or shown is None:
-            self._foreground = without_model(self._foreground, scene)
+            self._foreground = replace(self._foreground, memory=None)
             tracks = self._with_object_ids(tracked.tracks)
             self.trace = SegmentationTrace(scene, tracks, tracked.keys, tracked.posterior)
             return

@@ -9,7 +9,7 @@ from tests.paths import ROOT
 from visup.tasks.supervision.events import KINDS
 from visup.wording import EVENT_KINDS
 
-TELLING = {"Event", "_event", "_stage_event", "tell"}
+TELLING = {"Event", "_event", "_stage_event", "report"}
 ROOMS = ("agent/cycle", "rules", "tasks/supervision")
 
 

@@ -63,27 +63,19 @@ class ForegroundState:
         return self.ground_px is not None and not self.calm
 
 
-def without_model(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
-    """The state after a frame in which only the background's motion is updated.
+def with_ground_motion(state: ForegroundState, scene: FrameMeasurements) -> ForegroundState:
+    """The state with the running mean of the background's displacement updated.
 
     Args:
         state: The state after the previous frame.
         scene: The frame as measured.
     """
-    return replace(state, memory=None, ground_px=_ground_px(state, scene))
-
-
-def _ground_px(state: ForegroundState, scene: FrameMeasurements) -> float:
-    """The running mean of the background's displacement, updated."""
     x, y = scene.cells.centre.astype(np.int64).T
     models = scene.measured[0].background.models
     ground = np.stack([model.at(scene.cells.centre) for model in models])
     speed = float(np.median(nearest_lengths(ground, scene.flow[y, x])))
-    return (
-        speed
-        if state.ground_px is None
-        else state.ground_px + NEWEST_WEIGHT * (speed - state.ground_px)
-    )
+    before = speed if state.ground_px is None else state.ground_px
+    return replace(state, ground_px=before + NEWEST_WEIGHT * (speed - before))
 
 
 def initial_foreground() -> ForegroundState:
@@ -134,7 +126,7 @@ def update_foreground(
     """The foreground after a frame.
 
     Args:
-        state: The state after the previous frame.
+        state: The state after the previous frame, with the ground's motion in this one.
         model: The trained model.
         scene: The frame as measured.
         shown: Its cues that need no tracks, and their memory (`flow_cues`).
@@ -148,4 +140,4 @@ def update_foreground(
     belief = update_belief(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
     objects = update_objects(state.objects, cues, belief, tracks, scene.time, conditions)
-    return cues, ForegroundState(memory, belief, objects, _ground_px(state, scene))
+    return cues, replace(state, memory=memory, belief=belief, objects=objects)
