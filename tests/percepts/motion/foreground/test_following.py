@@ -30,6 +30,13 @@ def test_what_moves_over_a_panning_ground_is_believed_and_reported_under_one_id(
     assert 0 <= belief.min() < 0.1 < 0.9 < belief.max() <= 1
 
 
+def test_a_camera_at_rest_is_known_before_objects_are_reported() -> None:
+    segmenter, ids = MotionSegmenter(), set()
+    for shot in clip(texture(1, (320, 480)), lambda n: (20, 30), [DISC], 16):
+        ids |= {r.id for r in segmenter.step(shot.frame)}
+    assert ids == {1}, "what the belief alone speaks for has taken no id"
+
+
 def test_nothing_is_believed_where_that_is_not_wanted() -> None:
     segmenter = MotionSegmenter(MotionSettings(learnt=False))
     for n in range(3):
