@@ -26,10 +26,8 @@ from visup.percepts.appearance.models.scene import Scene
 KEY_S = 0.5  # lifetime of a key frame, seconds
 OFF_PX = 1.0  # tolerance of a scene point about the common motion, working pixels
 STATIC_PX = 0.35  # most motion of points since the key frame while the camera rests, working pixels
-STATIC_SHARE, AGREEING_SHARE = (
-    0.6,
-    0.45,
-)  # shares of the points that must rest, or agree on a motion
+STATIC_SHARE, AGREEING_SHARE = 0.6, 0.45
+"""Shares of the points that must rest, or agree on a motion."""
 LEAST = 8  # fewest points for an estimate
 
 

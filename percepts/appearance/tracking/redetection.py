@@ -21,26 +21,22 @@ from visup.percepts.appearance.tracking.verification import Match, verify
 
 SURE = 0.6  # score that suffices by itself: no other object was observed to reach it
 FAIR, APART = 0.42, 1.5  # score that suffices if it exceeds those of other positions by a factor
-LEAST_COLOUR_EXCESS = (
-    0.45  # least excess of the object's colours at a position over those around it
-)
+LEAST_COLOUR_EXCESS = 0.45
+"""Least excess of the object's colours at a position over those around it."""
 NOISE = 0.15  # score that any position may have by chance
 MOVING_FAIR, MOVING_APART = 0.45, 1.2  # as FAIR and APART, among positions that changed recently
 TAUGHT_POSE_BONUS = 0.1  # bonus of the position where an object was taught
 RECENT_SIZES = (0.85, 1.0, 1.18)
 SIZES = (0.75, 0.87, 1.0, 1.15, 1.32)
 ROTATIONS = (-0.4, 0.4)
-BODY_SIMILARITY = (
-    0.5  # least intersection of the colour histograms of a moving body and of an object
-)
+BODY_SIMILARITY = 0.5
+"""Least intersection of the colour histograms of a moving body and of an object."""
 BODY_SIZES = (0.5, 1.8)  # size (root of the area) of a moving body, relative to the object's
 LEAST_CUT_BODY_SIZE = 0.25  # least relative size of a moving body that the border cuts off
-OCCLUDER_EXCESS = (
-    -0.5
-)  # excess of an object's colours in a blob over it, up to which the blob occludes it
-OCCUPIED_SHARE = (
-    0.5  # share of a position covered by another object from which that position is occupied
-)
+OCCLUDER_EXCESS = -0.5
+"""Excess of an object's colours in a blob over it, up to which the blob occludes it."""
+OCCUPIED_SHARE = 0.5
+"""Share of a position covered by another object from which that position is occupied."""
 
 
 @dataclass(frozen=True, slots=True)

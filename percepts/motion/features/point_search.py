@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from visup.percepts.motion.features._point_search_jit import WINDOW, search_nearby
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 
-STEPS_NEAR = 10, 0.03  # most iterations of a search, and the step, pixels, at which it stops: well
-STEPS_FAR = (
-    30,
-    0.01,
-)  # below the error of sampling; slow motion over long baselines needs more of both
-NEARBY = (
-    1.0  # pixels; within 2, one point in ten more is found, and more of them differ from OpenCV's
-)
+STEPS_NEAR, STEPS_FAR = (10, 0.03), (30, 0.01)
+"""Most iterations of a search, and the step, pixels, at which it stops: well below the error of sampling.
+Slow motion over long baselines needs more of both."""
+NEARBY = 1.0
+"""Reach of the search, pixels: within 2, one point in ten more is found, and more of them differ from
+OpenCV's."""
 Found = tuple[Floats, NDArray[np.uint8], Floats]
 
 __all__ = ["WINDOW", "search", "search_widely"]

@@ -40,13 +40,10 @@ FAR = np.cos(np.radians(12.0))
 
 _MARGIN = 0.25
 _QUALITY, _APART_PX = 0.02, 4
-_RING = (
-    5,
-    13,
-)  # pixels: sides of the squares by which a body grows to where its surroundings begin and end
-_PLAIN = (
-    12  # range of tones, from the 5th to the 95th percentile, up to which surroundings are plain
-)
+_RING = 5, 13
+"""Pixels: sides of the squares by which a body grows to where its surroundings begin and end."""
+_PLAIN = 12
+"""Range of tones, from the 5th to the 95th percentile, up to which surroundings are plain."""
 _RETURNS_PX = 0.3
 _WINDOW = (15, 15)
 _ROUNDS = 8

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.perceptron import FAR, Perceptron
 
-MEMBERS = (
-    4  # left out by families, J 0.668; of one 0.649 and 0.652, of one with twice the units 0.637
-)
+MEMBERS = 4
+"""Perceptrons in an ensemble: left out by families, J 0.668; of one 0.649 and 0.652, of one of twice the
+units 0.637."""
 HIDDEN = 12
 EPOCHS = 30
 BATCH = 2048
