@@ -50,9 +50,8 @@ class MovingObject:
         key: Internal key, from 1.
         id: Public number; 0 for a candidate.
         track: Public id of its track, observed or not; 0 when there is none.
-        frames: In how many frames it was observed.
         last_seen: Seconds.
-        existence: Running mean of the belief in its superpixels.
+        existence: Running mean of the belief in its superpixels; 0 before it was observed.
         existence_alone: The same from the cues of superpixels alone.
         had_track: Whether it ever had a track.
         was_reported: Whether it was ever believed enough to be reported.
@@ -61,7 +60,6 @@ class MovingObject:
     key: int
     id: int
     track: int
-    frames: int
     last_seen: float
     existence: float = 0.0
     existence_alone: float = 0.0
@@ -178,7 +176,7 @@ def update_objects(
     owner = _spread_ownership(owner, moves, cues)
     owner, fresh = _candidates(owner, moves, cues, conditions.least, last_key)
     last_key += len(fresh)
-    known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
+    known |= {k: MovingObject(k, 0, 0, now) for k in fresh}
     objects = ForegroundObjects(owner, belief.share, known, last_key)
     # Residual motion within the sampling error supports no object.
     moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
@@ -264,7 +262,7 @@ def _with_tracks(
         o = known.get(_main_owner(previous[mine], area[mine]))
         if o is None or o.track:
             last_key += 1
-            o = MovingObject(last_key, track, 0, 0, -math.inf)
+            o = MovingObject(last_key, track, 0, -math.inf)
         known[o.key] = replace(o, id=o.id or track, track=track, had_track=True)
     return known, last_key
 
@@ -318,6 +316,17 @@ def _candidates(
     return out, [int(k) for k in keys[good]]
 
 
+def _with_belief(o: MovingObject, belief: float, alone: float, now: float) -> MovingObject:
+    """An object after a frame in which its cells have these mean beliefs, in all and by their own cues."""
+    weight = NEWEST_WEIGHT if o.existence else 1.0
+    return replace(
+        o,
+        last_seen=now,
+        existence=o.existence + weight * (belief - o.existence),
+        existence_alone=o.existence_alone + weight * (alone - o.existence_alone),
+    )
+
+
 def _observed(
     objects: ForegroundObjects,
     belief: Belief,
@@ -325,7 +334,7 @@ def _observed(
     now: float,
     conditions: ReportingConditions,
 ) -> ForegroundObjects:
-    """The objects updated from the frame: lasting candidates confirmed, missing ones deleted."""
+    """The objects updated from the frame: believed candidates confirmed, missing ones deleted."""
     pixels = np.bincount(objects.owner, area, objects.last_key + 1)
     beliefs, alone = (
         np.bincount(objects.owner, area * share, objects.last_key + 1)
@@ -337,15 +346,7 @@ def _observed(
             if o.track or now - o.last_seen <= (MISSED_S if o.id else 0):
                 known[k] = o
             continue
-        weight = NEWEST_WEIGHT if o.frames else 1.0
-        o = replace(
-            o,
-            frames=o.frames + 1,
-            last_seen=now,
-            existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
-            existence_alone=o.existence_alone
-            + weight * (float(alone[k] / pixels[k]) - o.existence_alone),
-        )
+        o = _with_belief(o, float(beliefs[k] / pixels[k]), float(alone[k] / pixels[k]), now)
         if conditions.alone and not o.id and o.is_reportable:
             stands = conditions.is_standing(objects.owner == k)
             o = o if stands else replace(o, id=conditions.ids.new())
